@@ -1,0 +1,61 @@
+"""One clock: the rules that tie states and actions to time, for recording, data sets and execution alike.
+
+At step k of the 30 Hz recording the state s_k is read, the action u_k is chosen in it, (s_k, u_k) is stored and
+the world advances to s_{k+1}. A data set at `fps` keeps every `stride`-th state; its action is what, held until
+the next frame, best reproduces the motion. Execution holds each action for `stride` steps.
+"""
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from .exceptions import InvalidValueError
+from .task import RECORD_HZ
+
+Hold = Literal["mean", "first"]
+"""How the actions between two frames become one: their mean (reproduces the motion), or the first of them."""
+
+
+def stride(fps: int) -> int:
+    """Recorded steps in a frame.
+
+    Raises:
+        InvalidValueError: `fps` does not divide the recording rate.
+    """
+    if fps < 1 or RECORD_HZ % fps:
+        divisors = [d for d in range(1, RECORD_HZ + 1) if RECORD_HZ % d == 0]
+        raise InvalidValueError("fps", f"a divisor of {RECORD_HZ} {divisors}", fps)
+    return RECORD_HZ // fps
+
+
+def frame_states(states: np.ndarray, fps: int) -> np.ndarray:
+    """States of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`."""
+    return states[:: stride(fps)]
+
+
+def frame_actions(actions: np.ndarray, fps: int, hold: Hold = "mean") -> np.ndarray:
+    """Actions of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`.
+
+    The dynamics are linear in the force but for a clip, so the mean of the held steps gives the velocity that was
+    recorded; the last frame may hold fewer steps.
+    """
+    step = stride(fps)
+    if hold not in get_args(Hold):
+        raise InvalidValueError("hold", f"one of {get_args(Hold)}", hold)
+    if hold == "first" or step == 1:
+        return actions[::step].copy()
+    starts = np.arange(0, len(actions), step)
+    counts = np.diff(np.append(starts, len(actions)))
+    return np.add.reduceat(actions, starts, axis=0) / counts[:, None]
+
+
+def previous_actions(actions: np.ndarray) -> np.ndarray:
+    """The action of the frame before each frame, zero at the first: `(T, n)` to `(T, n)`."""
+    previous = np.zeros_like(actions)
+    previous[1:] = actions[:-1]
+    return previous
+
+
+def zero_order_hold(actions: np.ndarray, fps: int) -> np.ndarray:
+    """Executed actions of a plan: `(T, n)` at `fps` to `(T * stride, n)` at the recording rate."""
+    return np.repeat(actions, stride(fps), axis=0)

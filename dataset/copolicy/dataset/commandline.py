@@ -1,0 +1,92 @@
+"""What every command of every room shares: flags, exit status, progress, and errors of one line."""
+
+import argparse
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterable, Sequence
+
+from tqdm import tqdm
+
+from .exceptions import CopolicyError
+
+Handler = Callable[[argparse.Namespace], dict]
+"""A command: takes its parsed flags, returns its summary as a JSON-able dict."""
+
+
+def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+    """Parser of one room's script, and where its commands are added."""
+    parser = argparse.ArgumentParser(prog=prog, description=description)
+    return parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+
+def add_command(commands: argparse._SubParsersAction, name: str, handler: Handler, help: str, example: str):
+    """Adds a command with `--json`, `--debug` and an example at the end of its `--help`."""
+    parser = commands.add_parser(
+        name,
+        help=help,
+        description=help,
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_common_flags(parser)
+    parser.set_defaults(handler=handler)
+    return parser
+
+
+def add_common_flags(parser: argparse.ArgumentParser) -> None:
+    """The two flags that every command has."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout; logs go to stderr")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> int:
+    """Parses, runs the handler, prints its summary; returns the exit status (0, 1 or 2).
+
+    A summary may hold `exit_status` when the work was done but its result is a finding (1).
+    """
+    arguments = parser.parse_args(argv)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
+    try:
+        summary = dict(arguments.handler(arguments))
+    except CopolicyError as error:
+        if arguments.debug:
+            raise
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return error.exit_status
+    except OSError as error:
+        if arguments.debug:
+            raise
+        print(f"{parser.prog}: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{parser.prog}: stopped", file=sys.stderr)
+        return 130
+    status = int(summary.pop("exit_status", 0))
+    if arguments.json:
+        print(json.dumps(summary, indent=2))
+    else:
+        for line in _lines(summary):
+            print(line)
+    return status
+
+
+def progress[Item](items: Iterable[Item], total: int | None, what: str) -> Iterable[Item]:
+    """A progress bar on stderr when that is a terminal (or `COPOLICY_PROGRESS=1`), nothing otherwise."""
+    shown = sys.stderr.isatty() or os.environ.get("COPOLICY_PROGRESS") == "1"
+    return tqdm(items, total=total, desc=what, disable=not shown, file=sys.stderr, mininterval=0.5, leave=True)
+
+
+def _lines(summary: dict, indent: str = "") -> Iterable[str]:
+    width = max((len(str(key)) for key in summary), default=0)
+    for key, value in summary.items():
+        if isinstance(value, dict):
+            yield f"{indent}{key}"
+            yield from _lines(value, indent + "  ")
+        elif isinstance(value, float):
+            yield f"{indent}{key:<{width}}  {value:.4g}"
+        elif isinstance(value, (list, tuple)) and len(value) > 12:
+            yield f"{indent}{key:<{width}}  {len(value)} entries (see --json)"
+        else:
+            yield f"{indent}{key:<{width}}  {value}"
