@@ -73,9 +73,17 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
 
 
 def progress[Item](items: Iterable[Item], total: int | None, what: str) -> Iterable[Item]:
-    """A progress bar on stderr when that is a terminal (or `COPOLICY_PROGRESS=1`), nothing otherwise."""
+    """Passes items on under a progress bar."""
+    with progress_bar(total, what) as bar:
+        for item in items:
+            yield item
+            bar.update()
+
+
+def progress_bar(total: int | None, what: str) -> tqdm:
+    """A progress bar on stderr when that is a terminal (or `COPOLICY_PROGRESS=1`), silent otherwise."""
     shown = sys.stderr.isatty() or os.environ.get("COPOLICY_PROGRESS") == "1"
-    return tqdm(items, total=total, desc=what, disable=not shown, file=sys.stderr, mininterval=0.5, leave=True)
+    return tqdm(total=total, desc=what, disable=not shown, file=sys.stderr, mininterval=0.5)
 
 
 def _lines(summary: dict, indent: str = "") -> Iterable[str]:

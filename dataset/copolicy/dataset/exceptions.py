@@ -13,6 +13,10 @@ class CopolicyError(Exception):
 
     exit_status = 2
 
+    def __reduce__(self):
+        # Children build the message from other arguments; an error that comes out of a worker process has it already.
+        return _with_message, (type(self), self.args)
+
 
 class ShapeError(CopolicyError):
     """An array of another shape than the one promised."""
@@ -62,6 +66,10 @@ class RunError(CopolicyError):
     """The call was right, but the data or the run has a problem."""
 
     exit_status = 1
+
+
+def _with_message(kind: type[CopolicyError], args: tuple) -> CopolicyError:
+    return kind.__new__(kind, *args)
 
 
 def _shape(shape: tuple[int | str, ...]) -> str:

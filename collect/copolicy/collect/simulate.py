@@ -1,0 +1,252 @@
+"""Records episodes of scripted pairs, as fast as the machine goes."""
+
+import multiprocessing
+import os
+import signal
+import time
+import uuid
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from importlib.metadata import version
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from copolicy.dataset.commandline import progress
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
+from copolicy.dataset.task import MapConfig, Physics, identify
+from copolicy.dataset.task import map_set as maps_of
+
+from .episode_file import PART_SUFFIX
+from .pilots import PAIRS, simulated_pair
+from .recorder import EpisodeRecorder
+from .schedule import balanced_schedule
+from .wall_clock import WallClockAnchor
+from .world import RUNNING, TableWorld
+
+
+class Pilot(Protocol):
+    """Whoever moves one end of the table."""
+
+    def act(self, state: np.ndarray) -> np.ndarray:
+        """The force `(2,)` in a state `(7,)`."""
+        ...
+
+
+@dataclass(frozen=True)
+class EpisodeJob:
+    """All that a worker needs for one episode."""
+
+    path: Path
+    map_config: MapConfig
+    physics: Physics
+    meta: EpisodeMeta
+    anchor: WallClockAnchor
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """How one episode went."""
+
+    termination_reason: str
+    success: bool
+    steps: int
+    size: int  # bytes of its file
+
+
+def simulate(
+    out: Path | str,
+    episodes: int,
+    seed: int,
+    map_set: str = "training",
+    workers: int | None = None,
+    orientations: bool = False,
+    pairs: Sequence[str] | None = None,
+    physics: Physics | None = None,
+    started_ns: int | None = None,
+) -> dict:
+    """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
+
+    States and actions depend on the seed, the set and the pairs alone, not on the workers or the machine's load:
+    each episode draws from `SeedSequence((seed, index))`. Failures and time-outs are kept, marked as what they are.
+
+    Args:
+        out: the folder; made if missing.
+        episodes: how many.
+        seed: of the schedule and of the pilots.
+        map_set: one of `MAP_SETS`.
+        workers: processes; by default one for each processor.
+        orientations: each map with four start orientations.
+        pairs: names out of `PAIRS`; by default all.
+        physics: settings of the dynamics.
+        started_ns: the moment that the recordings carry, UTC, nanoseconds since 1970; by default now. With a given
+            one, equal calls write equal bytes.
+
+    Returns:
+        Counts and rates, JSON-able.
+
+    Raises:
+        OutputExistsError: the folder holds recordings already, or is none; nothing was written.
+        UnknownNameError: no such map set or pair.
+        InvalidValueError: less than one episode or worker, or a negative seed.
+    """
+    out = Path(out)
+    workers = _processors() if workers is None else workers
+    for name, value, least in (("episodes", episodes, 1), ("workers", workers, 1), ("seed", seed, 0)):
+        if value < least:
+            raise InvalidValueError(name, f"at least {least}", value)
+    maps = maps_of(map_set, orientations)
+    pairs = tuple(PAIRS) if pairs is None else tuple(pairs)
+    for pair in pairs:
+        if pair not in PAIRS:
+            raise UnknownNameError("pair", pair, PAIRS)
+    _refuse_recordings(out)
+
+    anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
+    variant = f"{map_set}{'-orientations' if orientations else ''}"
+    physics = physics or Physics()
+    jobs = [
+        EpisodeJob(
+            out / f"episode_{index:06d}.mcap",
+            maps[place],
+            physics,
+            _meta(maps[place], pair, variant, seed, index),
+            anchor,
+        )
+        for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed))
+    ]
+    out.mkdir(parents=True, exist_ok=True)
+    started = time.perf_counter()
+    results = list(progress(_record_all(jobs, workers), len(jobs), "episodes"))
+    return _summary(out, results, time.perf_counter() - started)
+
+
+def record_episode(
+    path: Path,
+    map_config: MapConfig,
+    pilots: tuple[Pilot, Pilot],
+    meta: EpisodeMeta,
+    anchor: WallClockAnchor,
+    physics: Physics | None = None,
+) -> EpisodeResult:
+    """Lets two pilots carry the table until the episode ends, and records it.
+
+    Args:
+        path: of the finished file.
+        map_config: the map.
+        pilots: robot, human.
+        meta: what is known at the start.
+        anchor: moment of the first step.
+        physics: settings of the dynamics.
+    """
+    world = TableWorld(map_config, physics)
+    with EpisodeRecorder(path, map_config, meta, anchor) as recorder:
+        outcome = RUNNING
+        while not outcome.done:
+            state = world.observation
+            action = np.clip(np.concatenate([pilot.act(state) for pilot in pilots]), -1.0, 1.0)
+            outcome = world.step(action)
+            recorder.step(action, world.pose, world.velocity, world.reward())
+        recorder.finish(outcome.success, outcome.reason)
+    return EpisodeResult(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)
+
+
+def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
+    map_id, map_set = identify(map_config)
+    software = version("lerobot_policy_copolicy")
+    return EpisodeMeta(
+        episode_uuid=str(uuid.uuid5(uuid.NAMESPACE_OID, f"copolicy {software} {variant} {pair} {seed} {index}")),
+        session_id=f"simulated-{variant}-{seed}",
+        pair_id=pair,
+        player_0_id=f"{pair}-robot",
+        player_1_id=f"{pair}-human",
+        controller_0="scripted",
+        controller_1="scripted",
+        map_id=map_id,
+        map_set=map_set,
+        seed=int(np.random.SeedSequence((seed, index)).generate_state(1)[0]),
+        source="simulated",
+        software_version=software,
+    )
+
+
+def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]:
+    groups = _groups_by_plan(jobs, workers)
+    if workers == 1 or len(groups) == 1:
+        for group in groups:
+            for job in group:
+                yield _record(job)
+        return
+    # Spawned, not forked: a fork would copy the locks of whatever threads the caller runs.
+    context = multiprocessing.get_context("spawn")
+    stop = context.Event()
+    with ProcessPoolExecutor(min(workers, len(groups)), context, _start_worker, (stop,)) as pool:
+        futures = [pool.submit(_record_group, group) for group in groups]
+        try:
+            for future in as_completed(futures):
+                yield from future.result()
+        except BaseException:
+            stop.set()
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[EpisodeJob]]:
+    """Episodes with the same goal and obstacles together: planning around them takes time, and a process keeps it."""
+    by_plan: dict[tuple, list[EpisodeJob]] = defaultdict(list)
+    for job in jobs:
+        config = job.map_config
+        by_plan[config.goal, config.obstacles, config.obstacle_size].append(job)
+    parts = -(-workers // len(by_plan))
+    return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
+
+
+_stop: Event | None = None  # of a worker process, set when the command is stopped
+
+
+def _start_worker(stop: Event) -> None:
+    # Ctrl-C reaches every process of a terminal: the workers leave it to the first one and finish their episode.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    global _stop
+    _stop = stop
+
+
+def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
+    return [_record(job) for job in jobs if _stop is None or not _stop.is_set()]
+
+
+def _record(job: EpisodeJob) -> EpisodeResult:
+    pilots = simulated_pair(job.map_config, job.meta.pair_id, job.meta.seed)
+    return record_episode(job.path, job.map_config, pilots, job.meta, job.anchor, job.physics)
+
+
+def _refuse_recordings(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise OutputExistsError(out)
+    for pattern in ("*.mcap", f"*.mcap{PART_SUFFIX}"):
+        for found in sorted(out.glob(pattern)):
+            raise OutputExistsError(found)
+
+
+def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict:
+    steps = sum(result.steps for result in results)
+    size = sum(result.size for result in results)
+    return {
+        "out": str(out),
+        "episodes": len(results),
+        "success_rate": sum(result.success for result in results) / len(results),
+        "termination_reasons": dict(sorted(Counter(result.termination_reason for result in results).items())),
+        "steps": steps,
+        "bytes": size,
+        "seconds": round(seconds, 3),
+        "steps_per_second": round(steps / seconds, 1),
+    }
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,79 @@
+"""The table: its outline as three convex parts, and how its picture sits on the pixel grid.
+
+The table is drawn as an image of 191 x 59 px. Its solid part is a circle at the human's end, a board with rounded
+corners and a triangle at the robot's end, with gaps of 4 px between them: a rectangle would collide where the
+original does not. Image coordinates (u, v) have their origin in the middle of the image, u to the right and v down
+at theta = 0; theta turns counter-clockwise on screen.
+"""
+
+import math
+
+import pymunk
+
+IMAGE_SIZE = (191, 59)
+"""Width and height of the table's image at theta = 0, px; the wall rule counts its transparent corners too."""
+
+CIRCLE_CENTRE = (-78.0, 0.0)
+CIRCLE_RADIUS = 17.5
+BOARD = (-56.5, -29.5, 51.5, 29.5)
+"""Left, top, right, bottom in image coordinates, px; the board's middle is 2.5 px off the image's."""
+BOARD_CORNER_RADIUS = 13.0
+TRIANGLE = ((55.5, 17.5), (72.5, -16.5), (76.5, -16.5), (95.5, 17.5))
+
+REACH = math.hypot(95.5, 17.5)
+"""Distance of the outermost solid point from the centre, px."""
+
+# The corners of square pixels stick out of the circle that they draw.
+_CIRCLE_FRINGE = 0.3
+
+PART_BOUNDS = (
+    (*CIRCLE_CENTRE, CIRCLE_RADIUS + _CIRCLE_FRINGE),
+    (-2.5, 0.0, math.hypot(54.0, 29.5)),
+    (75.5, 2.0, math.hypot(20.5, 18.5)),
+)
+"""A circle (u, v, radius) around each part, in the order of `table_shapes`, px."""
+
+
+def table_shapes(body: pymunk.Body) -> tuple[pymunk.Shape, ...]:
+    """Circle, board and triangle of the table on a body whose angle is minus theta (pymunk turns from x to y)."""
+    left, top, right, bottom = BOARD
+    r = BOARD_CORNER_RADIUS
+    inner = [(left + r, top + r), (right - r, top + r), (right - r, bottom - r), (left + r, bottom - r)]
+    return (
+        pymunk.Circle(body, CIRCLE_RADIUS + _CIRCLE_FRINGE, CIRCLE_CENTRE),
+        pymunk.Poly(body, inner, radius=r),
+        pymunk.Poly(body, list(TRIANGLE)),
+    )
+
+
+def square_shape(body: pymunk.Body, centre: tuple[float, float], size: int) -> pymunk.Poly:
+    """An obstacle or the goal as the hull of its pixels' centres.
+
+    The original puts the corner of the square at the whole pixel towards zero and compares pixels: a table that
+    reaches less than half a pixel into the square touches none of them.
+    """
+    left, top = (int(value - size / 2) for value in centre)
+    near, far = 0.5, size - 0.5
+    corners = [(left + u, top + v) for u, v in ((near, near), (far, near), (far, far), (near, far))]
+    return pymunk.Poly(body, corners)
+
+
+def image_size(cos: float, sin: float) -> tuple[int, int]:
+    """Width and height of the turned image, px: the box that must stay in the window."""
+    width, height = IMAGE_SIZE
+    cos, sin = abs(cos), abs(sin)
+    return int(width * cos + height * sin), int(width * sin + height * cos)
+
+
+def drawn_centre(x: float, y: float, image_width: int) -> tuple[float, float]:
+    """Where the middle of the picture is on screen: the position cut to whole pixels, and half a pixel that
+    depends on the width of the turned image (pygame's rotation, found by comparing 6,000 turned masks)."""
+    return int(x) + 0.5 * (image_width & 1), int(y) + 0.5
+
+
+def on_screen(pose: tuple[float, float, float], point: tuple[float, float]) -> tuple[float, float]:
+    """Position on screen of a point (u, v) of the table, px."""
+    x, y, theta = pose
+    u, v = point
+    cos, sin = math.cos(theta), math.sin(theta)
+    return x + u * cos + v * sin, y - u * sin + v * cos

@@ -1,0 +1,104 @@
+"""`copolicy-convert`: recordings, and files of the original program, to LeRobot v3 data sets."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+from copolicy.dataset.clock import Hold
+from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.exceptions import InvalidValueError
+
+from .prepare import Conversion
+from .recordings import convert_recordings
+from .upstream import convert_upstream
+from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command; returns the exit status."""
+    return run(_parser(), argv)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser, commands = command_parser("copolicy-convert", "Make LeRobot v3 data sets.")
+    mcap = add_command(
+        commands, "mcap", _mcap, "convert recordings, one MCAP file an episode, to a LeRobot v3 data set",
+        "copolicy-convert mcap recordings --root datasets/table --repo-id me/table",
+    )  # fmt: skip
+    mcap.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="folders of recordings, or single files")
+    _add_output_flags(mcap)
+    mcap.add_argument("--keep-discarded", action="store_true", help="keep episodes that the operator discarded")
+    mcap.add_argument("--no-drift", action="store_true", help="leave out the re-simulation (replay_drift_px)")
+    mcap.add_argument(
+        "--workers", type=int, default=1, metavar="N",
+        help="processes that read; pays from thousands of files on, the result is the same (default: %(default)s)",
+    )  # fmt: skip
+    upstream = add_command(
+        commands, "upstream", _upstream,
+        "convert files of the original program (raw pickles, processed npz, or its 10 Hz zarr store)",
+        "copolicy-convert upstream data/table/table_10Hz.zarr --root datasets/demonstrations --repo-id me/table",
+    )  # fmt: skip
+    upstream.add_argument("path", type=Path, metavar="PATH", help="folder of the files, or the store")
+    _add_output_flags(upstream)
+    upstream.add_argument(
+        "--angular-limit", choices=("auto", *ANGULAR_LIMITS), default="auto",
+        help="bound on the angular acceleration when they were recorded, rad/s^2; auto finds it for each episode",
+    )  # fmt: skip
+    upstream.add_argument(
+        "--obstacle-size", type=int, default=50, metavar="PX",
+        help="side of the obstacles, which the files do not tell (default: %(default)s, the training maps')",
+    )  # fmt: skip
+    return parser
+
+
+def _add_output_flags(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must not exist")
+    parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
+    parser.add_argument("--fps", type=int, default=10, help="frames a second, a divisor of 30 (default: %(default)s)")
+    parser.add_argument(
+        "--hold", choices=get_args(Hold), default=None,
+        help="a frame's action: the mean of its steps or the first (default: mean; first for a zarr store)",
+    )  # fmt: skip
+    parser.add_argument("--license", default="", metavar="ID", help="licence of episodes that state none, SPDX")
+    parser.add_argument(
+        "--skip-damaged", action="store_true", help="leave damaged files out and name them, instead of stopping"
+    )
+
+
+def _mcap(arguments: argparse.Namespace) -> dict:
+    conversion = Conversion(
+        arguments.fps,
+        arguments.hold or "mean",
+        arguments.license,
+        keep_discarded=arguments.keep_discarded,
+        drift=not arguments.no_drift,
+    )
+    return convert_recordings(
+        arguments.folders,
+        arguments.root,
+        _repo_id(arguments.repo_id),
+        conversion,
+        arguments.skip_damaged,
+        arguments.workers,
+    )
+
+
+def _upstream(arguments: argparse.Namespace) -> dict:
+    return convert_upstream(
+        arguments.path,
+        arguments.root,
+        _repo_id(arguments.repo_id),
+        arguments.fps,
+        arguments.hold,
+        UpstreamOptions(arguments.angular_limit, arguments.obstacle_size),
+        arguments.license,
+        arguments.skip_damaged,
+    )
+
+
+def _repo_id(text: str) -> str:
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", text):
+        raise InvalidValueError("--repo-id", "USER/NAME", text)
+    return text

@@ -1,0 +1,192 @@
+"""Writes a LeRobot v3 data set in one go: whole episodes as row groups, metadata once at the end.
+
+LeRobot's own `add_frame` / `save_episode` spends most of its time on images that are not there, rewrites the
+metadata at every episode, and loses the set when it is interrupted. The files are the same, row for row.
+"""
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.clock import Hold
+from copolicy.dataset.episode import EPISODE_COLUMNS
+from copolicy.dataset.exceptions import MissingExtraError, RunError
+from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.task import RECORD_HZ
+
+from .prepare import PreparedEpisode
+from .staging import new_folder
+from .statistics import episode_statistics
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from lerobot.datasets.compute_stats import aggregate_stats
+    from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+    from lerobot.datasets.feature_utils import get_hf_features_from_features
+    from lerobot.datasets.io_utils import write_info, write_stats
+    from lerobot.datasets.utils import DEFAULT_EPISODES_PATH, update_chunk_file_indices
+except ImportError as error:
+    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
+
+ROBOT_TYPE = "copolicy_table"
+RECORD_FILE = Path("meta/copolicy.json")
+_ARROW_TYPES = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
+
+
+@dataclass(frozen=True)
+class WrittenDataset:
+    """What was written."""
+
+    root: Path
+    repo_id: str
+    fps: int
+    hold: Hold
+    episodes: int
+    frames: int
+    successes: int
+
+    def summary(self) -> dict:
+        """For the end of a command."""
+        return {**asdict(self), "root": str(self.root)}
+
+
+def write_dataset(
+    episodes: Iterable[PreparedEpisode],
+    root: Path,
+    repo_id: str,
+    fps: int,
+    hold: Hold,
+    record: Callable[[], dict],
+    data_file_mb: int | None = None,
+) -> WrittenDataset:
+    """Writes the episodes, in their order, as a LeRobot v3 data set at `root`.
+
+    How actions were held is an extra key of the feature `action` in meta/info.json, where it survives loading,
+    pushing, splitting and editing and keeps sets of different holds from being merged. The rest of `record`
+    (versions, sources, what was left out, notes by episode) is in meta/copolicy.json: extra keys at the top of
+    info.json do not survive, and inside a feature they would keep sets of different versions from being merged.
+
+    Args:
+        episodes: consumed one by one.
+        record: JSON-able facts about the conversion, asked for once all episodes are consumed.
+        data_file_mb: size of a data file after which the next is begun, LeRobot's default if None.
+
+    Raises:
+        OutputExistsError: there is something at `root`; nothing is touched.
+        RunError: no episodes, or two with the same episode_uuid; nothing is left behind.
+    """
+    with new_folder(root) as partial:
+        meta = LeRobotDatasetMetadata.create(
+            repo_id, fps, _features(hold), ROBOT_TYPE, partial, use_videos=False, data_files_size_in_mb=data_file_mb
+        )
+        meta.save_episode_tasks([TASK])
+        rows, statistics, notes = _write_data(episodes, meta)
+        if not rows:
+            raise RunError(f"{root}: expected at least one episode to write, found none")
+        _write_episodes(rows, statistics, partial)
+        meta.info.total_episodes, meta.info.total_frames = len(rows), rows[-1]["dataset_to_index"]
+        meta.info.total_tasks, meta.info.splits = 1, {"train": f"0:{len(rows)}"}
+        write_info(meta.info, partial)
+        write_stats(aggregate_stats(statistics), partial)
+        text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
+        (partial / RECORD_FILE).write_text(text + "\n")
+    successes = sum(row["success"] for row in rows)
+    return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
+
+
+def _features(hold: Hold) -> dict[str, dict]:
+    action = {**FEATURES[ACTION], "hold": hold, "record_hz": RECORD_HZ}
+    return {**FEATURES, ACTION: action}
+
+
+def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
+    """Rows of meta/episodes without statistics, statistics of every episode, and notes by episode."""
+    schema = get_hf_features_from_features(meta.features).arrow_schema
+    rows: list[dict] = []
+    statistics: list[dict] = []
+    notes: dict[str, list[str]] = {}
+    seen: dict[str, int] = {}
+    chunk = file = start = 0
+    writer = None
+    try:
+        for index, episode in enumerate(episodes):
+            uuid = episode.meta.episode_uuid
+            if uuid in seen:
+                raise RunError(
+                    f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}"
+                )
+            seen[uuid] = index
+            path = meta.root / meta.data_path.format(chunk_index=chunk, file_index=file)
+            if writer is not None and path.stat().st_size >= meta.data_files_size_in_mb * 2**20:
+                writer.close()
+                writer = None
+                chunk, file = update_chunk_file_indices(chunk, file, meta.chunks_size)
+                path = meta.root / meta.data_path.format(chunk_index=chunk, file_index=file)
+            if writer is None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                writer = pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True)
+            clock = _clock_columns(index, start, episode.frames, meta.fps)
+            writer.write_table(_table({**episode.columns, **clock}, schema))
+            end = start + episode.frames
+            rows.append(
+                {
+                    "episode_index": index,
+                    "tasks": [TASK],
+                    "length": episode.frames,
+                    "data/chunk_index": chunk,
+                    "data/file_index": file,
+                    "dataset_from_index": start,
+                    "dataset_to_index": end,
+                    **asdict(episode.meta),
+                    "meta/episodes/chunk_index": 0,
+                    "meta/episodes/file_index": 0,
+                }
+            )
+            statistics.append({**episode.statistics, **episode_statistics(clock)})
+            if episode.notes:
+                notes[uuid] = list(episode.notes)
+            start = end
+    finally:
+        if writer is not None:
+            writer.close()
+    return rows, statistics, notes
+
+
+def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, np.ndarray]:
+    order = np.arange(frames)
+    return {
+        "timestamp": (order / fps).astype(np.float32),
+        "frame_index": order,
+        "episode_index": np.full(frames, index),
+        "index": start + order,
+        "task_index": np.zeros(frames, np.int64),
+    }
+
+
+def _table(columns: dict[str, np.ndarray], schema) -> "pa.Table":
+    arrays = []
+    for field in schema:
+        values = columns[field.name]
+        if pa.types.is_fixed_size_list(field.type):
+            flat = pa.array(values.reshape(-1), field.type.value_type)
+            arrays.append(pa.FixedSizeListArray.from_arrays(flat, type=field.type))
+        else:
+            arrays.append(pa.array(values, field.type))
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> None:
+    columns = {}
+    for name in rows[0]:
+        kind = EPISODE_COLUMNS.get(name)
+        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None)
+    for feature, kinds in statistics[0].items():
+        for kind in kinds:
+            columns[f"stats/{feature}/{kind}"] = pa.array([entry[feature][kind].tolist() for entry in statistics])
+    path = root / DEFAULT_EPISODES_PATH.format(chunk_index=0, file_index=0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=True)

@@ -1,0 +1,94 @@
+"""The topics of a recording: their names, the message type of each, and what their channels say about units."""
+
+import functools
+from dataclasses import dataclass, field
+from typing import Any
+
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap_protobuf.schema import build_file_descriptor_set
+
+from .messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, PlayerInput, TableState
+from .task import PLAYERS
+
+ENCODING = "protobuf"
+"""Encoding of every message and of every schema."""
+
+SCREEN_FRAME = "screen: origin top left, x right, y down, theta counter-clockwise on screen"
+SCENE_FRAME = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One stream of messages in a recording."""
+
+    name: str
+    message: Any  # class of a protobuf message
+    metadata: dict[str, str] = field(default_factory=dict)  # of its channel: units, frame, player
+
+    @property
+    def schema_name(self) -> str:
+        """Full name of the message, as the schema record has it."""
+        return self.message.DESCRIPTOR.full_name
+
+
+def _of_player(player: int) -> dict[str, str]:
+    return {"player": str(player), "seat": PLAYERS[player]}
+
+
+TABLE_STATE = Topic(
+    "/table/state",
+    TableState,
+    {"units": "x, y: px; theta: rad; vx, vy: px/s; omega: rad/s; sim_time: s", "frame": SCREEN_FRAME},
+)
+INPUTS = tuple(
+    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **_of_player(player)})
+    for player in range(2)
+)
+ACTIONS = tuple(
+    Topic(
+        f"/player/{player}/action",
+        PlayerAction,
+        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": SCREEN_FRAME, **_of_player(player)},
+    )
+    for player in range(2)
+)
+INTERACTION = Topic("/interaction", Interaction, {"units": "force: a player's full force; positive pulls apart"})
+LOOP_TIMING = Topic("/loop/timing", LoopTiming, {"units": "ns on the monotonic clock"})
+EVENT = Topic("/episode/event", EpisodeEvent)
+SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
+SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
+
+TOPICS = (TABLE_STATE, *INPUTS, *ACTIONS, INTERACTION, LOOP_TIMING, EVENT, SCENE_MAP, SCENE)
+"""Every topic of a recording, in the order of its channels."""
+
+
+@functools.cache
+def schema_data(message: Any) -> bytes:
+    """The FileDescriptorSet of a message and all it needs, the `data` of its schema record."""
+    return build_file_descriptor_set(message).SerializeToString(deterministic=True)
+
+
+@functools.cache
+def schema_difference(data: bytes, message: Any) -> str:
+    """What keeps our message class from decoding what a file's schema describes; empty where nothing does.
+
+    A field of another type would not fail to decode, it would silently read as zero. Further fields are harmless.
+    """
+    if data == schema_data(message):
+        return ""
+    full_name = message.DESCRIPTOR.full_name
+    theirs = {
+        f"{file.package}.{kind.name}": {one.name: (one.number, one.type, one.label) for one in kind.field}
+        for file in FileDescriptorSet.FromString(data).file
+        for kind in file.message_type
+    }
+    if full_name not in theirs:
+        return f"no message {full_name} in the schema"
+    for ours in build_file_descriptor_set(message).file:
+        for kind in ours.message_type:
+            if f"{ours.package}.{kind.name}" == full_name:
+                for one in kind.field:
+                    if theirs[full_name].get(one.name) != (one.number, one.type, one.label):
+                        return f"another field {one.name!r} in the schema of {full_name}"
+    return ""

@@ -1,0 +1,57 @@
+import pytest
+
+from copolicy.convert.staging import new_folder
+from copolicy.dataset.exceptions import OutputExistsError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def build_and_fail(path, error):
+    with new_folder(path) as partial:
+        partial.mkdir()
+        (partial / "file").write_text("half")
+        raise error
+
+
+def build_beside_another(path):
+    with new_folder(path) as partial:
+        partial.mkdir()
+        path.mkdir()
+
+
+def test_the_folder_appears_when_it_is_complete(tmp_path):
+    with new_folder(tmp_path / "deep" / "set") as partial:
+        partial.mkdir()
+        (partial / "file").write_text("done")
+        assert not (tmp_path / "deep" / "set").exists()
+    assert names(tmp_path / "deep") == ["set"]
+    assert (tmp_path / "deep" / "set" / "file").read_text() == "done"
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_error_leaves_nothing(tmp_path, error):
+    with pytest.raises(error):
+        build_and_fail(tmp_path / "set", error)
+    assert names(tmp_path) == []
+
+
+def test_what_is_there_stays(tmp_path):
+    (tmp_path / "set").mkdir()
+    with pytest.raises(OutputExistsError) as error, new_folder(tmp_path / "set"):
+        pytest.fail("not reached")
+    expected = f"{tmp_path / 'set'}: expected a path that does not exist yet, found one; nothing was overwritten"
+    assert str(error.value) == expected
+
+
+def test_what_appears_meanwhile_stays_too(tmp_path):
+    with pytest.raises(OutputExistsError):
+        build_beside_another(tmp_path / "set")
+    assert names(tmp_path) == ["set"]
+
+
+def test_a_broken_link_is_something(tmp_path):
+    (tmp_path / "set").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(OutputExistsError), new_folder(tmp_path / "set"):
+        pytest.fail("not reached")

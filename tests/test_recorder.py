@@ -1,0 +1,356 @@
+"""Recording: what the file holds for other programs, and what is left when a recording does not end well."""
+
+import math
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.reader import make_reader
+from mcap.records import Attachment, Chunk, DataEnd, Header, Message, Metadata
+from mcap.stream_reader import StreamReader
+from mcap_protobuf.decoder import DecoderFactory
+
+from copolicy.collect.recorder import EpisodeRecorder
+from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.collect.world import TableWorld
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError, ShapeError
+from copolicy.dataset.log import read_episode, read_metadata
+from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.dataset.task import MAP_SETS
+
+MAP = MAP_SETS["training"][6]
+META = EpisodeMeta("uuid-1", pair_id="S01", source="simulated")
+START_NS = 1_700_000_000_000_000_000
+ACTION = (0.5, -0.25, 1.0, 0.0)
+
+
+def recorder(path, **options):
+    return EpisodeRecorder(path, MAP, META, WallClockAnchor.simulated(START_NS), **options)
+
+
+def carry(recording, steps, action=ACTION):
+    """Records steps of the world under one action; returns the world."""
+    world = TableWorld(MAP)
+    for _ in range(steps):
+        world.step(action)
+        recording.step(action, world.pose, world.velocity, world.reward())
+    return world
+
+
+def records(path, kind, **options) -> Iterator[Any]:
+    with path.open("rb") as file:
+        yield from (record for record in StreamReader(file, **options).records if isinstance(record, kind))
+
+
+def decoded(path):
+    """Messages by topic as (log time, message), decoded with nothing but the schemas in the file."""
+    messages: dict[str, list] = {}
+    with path.open("rb") as file:
+        for _, channel, message, proto in make_reader(
+            file, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages():
+            messages.setdefault(channel.topic, []).append((message.log_time, proto))
+    return messages
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recorder") / "episode.mcap"
+    with recorder(path) as recording:
+        world = carry(recording, 95)
+        recording.finish(False, "timeout")
+    return path, world, recording
+
+
+def test_a_finished_recording_has_its_name_and_nothing_beside_it(finished):
+    path, world, recording = finished
+    assert [entry.name for entry in path.parent.iterdir()] == ["episode.mcap"]
+    episode = read_episode(path)
+    assert (episode.final_state == world.observation).all()
+    assert (episode.actions == ACTION).all()
+    assert episode.meta.termination_reason == "timeout"
+    assert recording.meta.duration_s == episode.meta.duration_s == 95 / 30
+
+
+def test_other_programs_decode_it_by_its_own_schemas(finished):
+    path, world, _ = finished
+    messages = decoded(path)
+    assert {topic: len(found) for topic, found in messages.items()} == {
+        "/table/state": 96,
+        "/player/0/action": 95,
+        "/player/1/action": 95,
+        "/interaction": 95,
+        "/episode/event": 2,
+        "/scene": 96,
+        "/scene/map": 1,
+    }
+    time_ns, state = messages["/table/state"][30]
+    assert (state.step, state.sim_time, time_ns) == (30, 1.0, START_NS + 10**9)
+    assert (messages["/player/1/action"][7][1].fx, messages["/player/1/action"][7][1].fy) == (1.0, 0.0)
+    _, last = messages["/interaction"][-1]
+    x, y = math.cos(world.pose[2]), -math.sin(world.pose[2])
+    assert last.force == pytest.approx(((0.5 - 1.0) * x + (-0.25 - 0.0) * y) / 2, abs=1e-12)
+    assert last.reward == world.reward()
+    events = [(event.step, event.kind, event.detail) for _, event in messages["/episode/event"]]
+    assert events == [(0, "start", ""), (95, "end", "timeout")]
+
+
+def test_records_that_describe_the_file(finished):
+    path, *_ = finished
+    (header,) = records(path, Header)
+    assert header.profile == ""
+    assert re.fullmatch(r"copolicy/\S+ mcap-python/1\.\S+", header.library)
+    (end,) = records(path, DataEnd)
+    assert end.data_section_crc != 0
+    (attachment,) = records(path, Attachment)
+    assert (attachment.name, attachment.media_type) == ("map_config.json", "application/json")
+    names = [record.name for record in records(path, Metadata)]
+    assert names == [
+        "session", "episode", "players", "devices", "software", "consent", "dataset_info", "episode_result",
+    ]  # fmt: skip
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    channels = {channel.topic: channel for channel in summary.channels.values()}
+    assert channels["/player/1/input"].metadata["seat"] == "human"
+    assert channels["/table/state"].metadata["units"].startswith("x, y: px; theta: rad")
+    assert {schema.name for schema in summary.schemas.values()} == {
+        "copolicy.v1.TableState", "copolicy.v1.PlayerInput", "copolicy.v1.PlayerAction", "copolicy.v1.Interaction",
+        "copolicy.v1.LoopTiming", "copolicy.v1.EpisodeEvent", "foxglove.SceneUpdate",
+    }  # fmt: skip
+
+
+def test_the_file_is_flushed_every_second_and_at_every_event(finished):
+    path, *_ = finished
+    ends = [chunk.message_end_time - START_NS for chunk in records(path, Chunk, emit_chunks=True)]
+    # Start event, steps 0-29, 30-59, 60-89, the rest with the end event.
+    assert ends == [0, *(step * 10**9 // 30 for step in (29, 59, 89, 95))]
+
+
+def test_the_scene_is_in_metres_with_y_up(finished):
+    path, world, _ = finished
+    messages = decoded(path)
+    still = {entity.id: entity for entity in messages["/scene/map"][0][1].entities}
+    assert list(still) == ["goal", *(f"obstacle_{i}" for i in range(len(MAP.obstacles))), "window"]
+    goal = still["goal"].cubes[0]
+    assert (goal.pose.position.x, goal.pose.position.y) == pytest.approx((MAP.goal[0] / 100, 6 - MAP.goal[1] / 100))
+    assert goal.size.x == pytest.approx(0.92)
+    moving = {entity.id: entity for entity in messages["/scene"][-2][1].entities}
+    assert list(moving) == ["table", "robot", "human"]
+    # The force of step 94 is drawn where the table was then: at its start theta is near pi, the robot on the left.
+    robot, human = moving["robot"].arrows[0], moving["human"].arrows[0]
+    assert robot.pose.position.x < moving["table"].cubes[0].pose.position.x < human.pose.position.x
+    assert (robot.shaft_length, human.shaft_length) == pytest.approx((math.hypot(0.5, 0.25), 1.0), abs=2e-4)
+    yaw = 2 * math.atan2(robot.pose.orientation.z, robot.pose.orientation.w)
+    assert (math.cos(yaw), math.sin(yaw)) == pytest.approx((math.sqrt(0.8), math.sqrt(0.2)), abs=1e-3)
+    circle = {entity.id: entity for entity in messages["/scene"][-1][1].entities}["human"].cylinders[0]
+    x, y, theta = world.pose
+    assert (circle.pose.position.x, circle.pose.position.y) == pytest.approx(
+        ((x - 78 * math.cos(theta)) / 100, 6 - (y + 78 * math.sin(theta)) / 100), abs=2e-4
+    )
+    assert moving["table"].timestamp.seconds == START_NS // 10**9 + 3
+
+
+def test_a_real_time_recording_keeps_the_clock_of_its_session(tmp_path):
+    path = tmp_path / "live.mcap"
+    anchor = WallClockAnchor(START_NS, 5_000)
+    with EpisodeRecorder(path, MAP, META, anchor, monotonic_ns=6_000, devices={"player_0": "gamepad"}) as recording:
+        for step, began in enumerate((7_000, 40_000_000)):
+            inputs = (PlayerInput(axes=[0.1, -0.9], buttons=[False, True], age_ns=12), None)
+            timing = LoopTiming(scheduled_ns=began - 1, start_ns=began, late_ns=1, work_ns=900)
+            recording.step(ACTION, MAP.start, (0, 0, 0), 0.0, monotonic_ns=began, inputs=inputs, timing=timing)
+            if step == 0:
+                recording.event("pause", "focus lost", monotonic_ns=20_000)
+        recording.finish(True, "goal", achieved_hz=25.0, late_ticks=1, notes="a note")
+    messages = decoded(path)
+    assert [time_ns - START_NS for time_ns, _ in messages["/table/state"]] == [2_000, 39_995_000, 73_328_333]
+    assert [message.monotonic_ns for _, message in messages["/table/state"]][:2] == [7_000, 40_000_000]
+    (_, sample), (time_ns, second) = messages["/player/0/input"]
+    assert (list(sample.axes), list(sample.buttons), sample.age_ns) == ([0.1, -0.9], [False, True], 12)
+    assert (second.step, time_ns - START_NS) == (1, 39_995_000)
+    assert "/player/1/input" not in messages
+    assert [(timing.step, timing.start_ns) for _, timing in messages["/loop/timing"]] == [(0, 7_000), (1, 40_000_000)]
+    assert [event.kind for _, event in messages["/episode/event"]] == ["start", "pause", "end"]
+    episode = read_episode(path)
+    assert (episode.meta.achieved_hz, episode.meta.late_ticks) == (25.0, 1)
+    metadata = read_metadata(path)
+    assert metadata["devices"] == {"player_0": "gamepad"}
+    assert metadata["session"]["started_at"] == "2023-11-14T22:13:20.000+00:00"
+    assert metadata["episode_result"]["notes"] == "a note"
+
+
+def test_nothing_is_overwritten(tmp_path):
+    path = tmp_path / "episode.mcap"
+    path.write_bytes(b"precious")
+    with pytest.raises(OutputExistsError, match=re.escape(f"{path}: expected a path that does not exist yet")):
+        recorder(path).__enter__()
+    assert path.read_bytes() == b"precious"
+    path.unlink()
+    part = tmp_path / "episode.mcap.part"
+    part.write_bytes(b"what a crash left")
+    with pytest.raises(OutputExistsError, match=re.escape(str(part))):
+        recorder(path).__enter__()
+    assert part.read_bytes() == b"what a crash left"
+
+
+def test_a_name_taken_meanwhile_is_not_overwritten(tmp_path):
+    path = tmp_path / "episode.mcap"
+    with recorder(path) as recording:
+        carry(recording, 3)
+        path.write_bytes(b"precious")
+        with pytest.raises(OutputExistsError):
+            recording.finish(True, "goal")
+    assert path.read_bytes() == b"precious"
+    assert len(read_episode(tmp_path / "episode.mcap.part").actions) == 3
+
+
+@pytest.mark.parametrize(
+    ("error", "reason", "flags", "discarded"),
+    [
+        (ZeroDivisionError(), "crash_recovered", "aborted", False),
+        (SystemExit(), "crash_recovered", "aborted", False),
+        (KeyboardInterrupt(), "operator_discard", "", True),
+        (None, "operator_discard", "", True),
+    ],
+)
+def test_a_block_left_without_finish_is_complete_up_to_its_last_state(tmp_path, error, reason, flags, discarded):
+    path = tmp_path / "episode.mcap"
+    worlds = []
+
+    def leave():
+        with recorder(path) as recording:
+            worlds.append(carry(recording, 40))
+            if error is not None:
+                raise error
+
+    if error is None:
+        leave()
+    else:
+        with pytest.raises(type(error)):
+            leave()
+    episode = read_episode(path)
+    assert (episode.final_state == worlds[0].observation).all()
+    assert len(episode.actions) == 40
+    meta = episode.meta
+    assert (meta.success, meta.termination_reason, meta.quality_flags, meta.discarded) == (
+        False, reason, flags, discarded,
+    )  # fmt: skip
+    assert not (tmp_path / "episode.mcap.part").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        ({"action": (0.0, 0.0)}, ShapeError, "action: expected shape (4,), got (2,)"),
+        (
+            {"action": (0.0, 1.5, 0.0, 0.0)},
+            InvalidValueError,
+            "action: expected forces in [-1, 1], found (0.0, 1.5, 0.0, 0.0)",
+        ),
+        ({"action": (math.nan, 0.0, 0.0, 0.0)}, InvalidValueError, "action: expected forces in [-1, 1], found (nan"),
+        ({"pose": (1.0, math.inf, 0.0)}, InvalidValueError, "state: expected finite numbers, found (1.0, inf"),
+        ({"inputs": (object(), None)}, AttributeError, "'object' object has no attribute 'step'"),
+    ],
+)
+def test_a_bad_step_leaves_no_trace(tmp_path, arguments, error, text):
+    path = tmp_path / "episode.mcap"
+    good = {"action": ACTION, "pose": MAP.start, "velocity": (0.0, 0.0, 0.0), "reward": 0.0}
+    with recorder(path) as recording:
+        recording.step(**good)
+        with pytest.raises(error, match=re.escape(text)):
+            recording.step(**{**good, **arguments})
+        recording.step(**good)
+        recording.finish(True, "goal")
+    assert len(read_episode(path).actions) == 2
+
+
+def test_one_end_and_nothing_after_it(tmp_path):
+    path = tmp_path / "episode.mcap"
+    with recorder(path) as recording:
+        with pytest.raises(InvalidValueError, match="termination_reason: expected one of"):
+            recording.finish(True, "done")
+        recording.finish(True, "goal")
+        with pytest.raises(RunError, match="expected one end of the recording, found another"):
+            recording.finish(True, "goal")
+        with pytest.raises(RunError, match="expected no step after the end of the recording, found one"):
+            recording.step(ACTION, MAP.start, (0, 0, 0), 0.0)
+    assert len(read_episode(path).actions) == 0
+
+
+KILLED = """
+import sys, time
+from copolicy.collect.recorder import EpisodeRecorder
+from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.task import MAP_SETS
+
+config = MAP_SETS["training"][6]
+with EpisodeRecorder(sys.argv[1], config, EpisodeMeta("killed"), WallClockAnchor.simulated(0)) as recording:
+    for step in range(100):
+        recording.step((0.1, 0.2, 0.3, 0.4), config.start, (0.0, 0.0, float(step)), 0.0)
+    print("recorded", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_killed_process_loses_at_most_a_second_of_its_part(tmp_path):
+    path = tmp_path / "episode.mcap"
+    process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    with process, process.stdout:
+        assert process.stdout.readline() == "recorded\n"
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    assert [entry.name for entry in tmp_path.iterdir()] == ["episode.mcap.part"]
+    part = tmp_path / "episode.mcap.part"
+    with pytest.raises(FileFormatError, match="expected an intact and complete MCAP file, found its end at byte"):
+        read_episode(part)
+    assert read_metadata(part)["episode"]["episode_uuid"] == "killed"
+    found = []
+    with pytest.raises(EndOfFile):
+        found.extend(records(part, Message))
+    states = [record for record in found if record.channel_id == 1]
+    assert len(states) == 90
+
+
+def test_nothing_about_the_machine_or_its_user_is_recorded(tmp_path, monkeypatch):
+    secrets = {
+        "USER": "zq-user", "LOGNAME": "zq-logname", "HOME": "/home/zq-home", "HF_TOKEN": "hf_zqtoken",
+        "HOSTNAME": "zq-host", "AWS_SECRET_ACCESS_KEY": "zq-secret",
+    }  # fmt: skip
+    for name, value in secrets.items():
+        monkeypatch.setenv(name, value)
+    path = tmp_path / "episode.mcap"
+    with recorder(path) as recording:
+        carry(recording, 5)
+        recording.finish(True, "goal")
+    content = path.read_bytes()
+    with path.open("rb") as file:
+        for record in StreamReader(file).records:
+            content += repr(record).encode()
+    for secret in (*secrets.values(), socket.gethostname(), str(tmp_path), str(Path(sys.prefix)), str(Path.cwd())):
+        assert secret.encode() not in content
+
+
+def test_a_long_recording_is_on_the_disk_not_in_memory(tmp_path):
+    """Positions for the route class (16 bytes a step) and the index of the chunks (one a second) are all that stays."""
+    steps = 3000
+    with recorder(tmp_path / "episode.mcap") as recording:
+        carry(recording, 100)
+        tracemalloc.start()
+        try:
+            carry(recording, steps)
+            kept, _ = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        recording.finish(False, "timeout")
+    assert kept < 200 * steps

@@ -1,0 +1,77 @@
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.task import MAP_SETS, MapConfig, Physics, identify, map_set
+
+
+def test_map_sets_have_the_sizes_of_the_paper():
+    assert {name: len(maps) for name, maps in MAP_SETS.items()} == {
+        "training": 84,
+        "paper36": 36,
+        "holdout": 84,
+        "unseen": 84,
+    }
+    assert len(set(MAP_SETS["training"])) == 84
+    assert {config.obstacle_size for config in MAP_SETS["training"]} == {50}
+    assert {config.obstacle_size for config in (*MAP_SETS["holdout"], *MAP_SETS["unseen"])} == {45}
+    assert set(MAP_SETS["paper36"]) <= set(MAP_SETS["training"])
+
+
+@pytest.mark.parametrize(("name", "key"), [("holdout", "holdout_84_nominal_seed88"), ("unseen", "unseen_84")])
+def test_evaluation_maps_are_the_frozen_lists(upstream, name, key):
+    frozen = json.loads((upstream / "maps.json").read_text())["expanded"][key]
+    for config, entry in zip(MAP_SETS[name], frozen, strict=True):
+        x, y, theta = entry["table"]
+        assert config.start == (x * 1200, y * 600, theta)
+        assert config.goal == (entry["goal"][0] * 1200, entry["goal"][1] * 600)
+        assert config.obstacles == tuple((x * 1200, y * 600) for x, y in entry["obstacles"])
+
+
+def test_orientations_give_four_starts_a_map():
+    maps = map_set("unseen", orientations=True)
+    assert len(maps) == 4 * 84
+    assert [config.start[2] for config in maps[:4]] == [0.0, math.pi / 2, math.pi, 3 * math.pi / 2]
+    assert len({config.start[:2] for config in maps[:4]}) == 1
+
+
+def test_an_unknown_set_lists_what_is_available():
+    with pytest.raises(UnknownNameError) as error:
+        map_set("validation")
+    assert str(error.value) == "unknown map set 'validation'; available: holdout, paper36, training, unseen"
+
+
+def test_identify_ignores_the_order_of_obstacles():
+    config = MAP_SETS["training"][6]
+    shuffled = replace(config, obstacles=config.obstacles[::-1])
+    assert identify(config) == identify(shuffled) == ("training-06", "training")
+    assert identify(replace(config, goal=(1.0, 2.0)))[1] == "custom"
+
+
+def test_map_survives_json():
+    config = MAP_SETS["unseen"][5]
+    assert MapConfig.from_json(config.to_json()) == config
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"start": 1, "goal": 2, "obstacles": 3, "obstacle_size": 4}'])
+def test_what_is_no_map_is_refused(text):
+    with pytest.raises(InvalidValueError, match=r"^map: expected JSON with start, goal, obstacles and obstacle_size"):
+        MapConfig.from_json(text)
+
+
+def test_a_map_takes_at_most_three_obstacles():
+    with pytest.raises(InvalidValueError, match=r"MapConfig.obstacles: expected at most 3, found 4"):
+        MapConfig((0, 0, 0), (1, 1), ((1, 1), (2, 2), (3, 3), (4, 4)))
+
+
+def test_a_map_of_no_number_is_refused():
+    with pytest.raises(InvalidValueError, match="finite positions"):
+        MapConfig((math.nan, 0, 0), (1, 1))
+
+
+def test_physics_refuses_a_limit_of_zero():
+    with pytest.raises(InvalidValueError, match="angular_acceleration_limit: expected a positive number, found 0"):
+        Physics(angular_acceleration_limit=0)

@@ -1,0 +1,200 @@
+"""`copolicy-train`: LeRobot's trainer with data sets in memory, and with errors that a user can act on."""
+
+import argparse
+import contextlib
+import io
+import logging
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from copolicy.dataset import commandline
+from copolicy.dataset.exceptions import (
+    CopolicyError,
+    FileFormatError,
+    MissingExtraError,
+    OutputExistsError,
+    RunError,
+)
+
+_PROG = "copolicy-train"
+# What draccus puts before the reason, where a section of the configuration may also be absent.
+_UNDECODED = "Could not decode the value into any of the given types:"
+_HELP = """\
+usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
+
+Trains a policy as lerobot-train does (same flags, same batches, same checkpoints, and each resumes the other's runs),
+with the data set in memory: loading goes from hundreds to hundreds of thousands of samples a second.
+
+Set unless you give them:
+  --policy.type=copolicy         the diffusion co-policy (--policy.preset=small trains on a CPU in minutes)
+  --policy.push_to_hub=false     nothing is uploaded
+  --dataset.repo_id=local/NAME   NAME is that of the folder of --dataset.root
+  --num_workers=0                batches come from memory
+
+Episodes that the data set marks as discarded are left out; the checkpoint records which ones were used.
+
+example:
+  copolicy-train --dataset.root=data/table --policy.preset=small --policy.device=cpu \\
+      --batch_size=512 --steps=3000 --output_dir=outputs/small
+  copolicy-train --config_path=outputs/small/checkpoints/last/pretrained_model/train_config.json \\
+      --resume=true --steps=6000
+
+--json prints one JSON object on stdout, --debug the traceback of an error.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status (0 done, 1 the data or the run has a problem, 2 the call is wrong)."""
+    flags = list(sys.argv[1:] if argv is None else argv)
+    own = [flag for flag in flags if flag in ("--json", "--debug")]
+    flags = [flag for flag in flags if flag not in own]
+    if "--help" in flags or "-h" in flags:
+        return _print_help(flags)
+    parser = argparse.ArgumentParser(prog=_PROG, add_help=False)
+    commandline.add_common_flags(parser)
+    parser.add_argument("flags", nargs="*")
+    parser.set_defaults(handler=_train)
+    return commandline.run(parser, [*own, "--", *flags])
+
+
+def with_defaults(flags: Sequence[str]) -> list[str]:
+    """The flags, preceded by the ones that `copolicy-train` sets where they are not given."""
+    given = {flag[2:].partition("=")[0]: flag for flag in flags if flag.startswith("--")}
+    added = [] if "num_workers" in given else ["--num_workers=0"]
+    if "config_path" not in given:
+        if not given.keys() & {"policy.type", "policy.path", "reward_model.type", "reward_model.path"}:
+            added.append("--policy.type=copolicy")
+        if "policy.push_to_hub" not in given and not any(name.startswith("reward_model.") for name in given):
+            added.append("--policy.push_to_hub=false")
+        root = _value("dataset.root", flags)
+        if root and "dataset.repo_id" not in given:
+            added.append(f"--dataset.repo_id=local/{Path(root).resolve().name}")
+    return [*added, *flags]
+
+
+def _value(name: str, flags: Sequence[str]) -> str | None:
+    """Value of `--name=value` or `--name value`."""
+    for position, flag in enumerate(flags):
+        if flag.startswith(f"--{name}="):
+            return flag.partition("=")[2]
+        if flag == f"--{name}" and position + 1 < len(flags):
+            return flags[position + 1]
+    return None
+
+
+def _print_help(flags: Sequence[str]) -> int:
+    print(_HELP)
+    with _lerobot(with_defaults(flags)):
+        from lerobot.configs import parser
+        from lerobot.configs.train import TrainPipelineConfig
+
+        parser.print_scoped_help(TrainPipelineConfig, sys.argv[1:])
+    return 0
+
+
+def _train(arguments: argparse.Namespace) -> dict:
+    flags = with_defaults(arguments.flags)
+    for name in ("config_path", "policy.path"):
+        _check_local_path(name, _value(name, flags))
+    # LeRobot and its libraries print here and there; stdout is for the summary.
+    with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
+        from .local_dataset import check_local_dataset
+        from .memory_training import train_from_memory
+
+        config = _parse()
+        _validate(config)
+        if config.dataset.root is not None and not config.dataset.streaming:
+            check_local_dataset(config.dataset.root)
+        try:
+            train_from_memory(config)
+        except (CopolicyError, OSError):
+            raise
+        except Exception as error:  # whatever LeRobot or torch raise; --debug shows where
+            raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
+    output = Path(config.output_dir or "")
+    checkpoint = output / "checkpoints" / "last" / "pretrained_model"
+    return {"output_dir": str(output), "steps": config.steps, "checkpoint": str(checkpoint)}
+
+
+@contextlib.contextmanager
+def _lerobot(flags: Sequence[str]) -> Iterator[None]:
+    """LeRobot with its plugins, and `flags` where it looks for them: it reads `sys.argv` again and again."""
+    # A state-only data set has no video: that no video decoder loads is 80 lines about nothing.
+    quiet = logging.getLogger("lerobot.utils.import_utils")
+    quiet.addFilter(_no_video)
+    before, sys.argv = sys.argv, [_PROG, *flags]
+    try:
+        try:
+            from lerobot.utils.import_utils import register_third_party_plugins
+        except ImportError as error:
+            raise MissingExtraError("lerobot") from error
+        register_third_party_plugins()
+        yield
+    finally:
+        sys.argv = before
+        quiet.removeFilter(_no_video)
+
+
+def _no_video(record: logging.LogRecord) -> bool:
+    return "torchcodec" not in record.getMessage()
+
+
+def _parse():
+    """LeRobot's configuration from `sys.argv`; argparse and draccus exit with a page of usage, here it is one line."""
+    from lerobot.configs import parser
+    from lerobot.configs.train import TrainPipelineConfig
+
+    def configured(config: TrainPipelineConfig) -> TrainPipelineConfig:
+        return config
+
+    # LeRobot's wrapper fills in the argument from sys.argv.
+    parsed: Callable[..., TrainPipelineConfig] = parser.wrap()(configured)
+
+    printed = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(printed):
+            return parsed()
+    except SystemExit:
+        problem = " ".join(printed.getvalue().rpartition("error: ")[2].split())
+        raise CopolicyError(problem.replace(f"{_UNDECODED} ", "") or "unreadable flags (see --help)") from None
+    except CopolicyError:
+        raise
+    except Exception as error:
+        raise CopolicyError(_line(error)) from error
+
+
+def _validate(config) -> None:
+    """LeRobot's own checks, which its trainer repeats, before anything else is done."""
+    output = config.output_dir
+    if output is not None and Path(output).is_dir() and not config.resume:
+        raise OutputExistsError(output)
+    try:
+        config.validate()
+    except CopolicyError:
+        raise
+    except Exception as error:
+        raise CopolicyError(_line(error)) from error
+
+
+def _check_local_path(name: str, value: str | None) -> None:
+    """A path that is not there must not be taken for the name of a Hub repository, which has one slash at most."""
+    if value is None or Path(value).exists():
+        return
+    if value.count("/") > 1 or value.startswith((".", "/", "~")) or value.endswith((".json", ".yaml", ".yml")):
+        raise FileFormatError(value, f"a file or folder for --{name}", "none")
+
+
+def _line(error: BaseException) -> str:
+    causes = []
+    current: BaseException | None = error
+    while current is not None and len(causes) < 3:
+        text = " ".join(str(current).split())
+        if text and text not in causes:
+            causes.append(text)
+        current = current.__cause__
+    return ": ".join(causes) or type(error).__name__
+
+
+if __name__ == "__main__":
+    sys.exit(main())

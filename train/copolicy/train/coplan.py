@@ -1,0 +1,152 @@
+"""The paper's co-planning study: both players act on one sampled plan, on every map of a set at once.
+
+Protocol (paper, section V-A): from the last To observations a joint plan is sampled, its first actions are executed,
+then the next plan is sampled. A plan lives at the data set's rate, so each of its actions is held for 30 / fps steps
+of the world (the original program's evaluation skips that hold and plays a 10 Hz plan three times too fast).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from copolicy.collect.world import TableWorld
+
+from copolicy.dataset import clock
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.map_config import MapConfig
+from copolicy.dataset.task import RECORD_HZ, Physics, identify
+
+from .planner import Planner
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One episode of a study.
+
+    Attributes:
+        path: `(steps + 1, 2)` the table's centre, px.
+        interaction: `(steps,)` interaction force, units of a player's full force.
+    """
+
+    map_index: int
+    map_config: MapConfig
+    repeat: int
+    success: bool
+    reason: str
+    plans: int
+    path: np.ndarray
+    interaction: np.ndarray
+
+    @property
+    def steps(self) -> int:
+        """Steps of 1/30 s."""
+        return len(self.interaction)
+
+    def to_json(self) -> dict:
+        """The row of `eval.json`."""
+        size = np.abs(self.interaction)
+        return {
+            "map_index": self.map_index,
+            "map_id": identify(self.map_config)[0],
+            "start_theta": self.map_config.start[2],
+            "obstacles": len(self.map_config.obstacles),
+            "repeat": self.repeat,
+            "success": self.success,
+            "reason": self.reason,
+            "steps": self.steps,
+            "time_s": self.steps / RECORD_HZ,
+            "plans": self.plans,
+            "interaction_mean": float(size.mean()),
+            "interaction_p95": float(np.quantile(size, 0.95)),
+        }
+
+
+class _Table:
+    """One world with the history that the policy sees of it."""
+
+    def __init__(self, map_index: int, config: MapConfig, repeat: int, physics: Physics, length: int):
+        self.map_index, self.repeat = map_index, repeat
+        self.world = TableWorld(config, physics)
+        self.map_vector = environment_state(config)
+        # Before the start there is nothing: the first observation is repeated, as it is padded in training.
+        self.states = [self.world.observation] * length
+        self.human = [np.zeros(2)] * length
+        self.path = [self.world.pose[:2]]
+        self.interaction: list[float] = []
+        self.plans = 0
+        self.outcome = None
+
+    def execute(self, action: np.ndarray, hold: int) -> None:
+        """Holds one action, then observes, unless the episode ends on the way."""
+        action = np.clip(action, -1.0, 1.0)
+        for _ in range(hold):
+            outcome = self.world.step(action)
+            self.path.append(self.world.pose[:2])
+            self.interaction.append(float(interaction_force(self.world.pose[2], action)))
+            if outcome.done:
+                self.outcome = outcome
+                return
+        self.states = [*self.states[1:], self.world.observation]
+        self.human = [*self.human[1:], action[2:]]
+
+    def result(self) -> Outcome:
+        assert self.outcome is not None
+        return Outcome(
+            self.map_index,
+            self.world.map_config,
+            self.repeat,
+            self.outcome.success,
+            self.outcome.reason,
+            self.plans,
+            np.array(self.path),
+            np.array(self.interaction),
+        )
+
+
+def coplan(
+    planner: Planner,
+    maps: Sequence[MapConfig],
+    physics: Physics,
+    *,
+    repeats: int = 1,
+    actions_per_plan: int = 8,
+    fps: int = 10,
+    seed: int = 0,
+    on_plan: Callable[[int], None] = lambda finished: None,
+) -> list[Outcome]:
+    """Runs every map `repeats` times, all of them through one call of the policy a plan.
+
+    Args:
+        actions_per_plan: actions executed before the next plan.
+        fps: rate of the data set that the policy was trained on.
+        on_plan: called after each round with the number of finished episodes.
+
+    Returns:
+        One outcome for each map and repeat, in that order.
+    """
+    hold = clock.stride(fps)
+    length = planner.policy.config.n_obs_steps
+    tables = [_Table(i, m, r, physics, length) for i, m in enumerate(maps) for r in range(repeats)]
+    generator = torch.Generator().manual_seed(seed)
+    while running := [table for table in tables if table.outcome is None]:
+        plans = planner.plan(_history(running), generator)
+        for table, plan in zip(running, plans, strict=True):
+            table.plans += 1
+            for action in plan[:actions_per_plan]:
+                table.execute(action, hold)
+                if table.outcome is not None:
+                    break
+        on_plan(sum(table.outcome is not None for table in tables))
+    return [table.result() for table in tables]
+
+
+def _history(tables: Sequence[_Table]) -> dict[str, np.ndarray]:
+    states = np.array([table.states for table in tables])  # (B, To, 7)
+    maps = np.array([table.map_vector for table in tables])[:, None]  # (B, 1, 11)
+    return {
+        STATE: states,
+        ENVIRONMENT_STATE: np.repeat(maps, states.shape[1], axis=1),
+        HUMAN_ACTION: np.array([table.human for table in tables]),
+    }

@@ -1,0 +1,180 @@
+"""`copolicy-quickstart`: the whole chain, small, on CPU: record, convert, train, evaluate, describe.
+
+It types the rooms' own commands, prints each, and imports none of them.
+"""
+
+import argparse
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from copolicy.dataset.commandline import add_common_flags, run
+from copolicy.dataset.exceptions import MissingExtraError, OutputExistsError, RunError
+
+REPO_ID = "local/quickstart"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One command of the chain, and what it is for."""
+
+    purpose: str
+    command: tuple[str, ...]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of `copolicy-quickstart`."""
+    parser = argparse.ArgumentParser(
+        prog="copolicy-quickstart",
+        description="Record simulated pairs, convert, train a small co-policy, evaluate and describe: on CPU, in "
+        "minutes. Simulated pairs stand in for people; nothing it prints is a result about people.",
+        epilog="example:\n  copolicy-quickstart --out outputs/quickstart",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
+    parser.add_argument("--episodes", type=int, default=600, help="simulated episodes (default: 600)")
+    parser.add_argument("--steps", type=int, default=2500, help="training steps of 512 samples (default: 2500)")
+    parser.add_argument("--limit", type=int, help="evaluate on the first N maps of each set only")
+    parser.add_argument("--seed", type=int, default=0, help="default: 0")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="default: one a core")
+    parser.add_argument(
+        "--upstream",
+        type=Path,
+        metavar="PATH",
+        help="start from files of the original program (raw, processed or zarr) instead of simulated pairs",
+    )
+    add_common_flags(parser)
+    parser.set_defaults(handler=_quickstart)
+    return run(parser, argv)
+
+
+def _quickstart(arguments: argparse.Namespace) -> dict:
+    out: Path = arguments.out
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise OutputExistsError(out)
+    out.mkdir(parents=True, exist_ok=True)
+    started = perf_counter()
+    steps = _chain(arguments)
+    for number, step in enumerate(steps, 1):
+        _say(f"\n[{number}/{len(steps)}] {step.purpose}\n$ {shlex.join(step.command)}")
+        _execute(step, quiet=arguments.json)
+    summary = _summary(arguments, perf_counter() - started)
+    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    _say("\nDone.")
+    return summary
+
+
+def _chain(arguments: argparse.Namespace) -> list[Step]:
+    out = arguments.out
+    dataset, training = out / "dataset", out / "training"
+    if arguments.upstream:
+        record = [
+            Step(
+                "Convert episodes of the original program into a LeRobot v3 data set",
+                ("copolicy-convert", "upstream", str(arguments.upstream), "--root", str(dataset), "--repo-id", REPO_ID),
+            )
+        ]
+    else:
+        recordings = str(out / "recordings")
+        record = [
+            Step(
+                f"Record {arguments.episodes} episodes of simulated pairs, one MCAP file each",
+                (
+                    *("copolicy-collect", "simulate", "--episodes", str(arguments.episodes)),
+                    *("--seed", str(arguments.seed), "--maps", "training", "--out", recordings),
+                    *("--workers", str(arguments.workers)),
+                ),
+            ),
+            Step(
+                "Convert the recordings into a LeRobot v3 data set at 10 Hz",
+                (
+                    *("copolicy-convert", "mcap", recordings, "--root", str(dataset), "--repo-id", REPO_ID),
+                    *("--license", "cc0-1.0"),
+                ),
+            ),
+        ]
+    train = Step(
+        "Train the co-policy's CPU preset on it",
+        (
+            *("copolicy-train", "--policy.type=copolicy", "--policy.preset=small", "--policy.device=cpu"),
+            *(f"--dataset.repo_id={REPO_ID}", f"--dataset.root={dataset}", f"--output_dir={training}"),
+            *(f"--steps={arguments.steps}", "--batch_size=512", f"--seed={arguments.seed}"),
+            *(f"--save_freq={arguments.steps}", f"--log_freq={max(1, arguments.steps // 10)}"),
+            "--env_eval_freq=0",
+        ),
+    )
+    limit = () if arguments.limit is None else ("--limit", str(arguments.limit))
+    evaluate = [
+        Step(
+            f"Let it carry the table on the {name} maps, both seats from one plan",
+            (
+                *("copolicy-eval", "coplan", "--policy", str(training), "--maps", name),
+                *("--out", str(out / "eval" / f"{name}.json"), *limit),
+            ),
+        )
+        for name in ("holdout", "unseen")
+    ]
+    describe = Step("Describe the data set", ("copolicy-cards", "dataset", str(dataset), "--repo-id", REPO_ID))
+    return [*record, train, *evaluate, describe]
+
+
+def _execute(step: Step, quiet: bool) -> None:
+    name, *flags = step.command
+    program = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
+    if program is None:
+        raise MissingExtraError(name)
+    # Nothing of the chain needs the network; saying so keeps LeRobot from asking the Hub about a local folder.
+    environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
+    # With --json, stdout belongs to the one object at the end.
+    status = subprocess.run([program, *flags], env=environment, stdout=sys.stderr if quiet else None).returncode
+    if status:
+        raise RunError(f"this command ended with status {status}: {shlex.join(step.command)}")
+
+
+def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
+    out: Path = arguments.out
+    training = out / "training" / "checkpoints" / "last" / "pretrained_model"
+    source = "files of the original program" if arguments.upstream else "simulated pairs"
+    reached = {}
+    for name in ("holdout", "unseen"):
+        success = json.loads((out / "eval" / f"{name}.json").read_text())["summary"]["success"]
+        mean, error = 100 * success["mean"], 100 * success["standard_error"]
+        reached[name] = f"{mean:.1f} ± {error:.1f} % success ({success['episodes']} episodes, one training seed)"
+    where = {} if arguments.upstream else {"recordings": str(out / "recordings")}
+    where |= {
+        "data set": str(out / "dataset"),
+        "card": str(out / "dataset" / "README.md"),
+        "checkpoint": str(training),
+        "results": f"{out / 'eval' / 'holdout.json'}, {out / 'eval' / 'unseen.json'}",
+        "pictures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
+    }
+    return {
+        "what was reached": {
+            "label": f"trained on {source} for {arguments.steps} short steps, co-planning in simulation: "
+            "no person took part",
+            **reached,
+            "minutes": round(seconds / 60, 1),
+        },
+        "where it is": where,
+        "what to type next": {
+            "a longer training": f"copolicy-train --policy.type=copolicy --policy.preset=small --policy.device=cpu "
+            f"--dataset.repo_id={REPO_ID} --dataset.root={out / 'dataset'} --output_dir={out / 'longer'} "
+            f"--batch_size=512 --steps={4 * arguments.steps}",
+            "other maps": f"copolicy-eval coplan --policy {training} --maps unseen --orientations "
+            f"--out {out / 'eval' / 'orientations.json'}",
+            "LeRobot's own evaluation": f"lerobot-eval --policy.path={training} --policy.device=cpu "
+            f"--env.type=table_carrying --eval.n_episodes=4 --eval.batch_size=2 --output_dir={out / 'lerobot-eval'}",
+        },
+    }
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,182 @@
+"""Settings of the diffusion co-policy."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from lerobot.configs import NormalizationMode, PolicyFeature, PreTrainedConfig
+from lerobot.optim import AdamWConfig
+
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+
+from .learning_rate import WarmupCosineSchedulerConfig
+from .presets import PRESETS
+
+_CHOICES = {
+    "network": ("transformer", "mlp"),
+    "observation_features": ("absolute", "relative"),
+    "prediction_type": ("epsilon", "sample", "v_prediction"),
+    "sampler": ("ddpm", "ddim"),
+}
+
+
+def _identity() -> dict[str, NormalizationMode]:
+    return dict.fromkeys(("STATE", "ENV", "ACTION"), NormalizationMode.IDENTITY)
+
+
+@PreTrainedConfig.register_subclass("copolicy")
+@dataclass
+class CopolicyConfig(PreTrainedConfig):
+    """Settings of the diffusion co-policy, which predicts the actions of both players.
+
+    A setting left open (None) takes the value of `preset`; a value given explicitly wins. The saved configuration
+    holds the values, so changing `preset` of a saved one changes nothing.
+
+    `normalization_mapping` is IDENTITY throughout: LeRobot puts the statistics of the current data set into the
+    processors, also when a checkpoint is fine-tuned on another set, and a column that was constant there (a goal, an
+    obstacle) explodes under them. Instead the policy scales by the fixed bounds of the task, inside the network.
+
+    Raises:
+        UnknownNameError: no such preset.
+        InvalidValueError: a setting outside what is allowed.
+    """
+
+    preset: str = "default"  # "default", "paper" (the paper exactly) or "small" (trains on a CPU in minutes)
+    past_human_action: bool = True  # condition on the human's past action (the paper's CoDP-H); false is CoDP
+
+    n_obs_steps: int = 3  # frames of history that a plan is conditioned on, the current one included
+    horizon: int = 12  # actions that a plan holds, from the oldest frame of the history on
+    n_action_steps: int = 8  # actions executed before the next plan, from the current frame on
+    drop_n_last_frames: int | None = None  # frames at the end of an episode that start no training sample
+    do_mask_loss_for_padding: bool = False  # leave actions beyond either end of the episode out of the loss
+
+    observation_features: str | None = None  # "absolute" positions or "relative" to the table
+    mirror: bool | None = None  # mirror half of the training samples in y
+    permute_obstacles: bool | None = None  # shuffle the order of the obstacles in training samples
+
+    network: str | None = None  # "transformer" decoder or residual "mlp"
+    n_layers: int | None = None  # decoder layers, or residual blocks of the mlp
+    width: int | None = None  # size of the embedding, or of the mlp's hidden layers
+    n_heads: int | None = None  # attention heads of the transformer
+    feedforward_width: int | None = None  # hidden size of the transformer's feed-forward part
+    attention_dropout: float | None = None  # dropout in the transformer's layers
+    embedding_dropout: float | None = None  # dropout after the transformer's embeddings
+
+    num_train_timesteps: int = 100  # diffusion steps in training
+    beta_schedule: str = "squaredcos_cap_v2"  # noise schedule, by its name in diffusers
+    prediction_type: str | None = None  # what the network predicts: "epsilon", "sample" or "v_prediction"
+    clip_sample_range: float = 1.0  # the sample is clipped to plus and minus this at each sampling step
+    sampler: str | None = None  # "ddpm" or "ddim"
+    num_inference_steps: int | None = None  # sampling steps of a plan
+    initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
+
+    ema: bool = True  # plan with an exponential moving average of the weights
+    ema_power: float = 0.75  # its decay after n updates is 1 - (1 + n / inv_gamma) ** -power
+    ema_inv_gamma: float = 1.0  # see ema_power
+    ema_max_decay: float = 0.9999  # upper bound of the decay
+
+    optimizer_lr: float | None = None  # peak learning rate of AdamW
+    optimizer_weight_decay: float | None = None  # not applied to biases, norms and position embeddings
+    optimizer_betas: tuple[float, float] | None = None  # AdamW's betas
+    optimizer_grad_clip_norm: float | None = None  # largest gradient norm; 0 does not clip
+    scheduler_warmup_steps: int | None = None  # updates over which the learning rate rises
+    scheduler_final_lr_fraction: float | None = None  # learning rate of the last update, as a fraction of the peak
+
+    normalization_mapping: dict[str, NormalizationMode] = field(default_factory=_identity)  # fixed, see above
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.preset not in PRESETS:
+            raise UnknownNameError("preset", self.preset, PRESETS)
+        for name, value in PRESETS[self.preset].items():
+            if getattr(self, name) is None:
+                setattr(self, name, value)
+        self._validate()
+
+    @property
+    def filled(self) -> Any:
+        """Itself, for a type checker, which cannot know that the preset has filled in every open setting."""
+        return self
+
+    def _validate(self) -> None:
+        filled = self.filled
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise UnknownNameError(name, getattr(self, name), choices)
+        if self.n_obs_steps < 1:
+            raise InvalidValueError("n_obs_steps", "at least 1", self.n_obs_steps)
+        usable = self.horizon - self.n_obs_steps + 1
+        if usable < 1:
+            raise InvalidValueError("horizon", f"at least n_obs_steps = {self.n_obs_steps}", self.horizon)
+        if not 1 <= self.n_action_steps <= usable:
+            expected = f"1 to {usable} (horizon {self.horizon} - n_obs_steps {self.n_obs_steps} + 1)"
+            raise InvalidValueError("n_action_steps", expected, self.n_action_steps)
+        if not 1 <= filled.num_inference_steps <= self.num_train_timesteps:
+            raise InvalidValueError(
+                "num_inference_steps",
+                f"1 to num_train_timesteps = {self.num_train_timesteps}",
+                self.num_inference_steps,
+            )
+        if self.network == "transformer" and filled.width % filled.n_heads:
+            raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
+        if filled.initial_noise_scale < 0:
+            raise InvalidValueError("initial_noise_scale", "zero or more", self.initial_noise_scale)
+        if any(mode is not NormalizationMode.IDENTITY for mode in self.normalization_mapping.values()):
+            raise InvalidValueError(
+                "normalization_mapping",
+                "IDENTITY throughout, because the policy scales by the fixed bounds of the task",
+                {kind: mode.value for kind, mode in self.normalization_mapping.items()},
+            )
+
+    @property
+    def observation_keys(self) -> tuple[str, ...]:
+        """Columns that the policy reads."""
+        return (STATE, ENVIRONMENT_STATE, HUMAN_ACTION) if self.past_human_action else (STATE, ENVIRONMENT_STATE)
+
+    @property
+    def observation_delta_indices(self) -> list[int]:
+        """Frames of the history, relative to the current one."""
+        return list(range(1 - self.n_obs_steps, 1))
+
+    @property
+    def action_delta_indices(self) -> list[int]:
+        """Frames of the plan, relative to the current one."""
+        return list(range(1 - self.n_obs_steps, 1 - self.n_obs_steps + self.horizon))
+
+    @property
+    def reward_delta_indices(self) -> None:
+        """The policy reads no reward."""
+        return None
+
+    def get_optimizer_preset(self) -> AdamWConfig:
+        """AdamW with the settings above."""
+        filled = self.filled
+        return AdamWConfig(
+            lr=filled.optimizer_lr,
+            weight_decay=filled.optimizer_weight_decay,
+            betas=filled.optimizer_betas,
+            grad_clip_norm=filled.optimizer_grad_clip_norm,
+        )
+
+    def get_scheduler_preset(self) -> WarmupCosineSchedulerConfig:
+        """Warm-up and cosine with the settings above."""
+        return WarmupCosineSchedulerConfig(self.scheduler_warmup_steps, self.filled.scheduler_final_lr_fraction)
+
+    def validate_features(self) -> None:
+        """Checks that the data set or the environment has the columns of this task.
+
+        Raises:
+            InvalidValueError: a column is missing.
+            ShapeError: a column has another shape.
+        """
+        for name in self.observation_keys:
+            _check_feature(name, self.input_features or {})
+        _check_feature(ACTION, self.output_features or {})
+
+
+def _check_feature(name: str, features: dict[str, PolicyFeature]) -> None:
+    if name not in features:
+        raise InvalidValueError("features of the data set or environment", name, sorted(features))
+    expected, given = FEATURES[name]["shape"], tuple(features[name].shape)
+    if given != expected:
+        raise ShapeError(name, expected, given)

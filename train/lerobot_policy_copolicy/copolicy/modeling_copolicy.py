@@ -1,0 +1,223 @@
+"""The diffusion co-policy: one network plans the actions of both players, the robot executes its half.
+
+Ng, Liu and Kennedy, "Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks" (2023, arXiv 2305.12171).
+"""
+
+import logging
+from collections import deque
+from typing import Unpack
+
+import torch
+from lerobot.policies import PreTrainedPolicy
+from lerobot.policies.pretrained import ActionSelectKwargs
+from torch import Tensor, nn
+
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.features import ACTION, FEATURES
+
+from .augmentation import mirror, permute_obstacles
+from .configuration_copolicy import CopolicyConfig
+from .denoiser_mlp import MlpDenoiser
+from .denoiser_transformer import TransformerDenoiser
+from .diffusion import PlanDiffusion
+from .ema import ExponentialMovingAverage
+from .features import AbsoluteFeatures, RelativeFeatures
+
+_ACTION_SIZE = FEATURES[ACTION]["shape"][0]
+_PADDING = f"{ACTION}_is_pad"
+_SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
+_DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
+_NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": (MlpDenoiser, _SIZES)}
+
+
+class CopolicyPolicy(PreTrainedPolicy):
+    """Predicts the next actions of both players from the last frames (and the human's past actions).
+
+    A plan made at frame n, with a history of To = 3 (`n_obs_steps`), T = 12 tokens (`horizon`) and 8 executed
+    (`n_action_steps`); r is the robot's half of an action, h the human's:
+
+        |frame                       | n-2 | n-1 |  n  | n+1 | ... | n+7 | n+8 | n+9 |
+        |observation is used         | yes | yes | yes |  -  |  -  |  -  |  -  |  -  |
+        |human's past action is used | yes | yes | yes |  -  |  -  |  -  |  -  |  -  |
+        |token                       |  0  |  1  |  2  |  3  | ... |  9  | 10  | 11  |
+        |action is planned           | r h | r h | r h | r h | ... | r h | r h | r h |
+        |r is executed               |  -  |  -  | yes | yes | yes | yes |  -  |  -  |
+        |h is executed when both players follow the plan, and is a prediction beside a real human
+
+    The human's past action of frame n is what the human did in frame n-1. At the start of an episode the history is
+    filled with copies of the first frame, in training and in execution alike. In training, tokens beyond either end
+    of the episode repeat its first or last action; the "paper" preset starts no sample in the last 9 frames, so that
+    only the beginning is padded.
+
+    Everything here is in physical units: observations in px, rad and s, actions in [-1, 1].
+    """
+
+    config_class = CopolicyConfig  # pyright: ignore[reportAssignmentType]
+    name = "copolicy"  # pyright: ignore[reportAssignmentType]
+
+    def __init__(self, config: CopolicyConfig, **kwargs):
+        super().__init__(config)
+        config.validate_features()
+        unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
+        if unused:
+            logging.info("the co-policy does not read %s", ", ".join(unused))
+        self.config = config
+        features = AbsoluteFeatures if config.observation_features == "absolute" else RelativeFeatures
+        self.features = features(config.past_human_action)
+        self.denoiser = _make_denoiser(config, self.features.size)
+        self.diffusion = PlanDiffusion(config)
+        self.ema = (
+            ExponentialMovingAverage(self.denoiser, config.ema_power, config.ema_inv_gamma, config.ema_max_decay)
+            if config.ema
+            else None
+        )
+        self.reset()
+
+    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Two groups, with and without weight decay; the moving average is in neither."""
+        decayed, plain = [], []
+        for name, parameter in self.denoiser.named_parameters():
+            weight = parameter.ndim > 1 and not name.endswith("_position")
+            (decayed if weight else plain).append(parameter)
+        # One fused kernel instead of a dozen small ones for each tensor: on a CPU that is 5 % of a small step.
+        fused = decayed[0].device.type in ("cpu", "cuda")
+        return [{"params": decayed, "fused": fused}, {"params": plain, "weight_decay": 0.0, "fused": fused}]
+
+    def update(self) -> None:
+        """Moves the average; LeRobot's trainer calls this after each optimizer step."""
+        if self.ema is not None:
+            self.ema.update(self.denoiser)
+
+    def reset(self) -> None:
+        """Forgets the history and the queued actions; call it whenever the environment is reset."""
+        self._history: dict[str, deque[Tensor]] = {
+            key: deque(maxlen=self.config.n_obs_steps) for key in self.config.observation_keys
+        }
+        self._queue: deque[Tensor] = deque()
+
+    def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> tuple[Tensor, dict]:
+        """The training loss: mean squared error of the prediction over all tokens and both players.
+
+        Args:
+            batch: observation columns `(B, To, n)`, action `(B, T, 4)`, and its padding mask `(B, T)` where
+                `do_mask_loss_for_padding` is set.
+            reduction: "mean", or "none" for one loss a sample (LeRobot's sample weighting).
+
+        Returns:
+            The loss, and an empty dict: reading another number here would make a GPU wait before the backward pass.
+
+        Raises:
+            InvalidValueError: a column is missing.
+            ShapeError: a column has another shape.
+        """
+        sample = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
+        sample[ACTION] = _column(batch, ACTION, self.config.horizon)
+        if self.training:
+            sample = self._augmented(sample)
+        noisy, steps, target = self.diffusion.noised(sample[ACTION])
+        prediction = self.denoiser(noisy, steps, self.features(sample))
+        error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
+        if self.config.do_mask_loss_for_padding:
+            if _PADDING not in batch:
+                raise InvalidValueError("batch, for do_mask_loss_for_padding", _PADDING, sorted(batch))
+            kept = (~batch[_PADDING]).to(error.dtype)
+            if reduction == "mean":
+                return (error * kept).sum() / kept.sum(), {}
+            return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1), {}
+        return (error.mean() if reduction == "mean" else error.mean(dim=1)), {}
+
+    @torch.no_grad()
+    def plan(
+        self, batch: dict[str, Tensor], generator: torch.Generator | None = None, noise: Tensor | None = None
+    ) -> Tensor:
+        """A whole plan for each history; keeps no state.
+
+        Args:
+            batch: observation columns `(B, To, n)`, oldest frame first, in physical units.
+            generator: source of the noise; the global one if None.
+            noise: `(B, T, 4)` standard normal to start from, instead of a draw.
+
+        Returns:
+            `(B, T, 4)` actions in [-1, 1]; token `To - 1` is that of the current frame.
+
+        Raises:
+            InvalidValueError: a column is missing.
+            ShapeError: a column has another shape.
+        """
+        observation = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
+        condition = self.features(observation)
+        shape = (len(condition), self.config.horizon, _ACTION_SIZE)
+        if noise is None:
+            source = condition.device if generator is None else generator.device
+            noise = torch.randn(shape, generator=generator, device=source)
+        elif noise.shape != shape:
+            raise ShapeError("noise", shape, tuple(noise.shape))
+        network = self.denoiser if self.ema is None else self.ema.model
+        return self.diffusion.sample(
+            lambda actions, steps: network(actions, steps, condition), noise.to(condition.device), generator
+        )
+
+    @torch.no_grad()
+    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
+        """The actions of a plan that are to be executed, from the current frame on.
+
+        Args:
+            batch: whole histories `(B, To, n)`; or single frames `(B, n)`, which are appended to the history kept
+                since `reset`.
+            kwargs: `noise` to start from, see `plan`.
+
+        Returns:
+            `(B, n_action_steps, 4)` in [-1, 1].
+        """
+        if all(key in batch and batch[key].ndim == 2 for key in self.config.observation_keys):
+            batch = self._observe(batch)
+        first = self.config.n_obs_steps - 1
+        return self.plan(batch, **kwargs)[:, first : first + self.config.n_action_steps]
+
+    @torch.no_grad()
+    def select_action(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
+        """The action of the current frame; plans anew when the last plan's actions are used up.
+
+        Args:
+            batch: single frames `(B, n)`; call once a frame, so that the history has none missing.
+            kwargs: `noise` to start from, see `plan`.
+
+        Returns:
+            `(B, 4)` in [-1, 1].
+        """
+        history = self._observe(batch)
+        if not self._queue:
+            self._queue.extend(self.predict_action_chunk(history, **kwargs).unbind(dim=1))
+        return self._queue.popleft()
+
+    def _observe(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
+        """Appends a frame to the history, which starts as copies of its first frame; returns the history stacked."""
+        for key, frames in self._history.items():
+            frames.append(_column(batch, key))
+            while len(frames) < self.config.n_obs_steps:
+                frames.append(frames[-1])
+        return {key: torch.stack(tuple(frames), dim=1) for key, frames in self._history.items()}
+
+    def _augmented(self, sample: dict[str, Tensor]) -> dict[str, Tensor]:
+        if self.config.mirror:
+            actions = sample[ACTION]
+            sample = mirror(sample, torch.rand(len(actions), device=actions.device) < 0.5)
+        if self.config.permute_obstacles:
+            sample = permute_obstacles(sample)
+        return sample
+
+
+def _make_denoiser(config: CopolicyConfig, condition_size: int) -> nn.Module:
+    network, names = _NETWORKS[config.filled.network]
+    return network(_ACTION_SIZE, condition_size, **{name: getattr(config, name) for name in names})
+
+
+def _column(batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
+    """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames."""
+    if key not in batch:
+        raise InvalidValueError("batch", f"the column {key}", sorted(batch))
+    values, size = batch[key], FEATURES[key]["shape"][0]
+    expected = (size,) if frames is None else (frames, size)
+    if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
+        raise ShapeError(key, ("B", *expected), tuple(values.shape))
+    return values

@@ -1,0 +1,165 @@
+"""The gymnasium environment of the table-carrying task."""
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from copolicy.collect.world import RUNNING, TableWorld
+from copolicy.dataset.clock import stride
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.task import MapConfig, Physics
+from copolicy.dataset.task import map_set as maps_of
+
+_TASK = "table_carrying"
+
+
+class TableCarryingEnv(gymnasium.Env):
+    """Two players carry a table past obstacles to a goal; an action holds the forces of both.
+
+    ## Action space
+    `Box(-1, 1, (4,), float32)`: robot_fx, robot_fy, human_fx, human_fy in units of a player's full force, x to the
+    right, y down. Held for 30 / fps steps of the world. With a simulated `partner`, the human half of the action is
+    ignored and the partner acts instead, at every step of the world.
+
+    ## Observation space
+    A `Dict` of float32 in px, rad and s:
+
+    | key | shape | LeRobot column |
+    |---|---|---|
+    | agent_pos | (7,) | observation.state: x, y, cos_theta, sin_theta, vx, vy, omega |
+    | environment_state | (11,) | observation.environment_state: start pose, goal, three obstacles padded with zeros |
+    | human_action | (2,) | observation.human_action: what the human did in the previous frame, zero at the first |
+
+    ## Reward
+    Of the state that the frame ends in (`copolicy.collect.reward`).
+
+    ## Success
+    The table touches the goal square; `info["is_success"]` tells at every step.
+
+    ## Termination
+    The goal, an obstacle or a wall is touched, also within a frame; `info["termination_reason"]` tells which.
+    Truncated after `step_limit` steps of the world.
+
+    ## Starting state
+    At rest at the start of a map. `reset(seed=s)` takes map `s % maps`, `reset(options={"map_index": i})` map i, and
+    a bare `reset()` the next one.
+
+    Args:
+        fps: actions a second, a divisor of 30.
+        map_set: name of a set of maps.
+        orientations: start each map in four orientations.
+        step_limit: steps of 1/30 s after which an episode is truncated.
+        angular_acceleration_limit: rad/s^2.
+        partner: simulated pair whose human plays the human half; empty for none.
+        render_mode: "rgb_array" or None.
+
+    Raises:
+        UnknownNameError: no such map set or pair.
+        InvalidValueError: `fps` does not divide 30.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (as gymnasium declares it)
+
+    def __init__(
+        self,
+        fps: int = 10,
+        map_set: str = "training",
+        orientations: bool = False,
+        step_limit: int = 1000,
+        angular_acceleration_limit: float = math.pi / 2,
+        partner: str = "",
+        render_mode: str | None = "rgb_array",
+    ):
+        self.metadata = {**type(self).metadata, "render_fps": fps}
+        self.render_mode = render_mode
+        self.task, self.task_description = _TASK, "Carry the table to the goal together."
+        self.maps = maps_of(map_set, orientations)
+        self.physics = Physics(angular_acceleration_limit, step_limit)
+        self.partner = partner
+        self._stride = stride(fps)
+        self._next_map = 0
+        if partner:
+            _simulated_human(self.maps[0], partner, 0)  # an unknown pair shall fail here, not at the first reset
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (4,), np.float32)
+        self.observation_space = gymnasium.spaces.Dict(
+            {"agent_pos": _box(STATE), "environment_state": _box(ENVIRONMENT_STATE), "human_action": _box(HUMAN_ACTION)}
+        )
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[dict, dict]:
+        """Puts the table at the start of a map.
+
+        Raises:
+            InvalidValueError: `options["map_index"]` is not the index of a map.
+        """
+        super().reset(seed=seed)
+        index = (options or {}).get("map_index", self._next_map if seed is None else seed % len(self.maps))
+        if not isinstance(index, (int, np.integer)) or not 0 <= index < len(self.maps):
+            raise InvalidValueError("map_index", f"0 to {len(self.maps) - 1}", index)
+        self._next_map = (index + 1) % len(self.maps)
+        self.map_index, map_config = int(index), self.maps[index]
+        self.world = TableWorld(map_config, self.physics)
+        self._environment = environment_state(map_config).astype(np.float32)
+        self._human = None
+        if self.partner:
+            self._human = _simulated_human(map_config, self.partner, int(self.np_random.integers(2**31)))
+        self._action = np.zeros(4)
+        return self._observation(), self._info("", False, 0.0)
+
+    def step(self, action: np.ndarray) -> tuple[dict, float, bool, bool, dict]:
+        """Holds an action `(4,)` for a frame."""
+        executed, forces = [], []
+        outcome = RUNNING
+        for _ in range(self._stride):
+            held = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+            if self._human is not None:
+                held[2:] = np.clip(self._human.act(self.world.observation), -1.0, 1.0)
+            outcome = self.world.step(held)
+            executed.append(held)
+            forces.append(interaction_force(self.world.pose[2], held))
+            if outcome.done:
+                break
+        # The past human action is that of the frame: of several held steps their mean, as in a data set.
+        self._action = np.mean(executed, axis=0)
+        truncated = outcome.reason == "timeout"
+        info = self._info(outcome.reason, outcome.success, float(np.abs(forces).mean()))
+        return self._observation(), self.world.reward(), outcome.done and not truncated, truncated, info
+
+    def render(self) -> np.ndarray | None:
+        """`(300, 600, 3)` uint8 picture of the world at half size, or None without a render mode."""
+        from .picture import draw  # here, because training without videos needs no pygame
+
+        return draw(self.world.map_config, self.world.pose, self._action) if self.render_mode else None
+
+    def _observation(self) -> dict[str, np.ndarray]:
+        return {
+            "agent_pos": self.world.observation.astype(np.float32),
+            "environment_state": self._environment.copy(),
+            "human_action": self._action[2:].astype(np.float32),
+        }
+
+    def _info(self, reason: str, success: bool, force: float) -> dict[str, Any]:
+        return {
+            "is_success": success,
+            "termination_reason": reason,
+            "interaction_force": force,  # mean magnitude over the frame, in units of a player's full force
+            "map_index": self.map_index,
+            "action": self._action.copy(),  # (4,) what was executed, the partner's half included
+        }
+
+
+def _simulated_human(map_config: MapConfig, pair_id: str, seed: int):
+    # Imported here, since only an environment with a simulated partner needs the planner behind it.
+    from copolicy.collect.pilots import simulated_pair
+
+    return simulated_pair(map_config, pair_id, seed)[1]
+
+
+def _box(column: str) -> gymnasium.spaces.Box:
+    """Twice the range of the task's bounds, since a table may slip a little beyond them in its last step."""
+    low, high = BOUNDS[column]
+    margin = (high - low) / 2
+    return gymnasium.spaces.Box((low - margin).astype(np.float32), (high + margin).astype(np.float32))
