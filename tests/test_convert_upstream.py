@@ -197,6 +197,33 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     assert single.notes[0].endswith(f"angular limit {name}")
     assert np.abs(single.states - episode.states).max() < 1e-4
 
+    write_store(tmp_path / "store", states, actions)
+    tenth = ZarrStore(tmp_path / "store").read(0, OPTIONS)
+    assert tenth.notes[0].endswith(f"angular limit {name}")
+    assert tenth.meta.quality_flags == ""
+    assert np.abs(tenth.states - episode.states[::3]).max() < 1e-9
+
+
+def write_store(folder: Path, states, actions):
+    """The 10 Hz store of one episode, in double precision and without compression."""
+    kept = np.arange(0, len(actions), 3)
+    pose = np.column_stack((states[:, :2], np.cos(states[:, 2]), np.sin(states[:, 2]), states[:, 3:]))
+    obstacles = np.array([*CONFIG.obstacles, (0, 0), (0, 0), (0, 0)])[:3].ravel()
+    setting = np.tile([*CONFIG.start, *CONFIG.goal, *obstacles], (len(kept), 1))
+    past = np.vstack((np.zeros(4), actions[kept[1:] - 1]))
+    arrays = {
+        "data/obs": np.hstack((pose[kept + 1], setting)),
+        "data/action": actions[kept],
+        "data/past_action": past,
+        "meta/episode_ends": np.array([len(kept)]),
+    }
+    for name, array in arrays.items():
+        (folder / name).mkdir(parents=True)
+        metadata = {"zarr_format": 2, "shape": array.shape, "chunks": array.shape, "dtype": array.dtype.str}
+        metadata |= {"compressor": None, "fill_value": 0, "filters": None, "order": "C"}
+        (folder / name / ".zarray").write_text(json.dumps(metadata))
+        (folder / name / ".".join("0" * array.ndim)).write_bytes(array.tobytes())
+
 
 def write_processed(path: Path, pose, actions, conditions):
     rewards = np.zeros((len(pose), 1))
@@ -237,7 +264,7 @@ def test_rewards_tell_a_wrong_goal_where_the_start_is_right():
 
 
 def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples, zarr_places):
-    episode = ZarrStore(examples / "table_10Hz.zarr").read(zarr_places[4], OPTIONS)
+    episode = ZarrStore(examples / "table_10Hz.zarr").read(zarr_places[3], OPTIONS)
     played, last = episode.map_config, episode.actions[-1]
 
     def check(stored: MapConfig):
@@ -247,7 +274,13 @@ def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples, zarr_places
     elsewhere = check(replace(played, goal=(960.0, 420.0)))
     assert elsewhere.flags == ("map_mismatch", "goal_recovered")
     assert elsewhere.config == played
-    assert "the path ends where nothing of it is touched; goal (960.0, 300.0) recovered" in elsewhere.notes[0]
+    assert "the path ends where nothing of it is touched; goal (960.0, 180.0) recovered" in elsewhere.notes[0]
+    # A table that ends between two goals touches both.
+    between = ZarrStore(examples / "table_10Hz.zarr").read(zarr_places[4], OPTIONS)
+    stored = replace(between.map_config, goal=(960.0, 420.0))
+    finding = check_by_path(stored, between.states, between.final_state, between.actions[-1], Physics())
+    assert finding.flags == ("map_mismatch",)
+    assert finding.notes[0].endswith("its goal and obstacles may be wrong")
     x, y = (round(float(value)) for value in episode.states[100, :2])
     crossed = check(replace(played, obstacles=((x, y),)))
     assert crossed.flags == ("map_mismatch",)

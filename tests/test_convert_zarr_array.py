@@ -77,7 +77,7 @@ def test_the_store_of_the_original(upstream):
         ({"zarr_format": 3}, "expected a Zarr v2 array of numbers, found zarr_format 3"),
         ({"dtype": "|O"}, "found data type '|O'"),
         ({"filters": [{"id": "pickle"}]}, "found filters [{'id': 'pickle'}]"),
-        ({"compressor": {"id": "pickle"}}, "a compressor among blosc, bz2, gzip, lz4, lzma, zlib, zstd, found 'pickle'"),
+        ({"compressor": {"id": "pickle"}}, "compressor among blosc, bz2, gzip, lz4, lzma, zlib, zstd, found 'pickle'"),
         ({"shape": [4, 2]}, "found shape (4, 2) in chunks (2,)"),
         ({"order": "K"}, "found order 'K'"),
     ],

@@ -51,6 +51,12 @@ def test_identify_ignores_the_order_of_obstacles():
     assert identify(replace(config, goal=(1.0, 2.0)))[1] == "custom"
 
 
+def test_identify_knows_the_start_orientations():
+    names = [identify(config) for config in map_set("unseen", orientations=True)]
+    assert names[:4] == [(f"unseen-00-{degrees}deg", "unseen") for degrees in (0, 90, 180, 270)]
+    assert len(set(names)) == 4 * 84
+
+
 def test_map_survives_json():
     config = MAP_SETS["unseen"][5]
     assert MapConfig.from_json(config.to_json()) == config

@@ -9,6 +9,8 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 from copolicy.dataset.exceptions import OutputExistsError
 from copolicy.dataset.topics import ENCODING, TOPICS, Topic, schema_data
 
+from .file_lock import hold
+
 PART_SUFFIX = ".part"
 """What a recording's name ends with while it runs, and after it broke off."""
 
@@ -35,6 +37,7 @@ class EpisodeFile:
             self._file = self.part.open("xb")
         except FileExistsError:
             raise OutputExistsError(self.part) from None
+        hold(self._file, wait=True)  # tells `recover` that this recording is running
         self._writer = Writer(
             self._file, chunk_size=_CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
@@ -89,14 +92,14 @@ class EpisodeFile:
         if self.path.exists():
             raise OutputExistsError(self.path)
         os.replace(self.part, self.path)
-        _sync_folder(self.path.parent)
+        sync_folder(self.path.parent)
 
     def close(self) -> None:
         """Lets go of the file as it is."""
         self._file.close()
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Makes a renaming survive a power failure, where the system lets a folder be opened."""
     if os.name == "nt":
         return

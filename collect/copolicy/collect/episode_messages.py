@@ -46,10 +46,12 @@ def start_records(meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[s
         },
         "dataset_info": episode_records.dataset_info(),
     }
-    return {
+    records = {
         name: episode_records.encode(meta, columns) | more.get(name, {})
         for name, columns in episode_records.COLUMNS_AT_START.items()
     }
+    records["dataset_info"][episode_records.START_DIGEST] = episode_records.start_digest(records)
+    return records
 
 
 def checked_forces(action: np.ndarray | Sequence[float]) -> tuple[float, ...]:

@@ -48,7 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     upstream.add_argument(
         "--obstacle-size", type=int, default=50, metavar="PX",
-        help="side of the obstacles, which the files do not tell (default: %(default)s, the training maps')",
+        help="side of the obstacles, which the files do not tell (default: %(default)s, as in the training maps)",
     )  # fmt: skip
     return parser
 

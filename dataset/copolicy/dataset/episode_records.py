@@ -1,5 +1,6 @@
 """How an episode's columns are spread over the metadata records of its recording, there and back."""
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -40,6 +41,9 @@ COLUMNS_AT_END = (
 )
 """The episode columns of the record `episode_result` at the end of a recording."""
 
+START_DIGEST = "start_sha256"
+"""The entry of the record `dataset_info` that vouches for all records at the start (`start_digest`)."""
+
 _CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
 
 
@@ -54,6 +58,20 @@ def dataset_info() -> dict[str, str]:
         "action_units": "a player's full force, [-1, 1]",
         "alignment": "the action of step k was taken in the state of step k; one more state follows the last action",
     }
+
+
+def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
+    """The sha256 of the metadata records at the start, without the digest itself.
+
+    The check sum over a recording's metadata stands at the end of its file; where a recording broke off, this entry
+    alone tells whether they are still what was written.
+    """
+    start = {
+        record: {name: text for name, text in records[record].items() if name != START_DIGEST}
+        for record in COLUMNS_AT_START
+        if record in records
+    }
+    return hashlib.sha256(json.dumps(start, sort_keys=True).encode()).hexdigest()
 
 
 def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:

@@ -75,7 +75,7 @@ def map_set(name: str, orientations: bool = False) -> tuple[MapConfig, ...]:
     maps = MAP_SETS[name]
     if not orientations:
         return maps
-    return tuple(replace(m, start=(m.start[0], m.start[1], theta)) for m in maps for theta in _ORIENTATIONS)
+    return tuple(turned for config in maps for turned in _orientations(config))
 
 
 def identify(config: MapConfig) -> tuple[str, str]:
@@ -83,7 +83,8 @@ def identify(config: MapConfig) -> tuple[str, str]:
 
     Returns:
         `("training-17", "training")` for a map of a set (a repeated map has the name of its first place,
-        a map of the paper's 36 its name in the training family), `("custom-1a2b3c4d", "custom")` for any other.
+        a map of the paper's 36 its name in the training family), `("training-17-90deg", "training")` for one of its
+        start orientations, `("custom-1a2b3c4d", "custom")` for any other.
     """
     name = _names().get(config.digest)
     return (name, name.split("-")[0]) if name else (f"custom-{config.digest}", "custom")
@@ -94,5 +95,12 @@ def _names() -> dict[str, str]:
     names: dict[str, str] = {}
     for set_name, maps in MAP_SETS.items():
         for index, config in enumerate(maps):
-            names.setdefault(config.digest, f"{set_name}-{index:02d}")
+            name = f"{set_name}-{index:02d}"
+            names.setdefault(config.digest, name)
+            for turned in _orientations(config):
+                names.setdefault(turned.digest, f"{name}-{round(math.degrees(turned.start[2]))}deg")
     return names
+
+
+def _orientations(config: MapConfig) -> list[MapConfig]:
+    return [replace(config, start=(*config.start[:2], theta)) for theta in _ORIENTATIONS]

@@ -39,6 +39,8 @@ def draw(map_config: MapConfig, pose: tuple[float, float, float], action: np.nda
     pygame.draw.circle(surface, _HUMAN, _scaled(human), CIRCLE_RADIUS * _SCALE)
     robot = on_screen(pose, (-CIRCLE_CENTRE[0], CIRCLE_CENTRE[1]))
     for seat, force in ((robot, action[:2]), (human, action[2:])):
+        if not np.any(force):
+            continue
         tip = (seat[0] + _FORCE_LENGTH * force[0], seat[1] + _FORCE_LENGTH * force[1])
         pygame.draw.line(surface, (0, 0, 0), _scaled(seat), _scaled(tip), 2)
     return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(_SIZE[1], _SIZE[0], 3)

@@ -8,7 +8,7 @@ import numpy as np
 
 from copolicy.collect.world import RUNNING, TableWorld
 from copolicy.dataset.clock import stride
-from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import MapConfig, Physics
@@ -83,7 +83,7 @@ class TableCarryingEnv(gymnasium.Env):
         self._stride = stride(fps)
         self._next_map = 0
         if partner:
-            _simulated_human(self.maps[0], partner, 0)  # an unknown pair shall fail here, not at the first reset
+            _check_pair(partner)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = gymnasium.spaces.Dict(
             {"agent_pos": _box(STATE), "environment_state": _box(ENVIRONMENT_STATE), "human_action": _box(HUMAN_ACTION)}
@@ -151,8 +151,17 @@ class TableCarryingEnv(gymnasium.Env):
         }
 
 
+# The pilots are imported where they are used, since only a simulated partner needs the planner behind them.
+
+
+def _check_pair(pair_id: str) -> None:
+    from copolicy.collect.pilots import PAIRS
+
+    if pair_id not in PAIRS:
+        raise UnknownNameError("simulated pair", pair_id, PAIRS)
+
+
 def _simulated_human(map_config: MapConfig, pair_id: str, seed: int):
-    # Imported here, since only an environment with a simulated partner needs the planner behind it.
     from copolicy.collect.pilots import simulated_pair
 
     return simulated_pair(map_config, pair_id, seed)[1]

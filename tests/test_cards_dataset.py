@@ -1,0 +1,124 @@
+import json
+import shutil
+from pathlib import Path
+
+import pyarrow.parquet as parquet
+import pytest
+import yaml
+from huggingface_hub import DatasetCard
+
+from copolicy.cards.cli import main
+from copolicy.cards.dataset_card import render
+from copolicy.cards.facts import DatasetFacts
+from copolicy.convert.cli import main as convert
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+
+
+@pytest.fixture(scope="module")
+def converted(tmp_path_factory, upstream) -> Path:
+    """The original program's raw example episodes as a LeRobot data set."""
+    root = tmp_path_factory.mktemp("cards") / "table"
+    raw = str(upstream / "examples_scripted" / "raw")
+    assert convert(["upstream", raw, "--root", str(root), "--repo-id", "local/table", "--license", "cc-by-4.0"]) == 0
+    return root
+
+
+@pytest.fixture
+def dataset(converted, tmp_path) -> Path:
+    """A copy that a test may change."""
+    return Path(shutil.copytree(converted, tmp_path / "table"))
+
+
+def _set_column(root: Path, column: str, values: list) -> None:
+    (path,) = (root / "meta" / "episodes").glob("*/*.parquet")
+    table = parquet.read_table(path)
+    index = table.schema.get_field_index(column)
+    parquet.write_table(table.set_column(index, column, [values]), path)
+
+
+def test_a_card_states_what_the_metadata_holds(dataset):
+    assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
+    card = DatasetCard.load(dataset / "README.md")
+    metadata = yaml.safe_load(card.content.split("---")[1])
+    assert metadata["license"] == "cc-by-4.0"
+    assert metadata["task_categories"] == ["robotics"]
+    assert metadata["size_categories"] == ["n<1K"]
+    assert metadata["configs"] == [{"config_name": "default", "data_files": "data/*/*.parquet"}]
+    assert {"LeRobot", "upstream"} <= set(metadata["tags"])
+    info = json.loads((dataset / "meta" / "info.json").read_text())
+    text = card.text
+    assert f"| episodes | {info['total_episodes']} |" in text
+    assert f"| frames | {info['total_frames']:,} |" in text
+    assert "| reached the goal | 5 of 6 (83.3 %) |" in text
+    assert "| collision_obstacle | 1 of 6 (16.7 %) |" in text
+    assert "Those files do not say who or what held the sticks." in text
+    assert "No person took part" not in text
+    assert 'LeRobotDataset("lab/table")' in text
+    assert "| `observation.human_action` | float32 | 2 | human_fx, human_fy |" in text
+
+
+def test_simulated_episodes_are_called_that(dataset):
+    _set_column(dataset, "source", ["simulated"] * 6)
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "**No person took part.**" in text
+    assert "simulated" in yaml.safe_load(text.split("---")[1])["tags"]
+
+
+def test_a_mixture_names_each_source(dataset):
+    _set_column(dataset, "source", ["simulated"] * 2 + ["human"] * 4)
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "human (4), simulated (2)" in text
+    assert "Consent: 0 of 6 (0.0 %) episodes name a consent record" in text
+
+
+@pytest.mark.parametrize(
+    ("licences", "expected"),
+    [(["", *["mit"] * 5], "unknown"), (["cc0-1.0", *["mit"] * 5], "other"), (["MIT"] * 6, "mit")],
+)
+def test_a_licence_is_never_made_up(dataset, licences, expected):
+    _set_column(dataset, "license", licences)
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert yaml.safe_load(text.split("---")[1])["license"] == expected
+
+
+def test_what_is_no_licence_identifier_is_refused(dataset):
+    _set_column(dataset, "license", ["free for all"] * 6)
+    with pytest.raises(InvalidValueError, match=r"license: expected a Hub licence identifier such as cc-by-4.0"):
+        render(DatasetFacts.read(dataset), "lab/table")
+
+
+def test_a_card_is_not_overwritten_unless_asked(dataset, capsys):
+    (dataset / "README.md").write_text("written by hand")
+    assert main(["dataset", str(dataset)]) == 2
+    assert "nothing was overwritten" in capsys.readouterr().err
+    assert (dataset / "README.md").read_text() == "written by hand"
+    assert main(["dataset", str(dataset), "--overwrite"]) == 0
+    assert (dataset / "README.md").read_text().startswith("---\n")
+    assert not list(dataset.glob("*.part"))
+
+
+def test_a_folder_that_is_no_data_set_is_named(tmp_path, capsys):
+    assert main(["dataset", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        f"copolicy-cards: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none\n"
+    )
+
+
+def test_a_data_set_that_contradicts_itself_is_refused(dataset):
+    path = dataset / "meta" / "info.json"
+    path.write_text(path.read_text().replace('"total_episodes": 6', '"total_episodes": 7'))
+    with pytest.raises(FileFormatError, match=r"expected 7 episodes with .* found 6 episodes"):
+        DatasetFacts.read(dataset)
+
+
+def test_a_truncated_parquet_file_is_named(dataset):
+    (path,) = (dataset / "meta" / "episodes").glob("*/*.parquet")
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(FileFormatError, match=r"file-000.parquet: expected a complete parquet file, found"):
+        DatasetFacts.read(dataset)
+
+
+def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
+    assert main(["dataset", str(dataset), "--repo-id", "table"]) == 2
+    assert "--repo-id: expected user/name" in capsys.readouterr().err
+    assert not (dataset / "README.md").exists()

@@ -1,0 +1,81 @@
+"""The whole chain as a user types it, small: from simulated pairs, and from the original program's own files."""
+
+import json
+import os
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from copolicy.cards.facts import DatasetFacts
+from copolicy.train.quickstart import main
+
+SMALL = ("--steps", "20", "--limit", "3", "--workers", "2")
+
+
+def _quickstart(out: Path, *flags: str) -> tuple[dict, str]:
+    """Runs the command in a process of its own; its summary and what it said."""
+    program = Path(sysconfig.get_path("scripts")) / "copolicy-quickstart"
+    done = subprocess.run(
+        [program, "--json", "--out", out, *SMALL, *flags], capture_output=True, text=True, env=dict(os.environ)
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    return json.loads(done.stdout), done.stderr
+
+
+def _check(out: Path, summary: dict) -> None:
+    where = summary["where it is"]
+    for name in ("data set", "card", "checkpoint"):
+        assert Path(where[name]).exists(), name
+    for path in (*where["results"].split(", "), *where["pictures"].split(", ")):
+        assert Path(path).is_file()
+    evaluation = json.loads((out / "eval" / "holdout.json").read_text())
+    assert evaluation["summary"]["success"]["episodes"] == 3
+    assert "(3 episodes, one training seed)" in summary["what was reached"]["holdout"]
+    assert json.loads((out / "summary.json").read_text()) == summary
+    assert not [path for path in out.rglob("*") if path.name.endswith(".part")]
+
+
+def test_the_chain_from_simulated_pairs(tmp_path):
+    out = tmp_path / "out"
+    summary, said = _quickstart(out, "--episodes", "4")
+    _check(out, summary)
+    assert len(list((out / "recordings").rglob("*.mcap"))) == 4
+    facts = DatasetFacts.read(out / "dataset")
+    assert facts.counts("source") == {"simulated": 4}
+    assert "simulated pairs" in summary["what was reached"]["label"]
+    assert "no person took part" in summary["what was reached"]["label"]
+    assert "**No person took part.**" in (out / "dataset" / "README.md").read_text()
+    assert "[1/6]" in said
+    assert "$ copolicy-collect simulate --episodes 4" in said
+    for command in summary["what to type next"].values():
+        assert command.split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
+
+
+@pytest.mark.parametrize("form", ["raw", "table_10Hz.zarr"])
+def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream, form):
+    out = tmp_path / "out"
+    summary, said = _quickstart(out, "--upstream", str(upstream / "examples_scripted" / form))
+    _check(out, summary)
+    facts = DatasetFacts.read(out / "dataset")
+    episodes = 11 if form.endswith("zarr") else 6
+    assert facts.counts("source") == {"upstream": episodes}
+    assert facts.successes == episodes - 1
+    assert "files of the original program" in summary["what was reached"]["label"]
+    # The original's converter took the map of episode 11 for episode 1; the raw folder still has both.
+    assert any("map_mismatch" in flags for flags in facts.counts("quality_flags")) == (form != "raw")
+    assert "$ copolicy-convert upstream" in said
+
+
+def test_an_output_folder_in_use_is_left_alone(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("mine")
+    assert main(["--out", str(tmp_path)]) == 2
+    assert "nothing was overwritten" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_a_command_that_fails_ends_the_chain_with_its_name(tmp_path, capfd):
+    assert main(["--out", str(tmp_path / "out"), "--upstream", str(tmp_path / "nowhere"), *SMALL]) == 1
+    error = capfd.readouterr().err
+    assert "copolicy-quickstart: this command ended with status 2: copolicy-convert upstream" in error
