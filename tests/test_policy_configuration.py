@@ -11,6 +11,7 @@ from lerobot.policies import make_pre_post_processors
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
 from lerobot_policy_copolicy import CopolicyConfig
+from lerobot_policy_copolicy.copolicy.learning_rate import WarmupCosineSchedulerConfig
 
 
 def features() -> tuple[dict, dict]:
@@ -44,6 +45,23 @@ def test_paper_preset_is_the_paper():
     assert (schedule.num_warmup_steps, schedule.final_lr_fraction) == (1000, 0.0)
     # Windows that would reach beyond the end start no sample: 12 - 3 frames.
     assert paper.drop_n_last_frames == 9
+
+
+def test_learning_rate_warms_up_and_falls_to_its_fraction():
+    def rates(fraction: float) -> list[float]:
+        optimizer = torch.optim.SGD([torch.zeros(1, requires_grad=True)], lr=2.0)
+        schedule = WarmupCosineSchedulerConfig(4, fraction).build(optimizer, 12)
+        found = []
+        for _ in range(14):
+            found.append(optimizer.param_groups[0]["lr"])
+            optimizer.step()
+            schedule.step()
+        return found
+
+    assert rates(0.1)[:5] == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    assert rates(0.1)[8] == pytest.approx(2.0 * (0.1 + 0.9 * 0.5))
+    assert rates(0.1)[12:] == pytest.approx([0.2, 0.2])
+    assert rates(0.0)[12] == 0.0
 
 
 def test_explicit_settings_win_over_the_preset():

@@ -129,11 +129,11 @@ def test_records_that_describe_the_file(finished):
     }  # fmt: skip
 
 
-def test_the_file_is_flushed_every_second_and_at_every_event(finished):
+def test_the_file_is_flushed_within_every_second_and_at_every_event(finished):
     path, *_ = finished
     ends = [chunk.message_end_time - START_NS for chunk in records(path, Chunk, emit_chunks=True)]
-    # Start event, steps 0-29, 30-59, 60-89, the rest with the end event.
-    assert ends == [0, *(step * 10**9 // 30 for step in (29, 59, 89, 95))]
+    # Start event, steps 0-26, 27-53, 54-80, the rest with the end event.
+    assert ends == [0, *(step * 10**9 // 30 for step in (26, 53, 80, 95))]
 
 
 def test_the_scene_is_in_metres_with_y_up(finished):
@@ -319,7 +319,7 @@ def test_a_killed_process_loses_at_most_a_second_of_its_part(tmp_path):
     with pytest.raises(EndOfFile):
         found.extend(records(part, Message))
     states = [record for record in found if record.channel_id == 1]
-    assert len(states) == 90
+    assert len(states) == 81
 
 
 def test_nothing_about_the_machine_or_its_user_is_recorded(tmp_path, monkeypatch):

@@ -209,6 +209,18 @@ def test_training_is_lerobots_step_for_step(recorded, tmp_path, monkeypatch, cap
     assert not torch.equal(resumed[0]["denoiser.head.weight"], weights(ours, 2)["denoiser.head.weight"])
 
 
+@pytest.mark.filterwarnings("ignore:pkg_resources is deprecated")  # from pygame, which draws the videos
+def test_trains_with_evaluations_and_fine_tunes(recorded, tmp_path, capsys):
+    environment = {"env.type": "table_carrying", "env.step_limit": 9, "env_eval_freq": 2, "eval.n_episodes": 1}
+    assert main(flags(recorded, tmp_path / "first", steps=2, **environment)) == 0
+    assert "'pc_success': 0.0" in capsys.readouterr().err
+    checkpoint = tmp_path / "first" / "checkpoints" / "last" / "pretrained_model"
+    tuned = [argument for argument in flags(recorded, tmp_path / "tuned", steps=1) if "policy." not in argument]
+    assert main([f"--policy.path={checkpoint}", "--policy.device=cpu", "--policy.n_action_steps=1", *tuned]) == 0
+    config = json.loads((tmp_path / "tuned" / "checkpoints" / "last" / "pretrained_model" / "config.json").read_text())
+    assert (config["width"], config["n_action_steps"], config["push_to_hub"]) == (16, 1, False)
+
+
 def test_discarded_episodes_are_left_out_and_recorded(copied, tmp_path, capsys):
     mark_discarded(copied, (1, 4))
     assert main(flags(copied, tmp_path / "out", steps=1)) == 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.task import MAP_SETS
 
+from .recover import recover, summary
 from .simulate import simulate
 
 
@@ -27,6 +28,17 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--out", type=Path, required=True, help="folder for the recordings, without any yet")
     command.add_argument("--workers", type=int, help="processes (default: one for each processor)")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    command = add_command(
+        commands,
+        "recover",
+        _recover,
+        help="turn recordings that broke off into readable episodes; nothing is deleted or changed",
+        example="copolicy-collect recover recordings/P01",
+    )
+    command.add_argument("folder", type=Path, help="folder of recordings; those below it are looked at too")
+    command.add_argument(
+        "--damaged", action="store_true", help="also recover the intact beginning of damaged finished recordings"
+    )
     return parser
 
 
@@ -44,6 +56,10 @@ def _simulate(arguments: argparse.Namespace) -> dict:
         arguments.workers,
         arguments.orientations,
     )
+
+
+def _recover(arguments: argparse.Namespace) -> dict:
+    return summary(arguments.folder, recover(arguments.folder, finished=True, damaged=arguments.damaged))
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ _LARGEST: dict[int, int] = {
 _HEAD = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK_CRC = slice(24, 28)  # of the body of a chunk
+_ENDED = "expected an intact and complete MCAP file, found its end"
 
 
 @dataclass
@@ -110,14 +111,11 @@ def read_intact_part(path: Path) -> IntactPart:
         part.stopped_by = str(error)
     except Exception as error:
         part.stopped_by = f"expected the next step, found {error or type(error).__name__}"
-    part.between_records = part.stopped_by.startswith(_ENDED)
+    part.between_records = not part.stopped_by or part.stopped_by.startswith(_ENDED)
     part.steps = count.complete
     _check_start(part)
     count.sum_up()
     return part
-
-
-_ENDED = "expected an intact and complete MCAP file, found its end"
 
 
 def _records_of(opcode: int, body: bytes) -> Iterator[McapRecord]:

@@ -4,40 +4,20 @@
 recording up to the last step that is proven complete. A second run finds that file and does nothing.
 """
 
-import contextlib
 import hashlib
-import itertools
-import os
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from importlib.metadata import version
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import Literal
 
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
-from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
-
-from copolicy.dataset import episode_records
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, OutputExistsError
 from copolicy.dataset.log import read_episode, read_metadata
-from copolicy.dataset.routes import route_class
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE
 
-from .episode_file import PART_SUFFIX, sync_folder
-from .episode_messages import event_record
+from .episode_file import PART_SUFFIX
 from .file_lock import hold
-from .intact_records import IntactPart, intact_records, read_intact_part
-
-RECOVERED = "recovered"
-"""Quality flag of a recovered episode, and what its name ends with."""
-
-RECORD = "recovery"
-"""The metadata record that says what a recovered file was made from."""
-
-_UNFINISHED = ".unfinished"  # a recovered file in the making; the next run starts it anew
+from .intact_records import read_intact_part
+from .recovered_file import RECORD, RECOVERED, write_recovered
 
 Status = Literal["recovered", "already_recovered", "empty", "running", "damaged"]
 
@@ -123,7 +103,7 @@ def recover_file(source: Path | str) -> Recovery:
             if not part.between_records:
                 raise FileFormatError(source, "at least one complete step", part.stopped_by.rpartition("found ")[2])
             return Recovery(source, "empty", detail="it ends before the first complete step")
-        _write(part, output, digest)
+        write_recovered(part, output, digest)
     return Recovery(source, "recovered", output, part.steps, part.stopped_by or "it was complete but for its name")
 
 
@@ -159,116 +139,3 @@ def _earlier(source: Path, output: Path, digest: str) -> Recovery:
     if metadata.get(RECORD, {}).get("source_sha256") != digest:
         raise OutputExistsError(output)
     return Recovery(source, "already_recovered", output, int(metadata[RECORD]["steps"]))
-
-
-def _write(part: IntactPart, output: Path, digest: str) -> None:
-    unfinished = output.with_name(output.name + _UNFINISHED)
-    try:
-        with unfinished.open("wb") as file:
-            _copy(part, file, digest)
-            file.flush()
-            os.fsync(file.fileno())
-        episode = read_episode(unfinished)
-        if len(episode.actions) != part.steps:
-            raise FileFormatError(unfinished, f"{part.steps} steps", str(len(episode.actions)))
-    except BaseException:
-        # Ours, and worth nothing: the source has all there is.
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
-        raise
-    if output.exists():
-        raise OutputExistsError(output)
-    os.replace(unfinished, output)
-    sync_folder(output.parent)
-
-
-def _copy(part: IntactPart, file: BinaryIO, digest: str) -> None:
-    writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(library=f"copolicy/{version('lerobot_policy_copolicy')} {LIBRARY_IDENTIFIER}")
-    copy = _Copy(writer, part.steps)
-    for record in itertools.islice(intact_records(part.path), part.records):
-        copy.take(record)
-    copy.add_event("recovered", part.stopped_by or "complete but for its name")
-    writer.add_metadata(episode_records.RESULT, _result(part))
-    writer.add_metadata(
-        RECORD,
-        {
-            "source": part.path.name,
-            "source_sha256": digest,
-            "source_bytes": str(part.path.stat().st_size),
-            "steps": str(part.steps),
-            "stopped_by": part.stopped_by,
-            "recovered_at": datetime.now(UTC).isoformat(timespec="seconds"),
-            "software_version": version("lerobot_policy_copolicy"),
-        },
-    )
-    writer.finish()
-
-
-class _Copy:
-    """Copies what belongs to the complete steps, and the state after them, with times and sequence numbers."""
-
-    def __init__(self, writer: Writer, steps: int):
-        self._writer, self._steps = writer, steps
-        self._schemas: dict[int, int] = {0: 0}
-        self._channels: dict[int, int] = {}
-        self._topics: dict[int, str] = {}
-        self._time_ns = 0  # of the final state
-
-    def take(self, record: McapRecord) -> None:
-        if isinstance(record, Schema):
-            self._schemas[record.id] = self._writer.register_schema(record.name, record.encoding, record.data)
-        elif isinstance(record, Channel):
-            schema = self._schemas[record.schema_id]
-            self._channels[record.id] = self._writer.register_channel(
-                record.topic, record.message_encoding, schema, record.metadata
-            )
-            self._topics[record.id] = record.topic
-        elif isinstance(record, Attachment):
-            self._writer.add_attachment(
-                record.create_time, record.log_time, record.name, record.media_type, record.data
-            )
-        elif isinstance(record, Metadata):
-            if record.name != episode_records.RESULT:
-                self._writer.add_metadata(record.name, record.metadata)
-        elif isinstance(record, Message):
-            self._take_message(record)
-
-    def add_event(self, kind: str, detail: str) -> None:
-        topic, payload = event_record(self._steps, kind, detail)
-        for channel, name in self._topics.items():
-            if name == topic.name:
-                self._add(channel, self._time_ns, payload, self._time_ns, self._steps)
-
-    def _take_message(self, message: Message) -> None:
-        topic = self._topics[message.channel_id]
-        # Sequence numbers are steps. Of the step after the last complete one only the state counts, and what
-        # happened before it was read; its scene shows the forces, which are not recorded as acting any more.
-        last = self._steps if topic in (TABLE_STATE.name, EVENT.name, SCENE.name) else self._steps - 1
-        if message.sequence > last:
-            return
-        if topic == TABLE_STATE.name:
-            self._time_ns = message.log_time
-        self._add(message.channel_id, message.log_time, message.data, message.publish_time, message.sequence)
-
-    def _add(self, channel: int, log_time: int, data: bytes, publish_time: int, sequence: int) -> None:
-        self._writer.add_message(self._channels[channel], log_time, data, publish_time, sequence)
-
-
-def _result(part: IntactPart) -> Mapping[str, str]:
-    if not part.stopped_by:
-        result = dict(part.metadata[episode_records.RESULT])
-        flags = [flag for flag in result["quality_flags"].split(",") if flag]
-        return result | {"quality_flags": ",".join([*flags, RECOVERED])}
-    assert part.map_config is not None
-    meta = replace(
-        episode_records.decode(
-            {**part.metadata, episode_records.RESULT: episode_records.encode(_NOTHING, episode_records.COLUMNS_AT_END)}
-        ),
-        termination_reason="crash_recovered",
-        duration_s=part.steps / RECORD_HZ,
-        route_class=route_class(part.table_path, part.map_config),
-        quality_flags=RECOVERED,
-    )
-    result = episode_records.encode(meta, episode_records.COLUMNS_AT_END)
-    return result | {"steps": str(part.steps), "total_reward": repr(part.total_reward), "notes": ""}

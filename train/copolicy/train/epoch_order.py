@@ -10,8 +10,8 @@ from lerobot.datasets import EpisodeAwareSampler
 class WholeEpochSampler(EpisodeAwareSampler):
     """LeRobot's sampler in the same order, computed for the whole epoch at its start.
 
-    LeRobot finds the frame of each position on its own, at 5 us a sample: more than a batch then costs to load, and
-    a fifth of a step on a GPU. Eight bytes a frame buy that back.
+    LeRobot finds the frame of each position on its own, which at 2.6 us a sample costs more than everything else of
+    loading from memory. At once it is 0.08 us, for a list of the frames in memory.
     """
 
     def _iter_epoch(self, epoch: int, start: int) -> Iterator[int]:

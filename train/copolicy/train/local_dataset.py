@@ -33,9 +33,9 @@ def check_local_dataset(root: Path | str) -> None:
         found = _rows(folder)
         if found != expected:
             raise FileFormatError(folder, f"{expected} rows, as meta/info.json says", f"{found}")
-    for name in ("tasks.parquet", "stats.json"):
-        if not (root / "meta" / name).is_file():
-            raise FileFormatError(root / "meta" / name, "part of a LeRobot v3 data set", "no such file")
+    tasks = root / "meta" / "tasks.parquet"
+    if not tasks.is_file():
+        raise FileFormatError(tasks, "part of a LeRobot v3 data set", "no such file")
 
 
 def training_episodes(episodes: list[int] | None, total: int, discarded: list[bool]) -> list[int] | None:

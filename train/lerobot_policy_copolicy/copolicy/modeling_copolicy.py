@@ -79,7 +79,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         for name, parameter in self.denoiser.named_parameters():
             weight = parameter.ndim > 1 and not name.endswith("_position")
             (decayed if weight else plain).append(parameter)
-        # One fused kernel instead of a dozen small ones for each tensor: on a CPU that is 5 % of a small step.
+        # One fused kernel instead of a dozen small ones for each tensor: on a CPU half the time of the optimizer.
         fused = decayed[0].device.type in ("cpu", "cuda")
         return [{"params": decayed, "fused": fused}, {"params": plain, "weight_decay": 0.0, "fused": fused}]
 

@@ -6,8 +6,7 @@ and shrunk, it moves by thirds of a pixel and has soft edges, and only the pixel
 
 from collections.abc import Sequence
 
-import pygame
-
+from ..sdl import pygame
 from .palette import Colour
 
 Point = tuple[float, float]

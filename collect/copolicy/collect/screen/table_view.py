@@ -3,10 +3,9 @@
 import math
 from collections.abc import Sequence
 
-import pygame
-
 from copolicy.dataset.task import GOAL_SIZE, WINDOW, MapConfig
 
+from ..sdl import pygame
 from ..table import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
 from .palette import FLOOR, FLOOR_DOT, GREEN, INK, OBSTACLE, OBSTACLE_STRIPE, SEATS, SHADOW, WOOD, WOOD_EDGE, mix
 from .patch import Point, SmoothPatch

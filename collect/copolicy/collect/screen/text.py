@@ -3,8 +3,7 @@
 import functools
 from typing import Literal
 
-import pygame
-
+from ..sdl import pygame
 from .palette import TEXT, Colour
 
 Anchor = Literal[

@@ -1,0 +1,91 @@
+"""A policy's checkpoint, loaded through LeRobot's factory: histories in, joint plans out.
+
+Collecting needs no torch. This module is for a policy at the stick alone, and imports torch and LeRobot by name when
+a checkpoint is loaded, never before.
+"""
+
+import contextlib
+import hashlib
+import io
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError
+
+
+class Checkpoint:
+    """A policy that plans for both players, with its processors.
+
+    Attributes:
+        name: type and the beginning of its weights' digest.
+        frames: how many observations a plan is made from.
+        actions_per_plan: frames of a plan that are executed before the next one (LeRobot's `n_action_steps`).
+    """
+
+    def __init__(self, path: Path, seed: int = 0):
+        """
+        Raises:
+            FileFormatError: the folder holds no policy that plans for both players.
+            MissingExtraError: torch or LeRobot is not installed.
+        """
+        folder = _pretrained_model(path)
+        try:
+            self._torch = import_module("torch")
+            config_class = import_module("lerobot.configs.policies").PreTrainedConfig
+            factory = import_module("lerobot.policies.factory")
+            import_module("lerobot.utils.import_utils").register_third_party_plugins()
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(error.name or "lerobot") from None
+        try:
+            config = config_class.from_pretrained(folder)
+            config.device = "cpu"
+            config.pretrained_path = folder
+            policy_class = factory.get_policy_class(config.type)
+            if not hasattr(policy_class, "plan"):
+                raise FileFormatError(folder, "a policy that plans for both players (method `plan`)", config.type)
+            with contextlib.redirect_stdout(io.StringIO()):  # LeRobot prints while it loads
+                self._policy = policy_class.from_pretrained(folder, config=config)
+            self._policy.eval()
+            self._preprocess, self._postprocess = factory.make_pre_post_processors(
+                config, pretrained_path=str(folder), preprocessor_overrides={"device_processor": {"device": "cpu"}}
+            )
+        except CopolicyError:
+            raise
+        except Exception as error:
+            raise FileFormatError(
+                folder, "a policy that LeRobot can load", f"{type(error).__name__}: {error}"
+            ) from error
+        digest = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
+        self.name = f"policy:{config.type}-{digest[:8]}"
+        self.frames = int(config.n_obs_steps)
+        self.actions_per_plan = int(config.n_action_steps)
+        self._generator = self._torch.Generator().manual_seed(seed)
+
+    def seed(self, seed: int) -> None:
+        """Sets the source of the plans' noise."""
+        self._generator.manual_seed(seed)
+
+    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        """Plans from the last frames.
+
+        Args:
+            history: observation keys to `(frames, n)`, oldest first, in physical units.
+
+        Returns:
+            `(frames of the plan, 4)` joint actions, the first for the newest frame.
+        """
+        torch = self._torch
+        batch = {key: torch.from_numpy(value[None].astype(np.float32)) for key, value in history.items()}
+        with torch.inference_mode():
+            plan = self._policy.plan(self._preprocess(batch), generator=self._generator)
+        return self._postprocess(plan[:, self.frames - 1 :])[0].cpu().numpy().astype(float)
+
+
+def _pretrained_model(path: Path) -> Path:
+    """The folder with `config.json`: the given one, its `pretrained_model`, or the last checkpoint of a run."""
+    for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
+        if (folder / "config.json").is_file() and (folder / "model.safetensors").is_file():
+            return folder
+    raise FileFormatError(path, "a checkpoint folder with config.json and model.safetensors", "none")

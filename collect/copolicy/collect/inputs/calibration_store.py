@@ -1,0 +1,61 @@
+"""Where calibrations are kept between sessions: one file of the user, by the kind of device."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError
+
+from .calibration import StickCalibration
+
+_FILE = "calibrations.json"
+
+
+def user_config_folder() -> Path:
+    """The folder for settings of this user, as the system has it."""
+    home = Path.home()
+    if sys.platform == "win32":
+        return Path(os.environ.get("APPDATA", home / "AppData" / "Roaming")) / "copolicy"
+    if sys.platform == "darwin":
+        return home / "Library" / "Application Support" / "copolicy"
+    return Path(os.environ.get("XDG_CONFIG_HOME") or home / ".config") / "copolicy"
+
+
+class CalibrationStore:
+    """Calibrations by the GUID of the device, which is the same for all devices of one make."""
+
+    def __init__(self, folder: Path):
+        """Reads what is there; the folder may be missing.
+
+        Raises:
+            FileFormatError: the file is not one of calibrations; it can be repaired or deleted.
+        """
+        self.path = folder / _FILE
+        self._by_guid: dict[str, StickCalibration] = {}
+        if not self.path.exists():
+            return
+        try:
+            entries = json.loads(self.path.read_text(encoding="utf-8"))
+            self._by_guid = {str(guid): StickCalibration.from_json(one) for guid, one in entries.items()}
+        except (ValueError, AttributeError) as error:
+            raise FileFormatError(self.path, "calibrations as JSON", str(error)) from None
+        except CopolicyError as error:
+            raise FileFormatError(self.path, "calibrations", str(error)) from None
+
+    def get(self, guid: str) -> StickCalibration:
+        """The calibration of a device, or the one that suits most."""
+        return self._by_guid.get(guid, StickCalibration())
+
+    def put(self, guid: str, calibration: StickCalibration) -> None:
+        """Keeps a calibration, on the disk too.
+
+        Raises:
+            OSError: the file cannot be written; the calibration holds for this session.
+        """
+        self._by_guid[guid] = calibration
+        entries = {key: one.to_json() for key, one in sorted(self._by_guid.items())}
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.path.with_suffix(".json.new")
+        fresh.write_text(json.dumps(entries, indent=2) + "\n", encoding="utf-8")
+        os.replace(fresh, self.path)

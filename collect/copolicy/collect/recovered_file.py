@@ -1,0 +1,154 @@
+"""Writes what can be trusted of a broken recording as a finished one."""
+
+import contextlib
+import itertools
+import os
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
+
+from copolicy.dataset import episode_records
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.messages.copolicy_pb2 import TableState
+from copolicy.dataset.routes import route_class
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE
+
+from .episode_file import sync_folder
+from .episode_messages import Record, event_record
+from .intact_records import IntactPart, intact_records
+from .scene import TableScene
+
+RECOVERED = "recovered"
+"""Quality flag of a recovered episode, and what its name ends with."""
+
+RECORD = "recovery"
+"""The metadata record that says what a recovered file was made from."""
+
+_UNFINISHED = ".unfinished"  # a recovered file in the making; the next run starts it anew
+
+
+def write_recovered(part: IntactPart, output: Path, source_sha256: str) -> None:
+    """Writes the complete steps of a part to `output`, which gets its name only after it was read back.
+
+    Raises:
+        FileFormatError: what was written does not read back; nothing is left of it.
+        OutputExistsError: another file took the name meanwhile.
+    """
+    unfinished = output.with_name(output.name + _UNFINISHED)
+    try:
+        with unfinished.open("wb") as file:
+            _write(part, file, source_sha256)
+            file.flush()
+            os.fsync(file.fileno())
+        steps = len(read_episode(unfinished).actions)
+        if steps != part.steps:
+            raise FileFormatError(part.path, f"{part.steps} steps that can be copied", str(steps))
+        if output.exists():
+            raise OutputExistsError(output)
+        os.replace(unfinished, output)
+    except BaseException:
+        # Ours, and worth nothing: the source has all there is.
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        raise
+    sync_folder(output.parent)
+
+
+def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
+    software = version("lerobot_policy_copolicy")
+    writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(library=f"copolicy/{software} {LIBRARY_IDENTIFIER}")
+    copy = _Copy(writer, part.steps)
+    for record in itertools.islice(intact_records(part.path), part.records):
+        copy.take(record)
+    copy.end(part.stopped_by)
+    writer.add_metadata(episode_records.RESULT, _result(part))
+    recovery = {
+        "source": part.path.name,
+        "source_sha256": source_sha256,
+        "source_bytes": str(part.path.stat().st_size),
+        "steps": str(part.steps),
+        "stopped_by": part.stopped_by,
+        "recovered_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software_version": software,
+    }
+    writer.add_metadata(RECORD, recovery)
+    writer.finish()
+
+
+class _Copy:
+    """Copies what belongs to the complete steps and the state after them, with times and sequence numbers."""
+
+    def __init__(self, writer: Writer, steps: int):
+        self._writer, self._steps = writer, steps
+        self._schemas: dict[int, int] = {0: 0}
+        self._channels: dict[int, int] = {}
+        self._topics: dict[int, str] = {}
+        self._final = TableState()
+        self._time_ns = 0  # of the final state
+
+    def take(self, record: McapRecord) -> None:
+        """Copies one record, or passes it by."""
+        writer = self._writer
+        if isinstance(record, Message):
+            self._take_message(record)
+        elif isinstance(record, Schema):
+            self._schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+        elif isinstance(record, Channel):
+            schema = self._schemas[record.schema_id]
+            channel = writer.register_channel(record.topic, record.message_encoding, schema, record.metadata)
+            self._channels[record.id] = channel
+            self._topics[record.id] = record.topic
+        elif isinstance(record, Attachment):
+            writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+        elif isinstance(record, Metadata) and record.name != episode_records.RESULT:
+            writer.add_metadata(record.name, record.metadata)
+
+    def end(self, stopped_by: str) -> None:
+        """Adds the scene of the final state, in which no force acts any more, and the event of the recovery."""
+        state = self._final
+        scene = TableScene().update(self._time_ns, (state.x, state.y, state.theta), (0.0, 0.0, 0.0, 0.0))
+        self._add_ours((SCENE, scene))
+        self._add_ours(event_record(self._steps, RECOVERED, stopped_by))
+
+    def _take_message(self, message: Message) -> None:
+        topic = self._topics[message.channel_id]
+        # Sequence numbers are steps. Of the step after the last complete one count the state, and the events before
+        # it, but not what was chosen in it.
+        last = self._steps if topic in (TABLE_STATE.name, EVENT.name) else self._steps - 1
+        if message.sequence > last:
+            return
+        if topic == TABLE_STATE.name and message.sequence == self._steps:
+            self._final, self._time_ns = TableState.FromString(message.data), message.log_time
+        channel = self._channels[message.channel_id]
+        self._writer.add_message(channel, message.log_time, message.data, message.publish_time, message.sequence)
+
+    def _add_ours(self, record: Record) -> None:
+        topic, payload = record
+        for channel, name in self._topics.items():
+            if name == topic.name:
+                self._writer.add_message(self._channels[channel], self._time_ns, payload, self._time_ns, self._steps)
+
+
+def _result(part: IntactPart) -> dict[str, str]:
+    recorded = part.metadata.get(episode_records.RESULT)
+    if recorded is not None and not part.stopped_by:
+        flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]
+        return recorded | {"quality_flags": ",".join([*flags, RECOVERED])}
+    assert part.map_config is not None
+    meta = EpisodeMeta(
+        "",
+        termination_reason="crash_recovered",
+        duration_s=part.steps / RECORD_HZ,
+        route_class=route_class(part.table_path, part.map_config),
+        quality_flags=RECOVERED,
+    )
+    result = episode_records.encode(meta, episode_records.COLUMNS_AT_END)
+    return result | {"steps": str(part.steps), "total_reward": repr(part.total_reward), "notes": ""}

@@ -1,0 +1,55 @@
+"""What the recordings of a folder say about themselves: the only memory that a session trusts."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from copolicy.dataset import episode_records
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.log import read_metadata
+
+PRACTICE = "practice"
+"""Quality flag of an episode to try things out; it is marked discarded too."""
+
+_COMPLETE = ("goal", "collision_obstacle", "collision_wall", "timeout")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One recording, as far as the schedule needs it.
+
+    Attributes:
+        counts: it was played to its end and kept, and was no practice.
+        seating: 1 where player b sat on the robot's seat.
+    """
+
+    path: Path
+    session_id: str
+    map_id: str
+    seating: int
+    success: bool
+    practice: bool
+    counts: bool
+
+
+def recordings(folder: Path) -> Iterator[Recorded]:
+    """The complete recordings in a folder and all below it, by path; one that cannot be read is told and left out."""
+    for path in sorted(folder.rglob("*.mcap")):
+        try:
+            records = read_metadata(path)
+            result = records[episode_records.RESULT]
+            players, flags = records["players"], result["quality_flags"].split(",")
+            yield Recorded(
+                path,
+                records["session"]["session_id"],
+                records["episode"]["map_id"],
+                int(players["player_0_id"] == f"{players['pair_id']}-b"),
+                result["success"] == "true",
+                PRACTICE in flags,
+                result["discarded"] == "false" and PRACTICE not in flags and result["termination_reason"] in _COMPLETE,
+            )
+        except FileFormatError as error:
+            logging.warning("not counted: %s", error)
+        except KeyError as error:
+            logging.warning("not counted: %s: expected the metadata of a recording, found no %s", path, error)

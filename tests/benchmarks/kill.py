@@ -1,0 +1,172 @@
+"""SIGKILL at random moments of a real-time recording: how much of the running episode is gone, and nothing else.
+
+Each run starts a process that records simulated pairs at 30 Hz, episode after episode, and tells through a pipe each
+step that it has handed to the recorder and the digest of each file that it has finished. Then it is killed, the
+folder recovered, and what was told compared with what is there.
+
+uv run python tests/benchmarks/kill.py --kills 50
+"""
+
+import argparse
+import hashlib
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.collect.pilots import simulated_pair
+from copolicy.collect.recorder import EpisodeRecorder
+from copolicy.collect.recover import recover
+from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.collect.world import RUNNING, TableWorld
+from copolicy.dataset.commandline import progress
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.task import MAP_SETS, RECORD_HZ, Physics
+
+EPISODE_STEPS = 150  # short ones, so that kills also fall on beginnings and ends
+
+
+@dataclass(frozen=True)
+class Kill:
+    """What one kill cost.
+
+    Attributes:
+        handed: steps of the running episode that the recorder had been given; 0 between two episodes.
+        recovered: steps of it that are there after `recover`.
+        finished: episodes that were finished before.
+        touched: how many of those are no longer what they were.
+        unreadable: recovered files that do not read back.
+    """
+
+    handed: int
+    recovered: int
+    finished: int
+    touched: int
+    unreadable: int
+
+    @property
+    def lost(self) -> int:
+        """Steps gone."""
+        return self.handed - self.recovered
+
+
+def record_until_killed(folder: Path) -> None:
+    """The child: records episodes in real time and tells what it has done, a line each."""
+    config = MAP_SETS["training"][6]
+    for index in range(1000):
+        pilots = simulated_pair(config, "S01", index)
+        world = TableWorld(config, Physics(step_limit=EPISODE_STEPS))
+        path = folder / f"episode_{index:06d}.mcap"
+        _tell(f"begin {path.name}")
+        due = time.monotonic_ns()
+        with EpisodeRecorder(path, config, EpisodeMeta(f"killed-{index}"), WallClockAnchor.now()) as recorder:
+            outcome = RUNNING
+            while not outcome.done:
+                began = time.monotonic_ns()
+                action = np.concatenate([pilot.act(world.observation) for pilot in pilots]).clip(-1.0, 1.0)
+                outcome = world.step(action)
+                recorder.step(action, world.pose, world.velocity, world.reward(), monotonic_ns=began)
+                _tell(f"step {recorder.steps}")
+                due += 10**9 // RECORD_HZ
+                time.sleep(max(0, due - time.monotonic_ns()) / 1e9)
+            recorder.finish(outcome.success, outcome.reason)
+        _tell(f"finished {path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}")
+
+
+def kill_once(folder: Path, after_s: float) -> Kill:
+    """Starts a recording process, kills it some seconds after its first step, and takes stock."""
+    folder.mkdir()
+    child = subprocess.Popen([sys.executable, __file__, "--record", str(folder)], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    with child, child.stdout as told:
+        told.readline()
+        time.sleep(after_s)
+        child.kill()
+        lines = [line.decode().split() for line in told]
+    return _take_stock(folder, lines)
+
+
+def study(kills: int, seed: int, folder: Path, shortest_s: float, longest_s: float, at_once: int) -> Iterator[Kill]:
+    """Kills at random moments, some processes at once."""
+    moments = np.random.default_rng(seed).uniform(shortest_s, longest_s, kills)
+    with ThreadPoolExecutor(at_once) as pool:
+        yield from pool.map(lambda job: kill_once(folder / f"run_{job[0]}", job[1]), enumerate(moments.tolist()))
+
+
+def _tell(line: str) -> None:
+    os.write(1, f"{line}\n".encode())
+
+
+def _take_stock(folder: Path, lines: list[list[str]]) -> Kill:
+    handed, digests = 0, {}
+    for kind, *words in lines:
+        if kind == "step":
+            handed = int(words[0])
+        elif kind == "finished":
+            digests[words[0]] = words[1]
+            handed = 0
+        else:
+            handed = 0
+    recovered = unreadable = 0
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    recoveries = recover(folder, finished=True)
+    for one in recoveries:
+        if one.output is None:
+            unreadable += one.status == "damaged"
+        elif len(read_episode(one.output).actions) != one.steps:
+            unreadable += 1
+        recovered += one.steps
+    if handed and not recoveries:
+        # Killed between the renaming and the line that tells of it.
+        recovered = handed
+    touched = sum(hashlib.sha256((folder / name).read_bytes()).hexdigest() != told for name, told in digests.items())
+    touched += sum(path.read_bytes() != content for path, content in before.items())
+    return Kill(handed, recovered, len(digests), touched, unreadable)
+
+
+def main() -> int:
+    """Prints the loss; exit status 1 where more than a second was lost or anything else was touched."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--shortest", type=float, default=0.2, help="s from the first step to the kill")
+    parser.add_argument("--longest", type=float, default=8.0, help="s from the first step to the kill")
+    parser.add_argument("--at-once", type=int, default=2, help="recording processes beside each other")
+    parser.add_argument("--record", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.record is not None:
+        record_until_killed(arguments.record)
+    with tempfile.TemporaryDirectory() as folder:
+        runs = study(
+            arguments.kills,
+            arguments.seed,
+            Path(folder),
+            arguments.shortest,
+            arguments.longest,
+            arguments.at_once,
+        )
+        kills = list(progress(runs, arguments.kills, "kills"))
+    lost = [kill.lost for kill in kills]
+    print(f"kills                        {len(kills)}, {sum(kill.handed > 0 for kill in kills)} within an episode")
+    for name, steps in (("mean", statistics.mean(lost)), ("median", statistics.median(lost)), ("max", max(lost))):
+        print(f"lost of the running one      {name} {steps:.1f} steps, {steps / RECORD_HZ:.2f} s")
+    print(f"finished episodes            {sum(kill.finished for kill in kills)}, touched {_sum(kills, 'touched')}")
+    print(f"recovered files unreadable   {_sum(kills, 'unreadable')}")
+    return int(max(lost) > RECORD_HZ or _sum(kills, "touched") > 0 or _sum(kills, "unreadable") > 0)
+
+
+def _sum(kills: list[Kill], name: str) -> int:
+    return sum(getattr(kill, name) for kill in kills)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
