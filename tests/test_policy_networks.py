@@ -55,18 +55,19 @@ def test_an_action_does_not_see_later_frames(frame):
     assert (after[:, frame:] - before[:, frame:]).abs().amax(dim=(0, 2)).min() > 0
 
 
-@pytest.mark.parametrize("network", [transformer(), MlpDenoiser(4, CONDITION, HORIZON, FRAMES, 2, 64)])
-def test_every_input_reaches_the_prediction(network):
-    optimizer = torch.optim.SGD(network.parameters(), lr=0.1)
+@pytest.mark.parametrize("make", [transformer, lambda: MlpDenoiser(4, CONDITION, HORIZON, FRAMES, 2, 64)])
+def test_every_input_reaches_the_prediction(make):
+    torch.manual_seed(0)
+    network = make()
+    # Both start out nearly or exactly blind (small weights, zero heads); weights of a trained size see everything.
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, std=0.3)
     actions, steps, condition = inputs()
-    for _ in range(3):  # the perceptron starts at zero
-        optimizer.zero_grad()
-        (network(actions, steps, condition) - 1).square().mean().backward()
-        optimizer.step()
     before = network(actions, steps, condition)
     assert before.shape == actions.shape
-    for changed in ((actions + 1, steps, condition), (actions, steps + 1, condition), (actions, steps, condition + 1)):
-        assert not torch.allclose(network(*changed), before, atol=1e-7)
+    changes = (actions + torch.randn_like(actions), steps, condition), (actions, steps + 40, condition)
+    for changed in (*changes, (actions, steps, condition + torch.randn_like(condition))):
+        assert (network(*changed) - before).abs().max() > 1e-2
 
 
 def test_perceptron_has_the_size_of_the_small_preset():

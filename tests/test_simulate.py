@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from copolicy.collect.cli import main
+from copolicy.collect.episode_job import record_episode
 from copolicy.collect.pilots import PAIRS
 from copolicy.collect.schedule import balanced_schedule
-from copolicy.collect.simulate import record_episode, simulate
+from copolicy.collect.simulate import simulate
+from copolicy.collect.start_pose import displaced_start
 from copolicy.collect.wall_clock import WallClockAnchor
 from copolicy.collect.world import RUNNING, TableWorld
 from copolicy.dataset.episode import EpisodeMeta
@@ -220,10 +222,50 @@ def test_ctrl_c_leaves_whole_episodes_and_one_line(tmp_path):
     assert not any(read_episode(path).meta.discarded for path in tmp_path.glob("*.mcap"))
 
 
-def test_help_has_the_commands_that_exist_and_an_example(capsys):
+def test_every_command_has_help_with_an_example(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE) == ["simulate"]
-    with pytest.raises(SystemExit):
-        main(["simulate", "--help"])
-    assert "example:\n  copolicy-collect simulate --episodes 200" in capsys.readouterr().out
+    commands = re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)
+    assert "simulate" in commands
+    for command in commands:
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        assert f"example:\n  copolicy-collect {command} " in capsys.readouterr().out
+
+
+def test_start_noise_moves_the_starts_and_says_so(tmp_path):
+    simulate(tmp_path, 6, seed=3, workers=1, start_noise=1.0)
+    starts = set()
+    for path in sorted(tmp_path.glob("*.mcap")):
+        episode = read_episode(path)
+        x, y, theta = episode.map_config.start
+        starts.add((x, y, theta))
+        assert episode.states[0, :2].tolist() == [x, y]
+        assert episode.meta.map_id.endswith("-displaced")
+        nominal = MAP_SETS["training"][int(episode.meta.map_id.split("-")[1])]
+        assert abs(x - nominal.start[0]) <= 90
+        assert abs(y - nominal.start[1]) <= 60
+        assert abs(theta - nominal.start[2]) <= 0.6
+        assert (episode.map_config.goal, episode.map_config.obstacles) == (nominal.goal, nominal.obstacles)
+    assert len(starts) == 6
+
+
+def test_a_displaced_start_touches_nothing_and_gives_up_on_a_hopeless_scale():
+    config = MAP_SETS["training"][6]
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        displaced = displaced_start(config, 2.0, rng)
+        assert not any(TableWorld(displaced).contact(displaced.start))
+    assert displaced_start(config, 1e6, rng) == config
+
+
+def test_clearance_widens_the_path(tmp_path):
+    nearest = {}
+    for clearance in (1.0, 3.0):
+        out = tmp_path / str(clearance)
+        simulate(out, 8, seed=1, workers=1, clearance=clearance)
+        episodes = [read_episode(path) for path in sorted(out.glob("*.mcap"))]
+        nearest[clearance] = np.mean(
+            [min(np.hypot(*(e.path - o).T).min() for o in e.map_config.obstacles) for e in episodes]
+        )
+    assert nearest[3.0] > nearest[1.0] + 5.0

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.collect.episode_job import record_episode
 from copolicy.collect.pilots import simulated_pair
 from copolicy.collect.recover import recover_file
-from copolicy.collect.simulate import record_episode
 from copolicy.collect.wall_clock import WallClockAnchor
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.episode import Episode, EpisodeMeta

@@ -8,13 +8,16 @@ from pathlib import Path
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.task import MAP_SETS
 
+from .play.command import add_play_command
 from .recover import recover, summary
+from .replay.command import add_replay_command
 from .simulate import simulate
 
 
 def parser() -> argparse.ArgumentParser:
     """The parser of `copolicy-collect` with all its commands."""
     parser, commands = command_parser("copolicy-collect", "Make recordings of two players who carry a table.")
+    add_play_command(commands)
     command = add_command(
         commands,
         "simulate",
@@ -28,6 +31,13 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--out", type=Path, required=True, help="folder for the recordings, without any yet")
     command.add_argument("--workers", type=int, help="processes (default: one for each processor)")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    command.add_argument(
+        "--start-noise", type=float, default=0.0, metavar="SCALE",
+        help="begin beside the start: up to SCALE times 90 px, 60 px and 0.6 rad away (default 0)",
+    )  # fmt: skip
+    command.add_argument(
+        "--clearance", type=float, help="how wide they keep from obstacles (default: each pair's own, 2; people: 1.7)"
+    )
     command = add_command(
         commands,
         "recover",
@@ -39,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--damaged", action="store_true", help="also recover the intact beginning of damaged finished recordings"
     )
+    add_replay_command(commands)
     return parser
 
 
@@ -55,6 +66,8 @@ def _simulate(arguments: argparse.Namespace) -> dict:
         arguments.maps,
         arguments.workers,
         arguments.orientations,
+        start_noise=arguments.start_noise,
+        clearance=arguments.clearance,
     )
 
 

@@ -16,9 +16,11 @@ from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Sch
 from copolicy.dataset import episode_records
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.mcap_records import MESSAGE_HEAD, RecordWalk, chunk_data
-from copolicy.dataset.messages.copolicy_pb2 import Interaction, LoopTiming, PlayerAction, TableState
+from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, TableState
 from copolicy.dataset.task import MapConfig
-from copolicy.dataset.topics import ACTIONS, ENCODING, INTERACTION, LOOP_TIMING, TABLE_STATE, TOPICS
+from copolicy.dataset.topics import ACTIONS, ENCODING, EVENT, INTERACTION, LOOP_TIMING, TABLE_STATE, TOPICS
+
+from .ticker import LoopStatistics, Tick
 
 _LARGEST: dict[int, int] = {
     Opcode.METADATA: 1 << 20,
@@ -45,7 +47,8 @@ class IntactPart:
         stopped_by: what ended it; empty where the file is whole.
         between_records: the file simply ends there, as after a kill, rather than going on with damage.
         total_reward: over the steps.
-        timing: `/loop/timing` of the steps, where there is any.
+        events: what happened, the events after the last complete step among them.
+        loop: how well the loop kept its time over the steps; without ticks where time was simulated.
     """
 
     path: Path
@@ -56,7 +59,8 @@ class IntactPart:
     stopped_by: str = ""
     between_records: bool = False
     total_reward: float = 0.0
-    timing: list[LoopTiming] = field(default_factory=list)
+    events: list[EpisodeEvent] = field(default_factory=list)
+    loop: LoopStatistics = field(default_factory=LoopStatistics)
     positions: array = field(default_factory=lambda: array("d"), repr=False)
 
     @property
@@ -158,7 +162,7 @@ class _StepCount:
         self._next = {topic.name: 0 for topic in (TABLE_STATE, *ACTIONS)}
         self._sequence = 0
         self._rewards = array("d")
-        self._timing: list[LoopTiming] = []
+        self._ticks = array("q")  # step, scheduled, start, skipped
 
     @property
     def complete(self) -> int:
@@ -179,7 +183,12 @@ class _StepCount:
         """Tells the part about its complete steps."""
         steps = max(0, self._part.steps)
         self._part.total_reward = sum(self._rewards[:steps])
-        self._part.timing = [timing for timing in self._timing if timing.step < steps]
+        paused = {event.step for event in self._part.events if event.kind == "pause"}
+        for step, scheduled, start, skipped in np.asarray(self._ticks).reshape(-1, 4).tolist():
+            if step in paused:
+                self._part.loop.pause()
+            if step < steps:
+                self._part.loop.add(Tick(scheduled, start, skipped))
 
     def _declare(self, channel: Channel) -> None:
         known = {topic.name for topic in TOPICS}
@@ -197,7 +206,10 @@ class _StepCount:
         elif topic == INTERACTION.name:
             self._rewards.append(Interaction.FromString(message.data).reward)
         elif topic == LOOP_TIMING.name:
-            self._timing.append(LoopTiming.FromString(message.data))
+            timing = LoopTiming.FromString(message.data)
+            self._ticks.extend((timing.step, timing.scheduled_ns, timing.start_ns, timing.skipped_ticks))
+        elif topic == EVENT.name:
+            self._part.events.append(EpisodeEvent.FromString(message.data))
 
     def _advance(self, topic: str, step: int, sequence: int) -> None:
         if not step == sequence == self._next[topic]:

@@ -24,6 +24,7 @@ from .episode_file import sync_folder
 from .episode_messages import Record, event_record
 from .intact_records import IntactPart, intact_records
 from .scene import TableScene
+from .session.recorded import PRACTICE
 
 RECOVERED = "recovered"
 """Quality flag of a recovered episode, and what its name ends with."""
@@ -143,12 +144,22 @@ def _result(part: IntactPart) -> dict[str, str]:
         flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]
         return recorded | {"quality_flags": ",".join([*flags, RECOVERED])}
     assert part.map_config is not None
+    happened = {event.kind: event for event in part.events}
+    practice = PRACTICE in happened
+    flags = {PRACTICE: practice, "paused": "pause" in happened, "slow_loop": part.loop.slow, RECOVERED: True}
     meta = EpisodeMeta(
         "",
         termination_reason="crash_recovered",
         duration_s=part.steps / RECORD_HZ,
+        achieved_hz=part.loop.achieved_hz,
+        late_ticks=part.loop.late,
         route_class=route_class(part.table_path, part.map_config),
-        quality_flags=RECOVERED,
+        quality_flags=",".join(flag for flag, raised in flags.items() if raised),
+        discarded=practice,
     )
+    notes = [event.detail for event in part.events if event.kind == "note"]
+    if "outcome" in happened:
+        # It was played to its end; the crash came before the verdict on it.
+        notes.append(f"ended at step {happened['outcome'].step} with {happened['outcome'].detail}, without a verdict")
     result = episode_records.encode(meta, episode_records.COLUMNS_AT_END)
-    return result | {"steps": str(part.steps), "total_reward": repr(part.total_reward), "notes": ""}
+    return result | {"steps": str(part.steps), "total_reward": repr(part.total_reward), "notes": "; ".join(notes)}

@@ -8,11 +8,10 @@ import uuid
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import replace
 from importlib.metadata import version
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -23,40 +22,11 @@ from copolicy.dataset.task import MapConfig, Physics, identify
 from copolicy.dataset.task import map_set as maps_of
 
 from .episode_file import PART_SUFFIX
-from .pilots import PAIRS, simulated_pair
-from .recorder import EpisodeRecorder
+from .episode_job import EpisodeJob, EpisodeResult
+from .pilots import PAIRS
 from .schedule import balanced_schedule
+from .start_pose import displaced_start
 from .wall_clock import WallClockAnchor
-from .world import RUNNING, TableWorld
-
-
-class Pilot(Protocol):
-    """Whoever moves one end of the table."""
-
-    def act(self, state: np.ndarray) -> np.ndarray:
-        """The force `(2,)` in a state `(7,)`."""
-        ...
-
-
-@dataclass(frozen=True)
-class EpisodeJob:
-    """All that a worker needs for one episode."""
-
-    path: Path
-    map_config: MapConfig
-    physics: Physics
-    meta: EpisodeMeta
-    anchor: WallClockAnchor
-
-
-@dataclass(frozen=True)
-class EpisodeResult:
-    """How one episode went."""
-
-    termination_reason: str
-    success: bool
-    steps: int
-    size: int  # bytes of its file
 
 
 def simulate(
@@ -69,6 +39,8 @@ def simulate(
     pairs: Sequence[str] | None = None,
     physics: Physics | None = None,
     started_ns: int | None = None,
+    start_noise: float = 0.0,
+    clearance: float | None = None,
 ) -> dict:
     """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
 
@@ -86,6 +58,8 @@ def simulate(
         physics: settings of the dynamics.
         started_ns: the moment that the recordings carry, UTC, nanoseconds since 1970; by default now. With a given
             one, equal calls write equal bytes.
+        start_noise: how far from the map's start episodes begin, see `displaced_start`; 0 begins at the start.
+        clearance: how wide both players keep from obstacles, instead of their habits' own.
 
     Returns:
         Counts and rates, JSON-able.
@@ -97,9 +71,10 @@ def simulate(
     """
     out = Path(out)
     workers = _processors() if workers is None else workers
-    for name, value, least in (("episodes", episodes, 1), ("workers", workers, 1), ("seed", seed, 0)):
-        if value < least:
-            raise InvalidValueError(name, f"at least {least}", value)
+    least = {"episodes": (episodes, 1), "workers": (workers, 1), "seed": (seed, 0), "start_noise": (start_noise, 0)}
+    for name, (value, bound) in least.items():
+        if value < bound:
+            raise InvalidValueError(name, f"at least {bound}", value)
     maps = maps_of(map_set, orientations)
     pairs = tuple(PAIRS) if pairs is None else tuple(pairs)
     for pair in pairs:
@@ -109,51 +84,21 @@ def simulate(
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
     variant = f"{map_set}{'-orientations' if orientations else ''}"
+    variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
+    variant += "" if clearance is None else f"-clearance_{clearance:g}"
     physics = physics or Physics()
-    jobs = [
-        EpisodeJob(
-            out / f"episode_{index:06d}.mcap",
-            maps[place],
-            physics,
-            _meta(maps[place], pair, variant, seed, index),
-            anchor,
-        )
-        for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed))
-    ]
+    jobs = []
+    for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed)):
+        meta = _meta(maps[place], pair, variant, seed, index)
+        config = maps[place]
+        if start_noise:
+            config = displaced_start(config, start_noise, np.random.default_rng((seed, index)))
+            meta = replace(meta, map_id=f"{meta.map_id}-displaced")
+        jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", config, physics, meta, anchor, clearance))
     out.mkdir(parents=True, exist_ok=True)
     started = time.perf_counter()
     results = list(progress(_record_all(jobs, workers), len(jobs), "episodes"))
     return _summary(out, results, time.perf_counter() - started)
-
-
-def record_episode(
-    path: Path,
-    map_config: MapConfig,
-    pilots: tuple[Pilot, Pilot],
-    meta: EpisodeMeta,
-    anchor: WallClockAnchor,
-    physics: Physics | None = None,
-) -> EpisodeResult:
-    """Lets two pilots carry the table until the episode ends, and records it.
-
-    Args:
-        path: of the finished file.
-        map_config: the map.
-        pilots: robot, human.
-        meta: what is known at the start.
-        anchor: moment of the first step.
-        physics: settings of the dynamics.
-    """
-    world = TableWorld(map_config, physics)
-    with EpisodeRecorder(path, map_config, meta, anchor) as recorder:
-        outcome = RUNNING
-        while not outcome.done:
-            state = world.observation
-            action = np.clip(np.concatenate([pilot.act(state) for pilot in pilots]), -1.0, 1.0)
-            outcome = world.step(action)
-            recorder.step(action, world.pose, world.velocity, world.reward())
-        recorder.finish(outcome.success, outcome.reason)
-    return EpisodeResult(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)
 
 
 def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
@@ -180,7 +125,7 @@ def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]
     if workers == 1 or len(groups) == 1:
         for group in groups:
             for job in group:
-                yield _record(job)
+                yield job.record()
         return
     # Spawned, not forked: a fork would copy the locks of whatever threads the caller runs.
     context = multiprocessing.get_context("spawn")
@@ -217,12 +162,7 @@ def _start_worker(stop: Event) -> None:
 
 
 def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
-    return [_record(job) for job in jobs if _stop is None or not _stop.is_set()]
-
-
-def _record(job: EpisodeJob) -> EpisodeResult:
-    pilots = simulated_pair(job.map_config, job.meta.pair_id, job.meta.seed)
-    return record_episode(job.path, job.map_config, pilots, job.meta, job.anchor, job.physics)
+    return [job.record() for job in jobs if _stop is None or not _stop.is_set()]
 
 
 def _refuse_recordings(out: Path) -> None:

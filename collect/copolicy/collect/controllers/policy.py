@@ -87,8 +87,8 @@ class PolicyController:
         self._map = environment_state(map_config)
         rest = state_vector(map_config.start, (0.0, 0.0, 0.0))
         # Before the start there is nothing: the first observation is repeated, as it is padded in training.
-        self._states = deque([rest] * self._planner.frames, maxlen=self._planner.frames)
-        self._human = deque([np.zeros(2)] * self._planner.frames, maxlen=self._planner.frames)
+        self._states: deque[np.ndarray] = deque([rest] * self._planner.frames, maxlen=self._planner.frames)
+        self._human: deque[np.ndarray] = deque([np.zeros(2)] * self._planner.frames, maxlen=self._planner.frames)
         self._ask(0)
 
     def read(self, state: np.ndarray) -> Reading:
@@ -97,7 +97,7 @@ class PolicyController:
         if within == 0:
             if frame > 0:
                 self._states.append(np.array(state))
-                self._human.append(frame_actions(np.array(self._held), POLICY_HZ)[0, 2:])
+                self._human.append(frame_actions(np.array(self._held), POLICY_HZ)[0, 2:].copy())
                 self._held = []
             self._take(frame)
         age = self._clock() - self._age_from if self._age_from else 0

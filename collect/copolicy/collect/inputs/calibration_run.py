@@ -9,6 +9,7 @@ from .calibration import DEAD_ZONES, StickCalibration
 
 _REST_SAMPLES = 30  # a second
 _SECTORS = 16
+_ROUNDS = 2  # the first time round many do not reach the edge everywhere
 _FAR = 0.5  # of an axis: nearer to the centre a stick is not turned round its edge
 _RESTLESS = 0.35  # a stick that rests further off than this is being held
 
@@ -17,7 +18,7 @@ class CalibrationRun:
     """Collects readings of a stick at 30 Hz until they make a calibration.
 
     First the stick must be left alone for a second (its centre, and how much it trembles), then turned round its
-    edge (its range).
+    edge twice (its range).
 
     Attributes:
         stage: `rest`, `turn` or `done`.
@@ -27,7 +28,8 @@ class CalibrationRun:
         self._before = before
         self._rest: list[tuple[float, float]] = []
         self._seen: list[tuple[float, float]] = []
-        self._sectors: set[int] = set()
+        self._visits = [0] * _SECTORS
+        self._sector = -1
         self.stage = "rest"
 
     @property
@@ -35,7 +37,7 @@ class CalibrationRun:
         """Share of the present stage that is done."""
         if self.stage == "rest":
             return len(self._rest) / _REST_SAMPLES
-        return len(self._sectors) / _SECTORS if self.stage == "turn" else 1.0
+        return sum(self._visits) / (_ROUNDS * _SECTORS) if self.stage == "turn" else 1.0
 
     def add(self, axes: Sequence[float]) -> None:
         """Takes a reading."""
@@ -54,8 +56,11 @@ class CalibrationRun:
             centre_x, centre_y = self._centre
             if math.hypot(x - centre_x, y - centre_y) > _FAR:
                 angle = math.atan2(y - centre_y, x - centre_x) % (2 * math.pi)
-                self._sectors.add(int(angle / (2 * math.pi) * _SECTORS) % _SECTORS)
-            if len(self._sectors) == _SECTORS:
+                sector = int(angle / (2 * math.pi) * _SECTORS) % _SECTORS
+                if sector != self._sector:
+                    self._sector = sector
+                    self._visits[sector] = min(_ROUNDS, self._visits[sector] + 1)
+            if sum(self._visits) == _ROUNDS * _SECTORS:
                 self.stage = "done"
 
     def result(self) -> StickCalibration:

@@ -1,5 +1,7 @@
 """Five pairs of simulated players who carry differently."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
@@ -35,8 +37,13 @@ PAIRS: dict[str, tuple[Habits, Habits]] = {
 """Habits of five simulated pairs: (robot seat, human seat)."""
 
 
-def simulated_pair(map_config: MapConfig, pair_id: str, seed: int) -> tuple[ScriptedPilot, ScriptedPilot]:
+def simulated_pair(
+    map_config: MapConfig, pair_id: str, seed: int, clearance: float | None = None
+) -> tuple[ScriptedPilot, ScriptedPilot]:
     """Two pilots with the habits of a pair and separate random numbers: (robot seat, human seat).
+
+    Args:
+        clearance: how wide both keep from obstacles, instead of their habits' own.
 
     Raises:
         InvalidValueError: a negative seed.
@@ -47,6 +54,8 @@ def simulated_pair(map_config: MapConfig, pair_id: str, seed: int) -> tuple[Scri
     if seed < 0:
         raise InvalidValueError("seed", "a whole number, not negative", seed)
     robot, human = PAIRS[pair_id]
+    if clearance is not None:
+        robot, human = replace(robot, clearance=clearance), replace(human, clearance=clearance)
     streams = np.random.SeedSequence([seed, *pair_id.encode()]).generate_state(2, np.uint64)
     return (
         ScriptedPilot(0, map_config, robot, int(streams[0])),

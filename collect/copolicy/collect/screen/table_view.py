@@ -120,7 +120,7 @@ class TableView:
     def _draw_table(self, surface: pygame.Surface, pose: Pose) -> None:
         scale = self._scale
         edge = 2.5 * scale
-        board = self._of_table(pose, _board_outline())
+        board = self._of_table(pose, board_outline())
         triangle = self._of_table(pose, TRIANGLE)
         (circle,) = self._of_table(pose, [CIRCLE_CENTRE])
         radius = CIRCLE_RADIUS * scale
@@ -176,7 +176,8 @@ class TableView:
             patch.circle(mix(colour, INK, 0.4), tail, 5 * scale)
 
 
-def _board_outline() -> list[Point]:
+def board_outline() -> list[Point]:
+    """The board with its round corners, image coordinates in px."""
     left, top, right, bottom = BOARD
     r = BOARD_CORNER_RADIUS
     corners = ((right - r, bottom - r), (left + r, bottom - r), (left + r, top + r), (right - r, top + r))

@@ -1,0 +1,1 @@
+"""`copolicy-collect play`: two players, one table, and every episode on the disk."""

@@ -1,0 +1,183 @@
+"""The loop: thirty ticks a second, and between them as many pictures as there is time for."""
+
+import time
+from collections import Counter, deque
+
+from ..inputs import Command, CommandReader, Press
+from ..screen import Canvas
+from ..screen.dialogs import draw_help, draw_toast
+from ..sdl import pygame
+from ..ticker import DT_NS, Tick
+from .failure import Failure
+from .finished import Finished
+from .game import Game
+from .lobby import Lobby
+from .paused import Paused
+from .phase import Phase, To
+from .ready import Countdown, Ready
+from .result import Result
+from .running import Running
+from .window import Window
+
+_PHASES: dict[To, type[Phase]] = {
+    To.LOBBY: Lobby,
+    To.READY: Ready,
+    To.COUNTDOWN: Countdown,
+    To.RUNNING: Running,
+    To.PAUSED: Paused,
+    To.RESULT: Result,
+    To.FAILURE: Failure,
+    To.FINISHED: Finished,
+}
+_MARGIN_NS = 2 * 10**6  # between the end of a picture and the next tick
+_STARVED_NS = 10**8  # a machine too slow to draw between ticks draws ten pictures a second, and is flagged
+
+
+class Application:
+    """Runs the phases of a session.
+
+    Every tick pumps SDL's events once and then lets the phase read the sticks, so a reading is never older than its
+    tick. A picture is drawn right after a tick and half-way to the next one, if it fits: drawing never makes a step
+    wait where the machine can draw in time at all.
+
+    Attributes:
+        phase: the present one.
+        pictures: drawn so far.
+    """
+
+    def __init__(self, game: Game, window: Window | None, first: To = To.LOBBY):
+        self.game = game
+        self.phase: Phase = _PHASES[first](game)
+        self.pictures = 0
+        self._window = window
+        self._commands = CommandReader()
+        self._help = False
+        self._drawn_ns = 0
+        self._drawing: deque[int] = deque([0], maxlen=20)
+        self._halfway_ns = 0
+
+    def run(self) -> None:
+        """Runs until the session ends, and ends a running episode in order."""
+        game, ticker = self.game, self.game.ticker
+        self.phase.enter()
+        ticker.restart()
+        try:
+            while not game.stop:
+                remaining = ticker.remaining_ns()
+                if remaining <= 0:
+                    if not self._tick(ticker.tick()):
+                        break
+                    self._draw()
+                elif self._window and game.clock() >= self._halfway_ns:
+                    self._draw()
+                else:
+                    self._sleep(remaining)
+            game.break_off(game.stop or "quit")
+        except BaseException as error:
+            if game.trial is not None:
+                game.trial.abandon(error)
+            raise
+
+    def summary(self) -> dict:
+        """What the command prints."""
+        game = self.game
+        verdicts = Counter(verdict for _, verdict in game.results)
+        return {
+            "session": game.folder.session_id,
+            "kept": verdicts["keep"],
+            "discarded": verdicts["discard"] + verdicts["redo"],
+            "unwritten": verdicts["lost"],
+            "outcomes": dict(sorted(Counter(outcome for outcome, _ in game.results).items())),
+            "kept_in_session": game.folder.counts.kept_here.total(),
+            "episodes": game.settings.episodes,
+            "complete": game.finished,
+            "ended_by": game.stop or "end",
+        }
+
+    def _tick(self, tick: Tick) -> bool:
+        for event in pygame.event.get():
+            self._handle(event)
+        if self.game.stop:
+            return False
+        following = self.phase.tick(tick)
+        if following is To.END:
+            return False
+        if following is not To.STAY:
+            self.phase = _PHASES[following](self.game)
+            self.phase.enter()
+        return True
+
+    def _handle(self, event: pygame.event.Event) -> None:
+        game, phase = self.game, self.phase
+        if event.type == pygame.QUIT:
+            game.stop = game.stop or "window closed"
+            return
+        if event.type == pygame.WINDOWFOCUSLOST and self._window:
+            phase.focus_lost()
+            return
+        added, removed = game.pads.handle(event)
+        if added and game.settings.headless:
+            game.give(added)
+        if removed:
+            player = game.take_away(removed)
+            if player:
+                phase.device_lost(player)
+        if phase.entry is not None:
+            phase.entry.handle(event)
+            if event.type in (pygame.KEYDOWN, pygame.TEXTINPUT):
+                return
+        if self._window and event.type == pygame.KEYDOWN and event.key in (pygame.K_F11, pygame.K_m):
+            if event.key == pygame.K_F11:
+                self._window.toggle_fullscreen()
+            else:
+                game.sounds.mute = not game.sounds.mute
+                game.say("sound off" if game.sounds.mute else "sound on")
+            return
+        press = self._commands.read(event)
+        if press:
+            self._press(press)
+
+    def _press(self, press: Press) -> None:
+        game, phase = self.game, self.phase
+        if self._help and not press.moved:
+            self._help = False
+            return
+        if press.command == Command.HELP:
+            self._help = True
+        if not isinstance(phase, Lobby) and not isinstance(phase, Running) and game.join(press):
+            return  # a press that gives a lost seat a device chooses nothing
+        phase.handle(press)
+
+    def _fits(self, remaining_ns: int) -> bool:
+        return not self.phase.realtime or max(self._drawing) + _MARGIN_NS < remaining_ns
+
+    def _draw(self) -> None:
+        window, game = self._window, self.game
+        if window is None:
+            return
+        now = game.clock()
+        self._halfway_ns = now + DT_NS // 2
+        starved = now - self._drawn_ns > _STARVED_NS
+        if not self._fits(game.ticker.remaining_ns()) and not starved:
+            return
+        canvas = Canvas(window.surface)
+        canvas.clear()
+        trial = game.trial
+        share = (now - trial.step_ns) / DT_NS if trial and self.phase.realtime else 1.0
+        self.phase.draw(canvas, min(1.0, max(0.0, share)))
+        if game.toast:
+            draw_toast(canvas, game.toast)
+        if self._help:
+            draw_help(canvas)
+        window.show()
+        self.pictures += 1
+        self._drawn_ns = game.clock()
+        self._drawing.append(self._drawn_ns - now)
+        if not self.phase.realtime:
+            self._halfway_ns = self._drawn_ns + 10 * DT_NS  # nothing moves between the ticks
+
+    def _sleep(self, remaining_ns: int) -> None:
+        wait = remaining_ns
+        if self._window and self.phase.realtime:
+            wait = min(wait, max(10**6, self._halfway_ns - self.game.clock()))
+        time.sleep(wait / 1e9)

@@ -1,0 +1,108 @@
+"""The flags of `copolicy-collect play`."""
+
+import argparse
+import math
+from pathlib import Path
+
+from copolicy.dataset.commandline import add_command
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.task import MAP_SETS
+
+from .settings import PilotSpec, PlaySettings
+
+_ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
+
+
+def add_play_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `play` to the commands of `copolicy-collect`."""
+    command = add_command(
+        commands,
+        "play",
+        _play,
+        help="two players carry the table together: a lobby, a session of episodes, one recording each",
+        example="copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
+    )
+    command.add_argument("--pair", required=True, help="pseudonym of the pair; its players are PAIR-a and PAIR-b")
+    command.add_argument("--out", type=Path, required=True, help="folder of all sessions; a session continues there")
+    command.add_argument(
+        "--pilots",
+        nargs=2,
+        metavar=("A", "B"),
+        help="who plays: joystick, keyboard, scripted[:S01], replay:FILE or policy:CKPT; A begins on the robot's seat "
+        "(default: the joysticks that are plugged in, the keyboard beside them)",
+    )
+    command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")
+    command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    command.add_argument("--episodes", type=int, default=36, help="episodes to keep in a session (default 36)")
+    command.add_argument("--practice", type=int, default=0, help="practice episodes before them, marked and discarded")
+    command.add_argument("--seed", type=int, default=0, help="of the schedule and of simulated players (default 0)")
+    command.add_argument(
+        "--seats",
+        choices=("swap", "fixed"),
+        help="swap: the players change seats in the middle of the session (default for two people); fixed: they do not",
+    )
+    command.add_argument("--consent-0", default="", metavar="ID", help="record id of player a's consent, no name")
+    command.add_argument("--consent-1", default="", metavar="ID", help="record id of player b's consent, no name")
+    command.add_argument("--license", default="", help="of the recordings, an SPDX identifier")
+    command.add_argument(
+        "--angular-limit", choices=_ANGULAR_LIMITS, default="pi/2", help="angular acceleration, rad/s^2 (default pi/2)"
+    )
+    command.add_argument("--countdown", type=float, default=3.0, help="seconds before each episode (default 3)")
+    command.add_argument("--new-session", action="store_true", help="do not continue the pair's unfinished session")
+    command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")
+    command.add_argument("--fullscreen", action="store_true", help="begin in full screen (F11 changes it)")
+    command.add_argument("--window", metavar="WxH", help="size of the window (default: what suits the desktop)")
+    command.add_argument("--mute", action="store_true", help="no sounds")
+    command.add_argument(
+        "--config-dir", type=Path, help="folder of the sticks' calibrations (default: the user's settings)"
+    )
+
+
+def settings_of(arguments: argparse.Namespace) -> PlaySettings:
+    """The settings behind the flags.
+
+    Raises:
+        CopolicyError: a value that cannot be.
+    """
+    pilots = None
+    if arguments.pilots:
+        first, second = (PilotSpec.parse(text) for text in arguments.pilots)
+        pilots = (first, second)
+    return PlaySettings(
+        pair=arguments.pair,
+        out=arguments.out,
+        pilots=pilots,
+        maps=arguments.maps,
+        orientations=arguments.orientations,
+        episodes=arguments.episodes,
+        practice=arguments.practice,
+        seed=arguments.seed,
+        swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
+        consents=(arguments.consent_0, arguments.consent_1),
+        license=arguments.license,
+        angular_limit=_ANGULAR_LIMITS[arguments.angular_limit],
+        headless=arguments.headless,
+        fullscreen=arguments.fullscreen,
+        window=_size(arguments.window),
+        mute=arguments.mute,
+        config_folder=arguments.config_dir,
+        new_session=arguments.new_session,
+        countdown_s=arguments.countdown,
+    )
+
+
+def _play(arguments: argparse.Namespace) -> dict:
+    settings = settings_of(arguments)
+    # Loading pygame and the pilots takes a moment that `--help` should not.
+    from .session_run import play
+
+    return play(settings)
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise InvalidValueError("window", "WxH, such as 1200x760", text)
+    return int(width), int(height)

@@ -1,0 +1,135 @@
+"""Before an episode: the map, who sits where, and the count-down."""
+
+import math
+
+from ..inputs import Command, Press
+from ..screen import Canvas
+from ..screen.dialogs import Line, draw_countdown, draw_dialog
+from ..screen.palette import MUTED, ORANGE, SKY, YELLOW
+from ..ticker import DT_NS, Tick
+from .game import Game
+from .menu import Menu
+from .phase import Phase, To
+from .player import Player
+
+_LIMB_S = 1.0  # a session without people moves on by itself
+
+
+class Ready(Phase):
+    """Shows the episode that is about to begin; either player starts it."""
+
+    def __init__(self, game: Game):
+        super().__init__(game)
+        self._menu = Menu(
+            "", [("start", "start"), ("swap seats", "swap"), ("sticks and consent", "lobby"), ("quit for now", "quit")]
+        )
+        self._choice = ""
+        self._ticks = 0
+
+    def enter(self) -> None:
+        """Prepares the episode."""
+        game = self.game
+        game.next_trial()
+        if game.folder.kept:
+            self._menu.items.insert(2, ("undo the last keep", "undo"))
+
+    def handle(self, press: Press) -> None:
+        """Starts, or does what the menu offers."""
+        shortcuts = {Command.SWAP: "swap", Command.UNDO: "undo", Command.PAUSE: "quit?"}
+        self._choice = shortcuts.get(press.command) or self._menu.handle(press) or self._choice
+
+    def tick(self, tick: Tick) -> To:
+        """Follows the players' choice; a session without people needs none."""
+        game = self.game
+        self._ticks += 1
+        choice, self._choice = self._choice, ""
+        if not any(player.person for player in game.players) and self._ticks * DT_NS > _LIMB_S * 1e9:
+            choice = "start"
+        if game.settings.headless:
+            choice = "start"
+        match choice:
+            case "start" if not game.missing():
+                return To.COUNTDOWN
+            case "start":
+                game.say(f"{game.missing()[0].player_id} has no device")
+            case "swap":
+                game.reseat()
+            case "undo":
+                game.undo()
+                game.next_trial()
+            case "lobby":
+                return To.LOBBY
+            case "quit":
+                game.stop = "quit"
+                return To.END
+            case "quit?":
+                self._menu.cursor = len(self._menu.items) - 1
+        return To.STAY
+
+    def device_lost(self, player: Player) -> None:
+        """They have to join again."""
+        self.game.say(f"{player.player_id} lost their device")
+
+    def draw(self, canvas: Canvas, share: float) -> None:
+        """Draws the map under a box that says who sits where."""
+        game, trial = self.game, self.trial
+        self.draw_world(canvas, self.trial)
+        lines = [
+            Line(f"{mark}: {player.player_id}, {player.label}", 30, colour)
+            for mark, player, colour in zip(("Triangle", "Circle"), game.seats(trial), (SKY, ORANGE), strict=True)
+        ]
+        if trial.practice:
+            lines.append(Line("practice: it does not count", 26, YELLOW))
+        missing = game.missing()
+        if missing:
+            lines.append(Line(f"{missing[0].player_id}: press any button to join", 28, YELLOW))
+        else:
+            lines.append(Line("A or Enter starts", 24, MUTED))
+        draw_dialog(canvas, game.title(trial), lines, self._menu.labels, self._menu.cursor)
+
+
+class Countdown(Phase):
+    """Three, two, one; then the episode begins or goes on."""
+
+    def __init__(self, game: Game):
+        super().__init__(game)
+        self._end_ns = game.clock() + round(game.settings.countdown_s * 1e9)
+        self._told = 0
+        self._stop = ""
+
+    @property
+    def _left_s(self) -> float:
+        return (self._end_ns - self.game.clock()) / 1e9
+
+    def handle(self, press: Press) -> None:
+        """Somebody is not ready after all."""
+        if press.command == Command.PAUSE:
+            self._stop = "player"
+
+    def device_lost(self, player: Player) -> None:
+        """Nothing begins without a device."""
+        self._stop = "device_lost"
+
+    def focus_lost(self) -> None:
+        """Nothing begins behind another window."""
+        self._stop = "focus_lost"
+
+    def tick(self, tick: Tick) -> To:
+        """Counts."""
+        if self._stop:
+            self.game.pause_reason = self._stop
+            return To.PAUSED
+        number = math.ceil(self._left_s)
+        if self._left_s <= 0:
+            self.game.sounds.play("go")
+            return To.RUNNING
+        if number != self._told:
+            self._told = number
+            self.game.sounds.play("count")
+        return To.STAY
+
+    def draw(self, canvas: Canvas, share: float) -> None:
+        """Draws the number over the world."""
+        self.draw_world(canvas, self.trial)
+        left = max(0.0, self._left_s)
+        draw_countdown(canvas, str(max(1, math.ceil(left))), 1 - left % 1)

@@ -1,0 +1,232 @@
+"""One episode while it runs: the world, both controllers, the recorder, and how well the loop keeps its time."""
+
+import contextlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.messages.copolicy_pb2 import LoopTiming
+from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics
+
+from ..controllers import Controller, PolicyController
+from ..recorder import EpisodeRecorder
+from ..session import PRACTICE
+from ..ticker import LoopStatistics, Tick
+from ..wall_clock import WallClockAnchor
+from ..world import RUNNING, Outcome, TableWorld
+
+Pose = tuple[float, float, float]
+
+
+class Trial:
+    """One episode, from its first step to its verdict.
+
+    The recording stays a `.part` until the verdict, which is known only after the end, is part of it. Everything
+    before is on the disk within a second, the end at once.
+
+    Attributes:
+        controllers: robot seat, human seat.
+        outcome: how it stands.
+        before: pose before the last step.
+        forces: the last action, robot xy, human xy.
+        interaction: of the last step, units of a player's full force.
+        score: sum of rewards.
+        trail: poses, one in three.
+        loop: how well the loop kept its time.
+        notes: of the operator.
+        paused: how often it was paused.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        map_config: MapConfig,
+        seating: int,
+        controllers: tuple[Controller, Controller],
+        meta: EpisodeMeta,
+        anchor: WallClockAnchor,
+        physics: Physics,
+        practice: bool,
+        clock: Callable[[], int] = time.monotonic_ns,
+    ):
+        self.path = path
+        self.map_config = map_config
+        self.seating = seating
+        self.controllers = controllers
+        self.meta = meta
+        self.practice = practice
+        self.world = TableWorld(map_config, physics)
+        self.step_limit = physics.step_limit
+        self.outcome: Outcome = RUNNING
+        self.before: Pose = self.world.pose
+        self.forces = (0.0, 0.0, 0.0, 0.0)
+        self.interaction = 0.0
+        self.score = 0.0
+        self.trail: list[Pose] = [self.world.pose]
+        self.loop = LoopStatistics()
+        self.notes: list[str] = []
+        self.paused = 0
+        self.step_ns = clock()
+        self._anchor = anchor
+        self._clock = clock
+        self._stack = ExitStack()
+        self._recorder: EpisodeRecorder | None = None
+        for seat, controller in enumerate(controllers):
+            controller.begin(seat, map_config, meta.seed)
+
+    @property
+    def began(self) -> bool:
+        """There is a recording."""
+        return self._recorder is not None
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return self.world.step_count
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time so far."""
+        return self.steps / RECORD_HZ
+
+    def begin(self, devices: Mapping[str, str]) -> None:
+        """Opens the recording.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        recorder = EpisodeRecorder(
+            self.path, self.map_config, self.meta, self._anchor, monotonic_ns=self._clock(), devices=devices
+        )
+        self._recorder = self._stack.enter_context(recorder)
+        if self.practice:
+            self.event("practice")  # what a crash leaves behind must say so too
+
+    def step(self, tick: Tick) -> None:
+        """One step: reads the state and both players, records, advances.
+
+        Raises:
+            OSError: the recording cannot be written.
+        """
+        world = self.world
+        state = world.observation
+        readings = [controller.read(state) for controller in self.controllers]
+        action = np.clip(np.array([*readings[0].force, *readings[1].force]), -1.0, 1.0)
+        self.before, self.step_ns = world.pose, tick.start_ns
+        self.outcome = world.step(action)
+        for controller in self.controllers:
+            controller.executed(action)
+        reward = world.reward()
+        self.loop.add(tick)
+        timing = LoopTiming(
+            scheduled_ns=tick.scheduled_ns,
+            start_ns=tick.start_ns,
+            late_ns=tick.late_ns,
+            work_ns=self._clock() - tick.start_ns,
+            skipped_ticks=tick.skipped if self.loop.ticks > 1 else 0,
+        )
+        self._open.step(
+            action,
+            world.pose,
+            world.velocity,
+            reward,
+            monotonic_ns=tick.start_ns,
+            inputs=(readings[0].message, readings[1].message),
+            timing=timing,
+        )
+        self.forces = tuple(action.tolist())
+        self.interaction = float(interaction_force(world.pose[2], action))
+        self.score += reward
+        if self.steps % 3 == 0:
+            self.trail.append(world.pose)
+        if self.outcome.done:
+            self.event("outcome", self.outcome.reason)
+
+    def event(self, kind: str, detail: str = "") -> None:
+        """Records an event, if the recording has begun."""
+        if self._recorder is not None:
+            self._recorder.event(kind, detail, self._clock())
+
+    def pause(self, reason: str) -> None:
+        """The steps stop."""
+        self.paused += 1
+        self.forces = (0.0, 0.0, 0.0, 0.0)
+        self.before = self.world.pose
+        self.event("pause", reason)
+
+    def resume(self) -> None:
+        """The steps go on; what lay between is no part of the loop's time."""
+        self.loop.pause()
+        self.event("resume")
+
+    def note(self, text: str) -> None:
+        """Adds a note of the operator."""
+        self.notes.append(text)
+        self.event("note", text)
+
+    def finish(self, discarded: bool = False, reason: str = "") -> None:
+        """The verdict on an episode that has ended.
+
+        Raises:
+            OSError: the recording cannot be completed; what there is stays as `.part`.
+        """
+        self._end(self.outcome.success, self.outcome.reason, discarded, reason, ())
+
+    def interrupt(self, termination: str, reason: str) -> None:
+        """Ends an episode before its end, discarded: nobody decided how it would have gone.
+
+        Args:
+            termination: one of `TerminationReason`.
+            reason: for the notes.
+        """
+        self._end(False, termination, True, reason, ("interrupted",))
+
+    def abandon(self, error: BaseException) -> None:
+        """Ends the recording after an error: what can be written is completed and marked, the rest stays `.part`."""
+        # What could not be written to a full disk cannot be written now either.
+        with contextlib.suppress(OSError):
+            self._stack.__exit__(type(error), error, error.__traceback__)
+
+    def _end(self, success: bool, termination: str, discarded: bool, reason: str, flags: Sequence[str]) -> None:
+        if self.practice:
+            flags = (PRACTICE, *flags)
+        if self.paused:
+            flags = (*flags, "paused")
+        if self.loop.slow:
+            flags = (*flags, "slow_loop")
+        self.event("verdict", "discard" if discarded else "keep")
+        self.event("loop", self.loop.summary())
+        plans = _latencies(self.controllers)
+        if plans:
+            self.event("plans", plans)
+        notes = [f"discarded: {reason}"] if discarded and reason else []
+        self._open.finish(
+            success,
+            termination,
+            achieved_hz=self.loop.achieved_hz,
+            late_ticks=self.loop.late,
+            quality_flags=",".join(flags),
+            discarded=discarded or self.practice,
+            notes="; ".join([*notes, *self.notes]),
+        )
+        self._stack.close()
+
+    @property
+    def _open(self) -> EpisodeRecorder:
+        assert self._recorder is not None, "a step before the recording was opened"
+        return self._recorder
+
+
+def _latencies(controllers: Sequence[Controller]) -> str:
+    """How long policies planned, where any did."""
+    lines = []
+    for seat, controller in enumerate(controllers):
+        if isinstance(controller, PolicyController) and controller.latencies:
+            p50, most = np.percentile(controller.latencies, (50, 100)) * 1e3
+            lines.append(f"seat {seat}: {len(controller.latencies)} plans, p50 {p50:.0f} ms, max {most:.0f} ms")
+    return "; ".join(lines)

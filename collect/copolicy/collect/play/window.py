@@ -1,0 +1,63 @@
+"""The window, or what stands in for it where there is no display."""
+
+import os
+
+from copolicy.dataset.exceptions import RunError
+
+from ..screen import SIZE
+from ..sdl import pygame
+
+_OF_DESKTOP = 0.86  # of the desktop's smaller side that a window takes by itself
+
+
+class Window:
+    """A window of any size."""
+
+    def __init__(self, size: tuple[int, int] | None, fullscreen: bool):
+        """
+        Args:
+            size: px; by default what suits the desktop.
+            fullscreen: begin so.
+
+        Raises:
+            RunError: there is no display.
+        """
+        try:
+            pygame.display.init()
+            desktop = pygame.display.get_desktop_sizes()[0]
+            scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
+            self._size = size or (round(SIZE[0] * scale), round(SIZE[1] * scale))
+            pygame.display.set_caption("copolicy: carry the table together")
+            self._open(fullscreen)
+        except pygame.error as error:
+            raise RunError(f"expected a display (or --headless), found none: {error}") from None
+        pygame.mouse.set_visible(False)
+
+    @property
+    def surface(self) -> pygame.Surface:
+        """What to draw on; another one after the window's size has changed."""
+        return pygame.display.get_surface()
+
+    def show(self) -> None:
+        """Shows what was drawn."""
+        pygame.display.flip()
+
+    def toggle_fullscreen(self) -> None:
+        """Full screen and back."""
+        if not self._fullscreen:
+            self._size = self.surface.get_size()
+        self._open(not self._fullscreen)
+
+    def _open(self, fullscreen: bool) -> None:
+        self._fullscreen = fullscreen
+        if fullscreen:
+            pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        else:
+            pygame.display.set_mode(self._size, pygame.RESIZABLE)
+
+
+def open_without_window() -> None:
+    """What SDL needs to deliver the events of joysticks where there is no window."""
+    os.environ["SDL_VIDEODRIVER"] = "dummy"
+    pygame.display.init()
+    pygame.display.set_mode((64, 64))

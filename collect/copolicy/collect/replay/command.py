@@ -1,0 +1,82 @@
+"""The flags of `copolicy-collect replay`."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.commandline import add_command
+from copolicy.dataset.exceptions import InvalidValueError
+
+_VIEWER = Path()  # `--rerun` without a file
+
+
+def add_replay_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `replay` to the commands of `copolicy-collect`."""
+    command = add_command(
+        commands,
+        "replay",
+        _replay,
+        help="play a recording in a window, or write it as video, GIF or pictures, or check it",
+        example="copolicy-collect replay recordings/P01-01/episode_000.mcap\n"
+        "  copolicy-collect replay episode_000.mcap --video episode.mp4 --speed 2\n"
+        "  copolicy-collect replay episode_000.mcap --verify",
+    )
+    command.add_argument("file", type=Path, help="a recording, NAME.mcap")
+    command.add_argument("--video", type=Path, metavar="OUT.mp4", help="write an H.264 video; needs no display")
+    command.add_argument("--gif", type=Path, metavar="OUT.gif", help="write an endless GIF; needs no display")
+    command.add_argument("--png", type=Path, metavar="OUT.png", help="write a sheet of pictures; needs no display")
+    command.add_argument(
+        "--rerun",
+        type=Path,
+        nargs="?",
+        const=_VIEWER,
+        metavar="OUT.rrd",
+        help="open it in Rerun, or write a file for Rerun (pip install rerun-sdk)",
+    )
+    command.add_argument(
+        "--verify", action="store_true", help="simulate the actions again; exit status 1 where they lead elsewhere"
+    )
+    command.add_argument("--speed", type=float, default=1.0, help="of video and GIF, times real time (default 1)")
+    command.add_argument("--fps", type=int, help="pictures a second (default: video 30, GIF 12)")
+    command.add_argument("--width", type=int, help="px (default: video 1200, GIF 600, sheet 1800)")
+    command.add_argument("--frames", type=int, default=12, help="pictures on the sheet (default 12)")
+    command.add_argument(
+        "--angular-limit",
+        choices=("pi/2", "pi/8"),
+        help="of --verify: the recording's bound on the angular acceleration (default: the one that fits better)",
+    )
+    command.add_argument("--limit-px", type=float, default=0.01, help="of --verify: largest drift, px (default 0.01)")
+    command.add_argument("--limit-rad", type=float, default=1e-4, help="of --verify: the same, rad (default 0.0001)")
+
+
+def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
+    # Loading pygame takes a moment that `--help` should not.
+    from .film import write_gif, write_video
+    from .rerun_log import log_to_rerun
+    from .sheet import write_sheet
+    from .track import read_track
+    from .verify import verify
+
+    track = read_track(arguments.file)
+    if not track.steps:
+        raise InvalidValueError(str(arguments.file), "a recording of at least one step", 0)
+    summary: dict[str, Any] = {}
+    film = {"speed": arguments.speed, "width": arguments.width, "fps": arguments.fps}
+    if arguments.verify:
+        summary["verify"] = verify(track, arguments.angular_limit, arguments.limit_px, arguments.limit_rad)
+        summary["exit_status"] = summary["verify"].pop("exit_status")
+    if arguments.video:
+        summary["video"] = write_video(track, arguments.video, **film)
+    if arguments.gif:
+        summary["gif"] = write_gif(track, arguments.gif, **film)
+    if arguments.png:
+        sheet = {} if arguments.width is None else {"width": arguments.width}
+        summary["png"] = write_sheet(track, arguments.png, arguments.frames, **sheet)
+    if arguments.rerun is not None:
+        summary["rerun"] = log_to_rerun(track, None if arguments.rerun == _VIEWER else arguments.rerun)
+    if not summary:
+        from .viewer import Viewer
+
+        Viewer(track).run()
+        summary = {"file": str(arguments.file), "steps": track.steps}
+    return summary

@@ -1,0 +1,173 @@
+"""A replay as a film: H.264 through PyAV or the ffmpeg program, or a GIF through Pillow."""
+
+import contextlib
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.commandline import progress
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, MissingExtraError, OutputExistsError, RunError
+
+from ..sdl import pygame
+from .pictures import picture_count, picture_size, pictures
+from .track import Track
+
+VIDEO_WIDTH, VIDEO_FPS = 1200, 30
+GIF_WIDTH, GIF_FPS = 600, 12
+
+_QUALITY = "20"  # of x264, 0 (lossless) to 51
+_PRESET = "veryfast"
+
+
+def write_video(
+    track: Track, path: Path, speed: float = 1.0, width: int | None = None, fps: int | None = None
+) -> dict[str, Any]:
+    """Writes an H.264 video that plays everywhere.
+
+    Args:
+        track: what to show.
+        path: of the file, `.mp4` or `.mkv`.
+        speed: times real time.
+        width: px.
+        fps: pictures a second.
+
+    Returns:
+        Size, pictures and seconds of the film, JSON-able.
+
+    Raises:
+        OutputExistsError: the file exists.
+        InvalidValueError: another ending, or a speed, width or rate that makes no film.
+        CopolicyError: neither PyAV nor ffmpeg is there.
+        RunError: the encoder failed.
+    """
+    width, fps = width or VIDEO_WIDTH, fps or VIDEO_FPS
+    _check(path, (".mp4", ".mkv"), speed, fps)
+    size = picture_size(width)
+    frames = _shown_progress(track, size, fps, speed)
+    encode = _encoder()
+    with _published(path) as unfinished:
+        encode(unfinished, frames, size, fps)
+    return _summary(path, track, size, fps, speed)
+
+
+def write_gif(
+    track: Track, path: Path, speed: float = 1.0, width: int | None = None, fps: int | None = None
+) -> dict[str, Any]:
+    """Writes an endless GIF; arguments, result and errors as for `write_video`.
+
+    Raises:
+        MissingExtraError: Pillow is not there.
+    """
+    width, fps = width or GIF_WIDTH, fps or GIF_FPS
+    _check(path, (".gif",), speed, fps)
+    try:
+        from PIL import Image
+    except ImportError:
+        raise MissingExtraError("Pillow") from None
+    size = picture_size(width)
+    # One palette for all pictures, without dithering: what stands still then compresses to nothing.
+    palette = None
+    images = []
+    for surface in _shown_progress(track, size, fps, speed):
+        image = Image.frombytes("RGB", size, pygame.image.tobytes(surface, "RGB"))
+        if palette is None:
+            palette = image.quantize(256)
+        images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    with _published(path) as unfinished:
+        images[0].save(
+            unfinished, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
+        )
+    return _summary(path, track, size, fps, speed)
+
+
+def _check(path: Path, endings: tuple[str, ...], speed: float, fps: int) -> None:
+    if path.suffix.lower() not in endings:
+        raise InvalidValueError(str(path), f"a name that ends with {' or '.join(endings)}", path.suffix)
+    if path.exists():
+        raise OutputExistsError(path)
+    if not 0.05 <= speed <= 100:
+        raise InvalidValueError("speed", "0.05 to 100", speed)
+    if not 1 <= fps <= 120:
+        raise InvalidValueError("fps", "1 to 120", fps)
+
+
+def _shown_progress(track: Track, size: tuple[int, int], fps: int, speed: float) -> Iterable[pygame.Surface]:
+    return progress(pictures(track, size, fps, speed), picture_count(track, fps, speed), "pictures")
+
+
+def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: float) -> dict[str, Any]:
+    count = picture_count(track, fps, speed)
+    return {
+        "out": str(path),
+        "bytes": path.stat().st_size,
+        "width": size[0],
+        "height": size[1],
+        "pictures": count,
+        "seconds": round(count / fps, 3),
+    }
+
+
+@contextlib.contextmanager
+def _published(path: Path) -> Iterator[Path]:
+    """A name to write to, which becomes `path` when all is written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".film-", dir=path.parent) as folder:
+        unfinished = Path(folder) / path.name
+        yield unfinished
+        if path.exists():
+            raise OutputExistsError(path)
+        os.replace(unfinished, path)
+
+
+def _encoder():
+    try:
+        import av
+
+        # A build of PyAV without x264 cannot write what we want; ffmpeg may.
+        if "libx264" in av.codecs_available:
+            return _encode_with_pyav
+    except ImportError:
+        pass
+    if shutil.which("ffmpeg"):
+        return _encode_with_ffmpeg
+    raise CopolicyError("--video: expected PyAV (pip install av) or the program ffmpeg, found neither")
+
+
+def _encode_with_pyav(path: Path, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int) -> None:
+    import av
+    from av.error import FFmpegError
+
+    try:
+        with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
+            stream = container.add_stream("libx264", rate=Fraction(fps), options={"crf": _QUALITY, "preset": _PRESET})
+            stream.width, stream.height = size
+            stream.pix_fmt = "yuv420p"
+            for surface in frames:
+                frame = av.VideoFrame.from_ndarray(pygame.surfarray.array3d(surface).swapaxes(0, 1), format="rgb24")
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+    except FFmpegError as error:
+        raise RunError(f"{path.name}: expected PyAV to encode the video, found {error}") from None
+
+
+def _encode_with_ffmpeg(path: Path, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int) -> None:
+    command = [
+        "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
+        "-r", str(fps), "-i", "-", "-c:v", "libx264", "-preset", _PRESET, "-crf", _QUALITY, "-pix_fmt", "yuv420p",
+        "-movflags", "+faststart", str(path),
+    ]  # fmt: skip
+    with tempfile.TemporaryFile() as errors:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors)
+        assert process.stdin is not None
+        with process, contextlib.suppress(BrokenPipeError), process.stdin as pipe:
+            for surface in frames:
+                pipe.write(pygame.image.tobytes(surface, "RGB"))
+        if process.returncode:
+            errors.seek(0)
+            told = errors.read().decode(errors="replace").strip().splitlines()
+            raise RunError(f"{path.name}: expected ffmpeg to encode the video, found {(told or ['nothing said'])[-1]}")

@@ -1,0 +1,92 @@
+"""The interaction force of an episode over its time, with a cursor: pulling apart above, pressing together below."""
+
+import numpy as np
+
+from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, VERMILION, Colour, mix
+from ..screen.text import draw_text
+from ..sdl import pygame
+
+_SMALLEST_RANGE = 0.5  # of a full force: a calm episode shall look calm
+
+
+class ForceGraph:
+    """Draws the curve once a size, and the cursor on it."""
+
+    def __init__(self, interaction: np.ndarray):
+        """
+        Args:
+            interaction: `(T,)`, units of a player's full force.
+        """
+        self._forces = interaction
+        self._range = max(_SMALLEST_RANGE, float(np.abs(interaction).max(initial=0.0)) * 1.1)
+        self._curve: pygame.Surface | None = None
+
+    def x_of(self, rect: pygame.Rect, position: float) -> float:
+        """Where a position (steps) lies in the rectangle, px."""
+        return rect.left + rect.width * position / max(1, len(self._forces))
+
+    def position_of(self, rect: pygame.Rect, x: float) -> float:
+        """The inverse of `x_of`."""
+        return (x - rect.left) / rect.width * len(self._forces)
+
+    def draw(self, surface: pygame.Surface, rect: pygame.Rect, position: float | None, font: float) -> None:
+        """Draws into a rectangle; without a position there is no cursor. `font` is the height of text, px."""
+        if self._curve is None or self._curve.get_size() != rect.size:
+            self._curve = self._draw_curve(rect.size)
+        surface.blit(self._curve, rect)
+        if position is not None:
+            self._shade(surface, rect, position)
+        draw_text(surface, "pulling apart", (rect.left + 0.3 * font, rect.top + 0.1 * font), font, MUTED)
+        draw_text(
+            surface, "pressing together", (rect.left + 0.3 * font, rect.bottom - 0.1 * font), font, MUTED, "bottomleft"
+        )
+        if position is None or not len(self._forces):
+            return
+        force = float(self._forces[min(int(position), len(self._forces) - 1)])
+        x, y = round(self.x_of(rect, position)), round(rect.centery - force / self._range * rect.height / 2)
+        thickness = max(2, round(font / 10))
+        pygame.draw.rect(surface, TEXT, (x - thickness // 2, rect.top, thickness, rect.height))
+        pygame.draw.circle(surface, SURROUND, (x, y), font * 0.42)
+        pygame.draw.circle(surface, _colour(force), (x, y), font * 0.32)
+        right = x < rect.right - 4 * font
+        draw_text(
+            surface,
+            f"{force:+.2f}",
+            (x + (0.5 if right else -0.5) * font, rect.top + 0.1 * font),
+            1.15 * font,
+            TEXT,
+            "topleft" if right else "topright",
+        )
+
+    def _shade(self, surface: pygame.Surface, rect: pygame.Rect, position: float) -> None:
+        """Makes paler what is still to come."""
+        left = round(self.x_of(rect, position))
+        shade = pygame.Surface((max(0, rect.right - left), rect.height), depth=32)
+        shade.fill(SURROUND)
+        shade.set_alpha(120)
+        surface.blit(shade, (left, rect.top))
+
+    def _draw_curve(self, size: tuple[int, int]) -> pygame.Surface:
+        # Twice as large and shrunk, for soft edges.
+        width, height = 2 * size[0], 2 * size[1]
+        canvas = pygame.Surface((width, height), depth=32)
+        canvas.fill(SURROUND)
+        middle = height // 2
+        if len(self._forces):
+            edges = np.linspace(0, len(self._forces), width + 1).astype(int)
+            for x in range(width):
+                column = self._forces[edges[x] : max(edges[x] + 1, edges[x + 1])]
+                for extreme in (float(column.max()), float(column.min())):
+                    top = middle - extreme / self._range * middle
+                    fill = mix(_colour(extreme), SURROUND, 0.55)
+                    pygame.draw.line(canvas, fill, (x, middle), (x, round(top)))
+            places = (np.arange(len(self._forces)) + 0.5) * width / len(self._forces)
+            points = [(x, middle - f / self._range * middle) for x, f in zip(places, self._forces, strict=True)]
+            for (start, force), end in zip(zip(points, self._forces, strict=True), points[1:], strict=False):
+                pygame.draw.line(canvas, _colour(float(force)), start, end, 4)
+        pygame.draw.line(canvas, PANEL_EDGE, (0, middle), (width, middle), 3)
+        return pygame.transform.smoothscale(canvas, size)
+
+
+def _colour(force: float) -> Colour:
+    return VERMILION if force > 0 else SKY

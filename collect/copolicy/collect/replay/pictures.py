@@ -1,0 +1,45 @@
+"""The pictures of a film of a replay, drawn without a display."""
+
+from collections.abc import Iterator
+
+from copolicy.dataset.exceptions import InvalidValueError
+
+from ..sdl import pygame
+from .playback import Playback
+from .track import Track, sampled
+from .view import SIZE, ReplayView, Shown
+
+_LAST_S = 1.0  # for which the last picture stays
+
+
+def picture_size(width: int) -> tuple[int, int]:
+    """Width and height of a picture, even numbers as films want them, px.
+
+    Raises:
+        InvalidValueError: too small to see anything, or larger than any film.
+    """
+    if not 200 <= width <= 7680:
+        raise InvalidValueError("width", "200 to 7680 px", width)
+    return width // 2 * 2, round(width * SIZE[1] / SIZE[0] / 2) * 2
+
+
+def picture_count(track: Track, frames_per_second: float, speed: float) -> int:
+    """How many pictures `pictures` gives."""
+    return len(sampled(track, frames_per_second, speed)) + round(_LAST_S * frames_per_second)
+
+
+def pictures(track: Track, size: tuple[int, int], frames_per_second: float, speed: float) -> Iterator[pygame.Surface]:
+    """The pictures in order; the same surface each time, drawn anew."""
+    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
+    surface = pygame.Surface(size, depth=32)
+    view = ReplayView(track)
+    shown = Shown(hint=False)
+    playback = Playback(track.steps, speed=speed)
+    for position in sampled(track, frames_per_second, speed):
+        playback.position = position
+        view.draw(surface, playback, shown)
+        yield surface
+    playback.playing = False
+    view.draw(surface, playback, shown)
+    for _ in range(round(_LAST_S * frames_per_second)):
+        yield surface

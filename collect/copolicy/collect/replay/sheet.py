@@ -1,0 +1,95 @@
+"""A contact sheet: an episode on one page."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, RunError
+from copolicy.dataset.task import PLAYERS, RECORD_HZ, WINDOW
+
+from ..screen.canvas import Canvas
+from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
+from ..screen.palette import INK, MUTED, TEXT
+from ..sdl import pygame
+from .track import Track
+from .view import ReplayView
+
+FRAMES = 12
+
+_GAP = 12
+_HEAD = 64
+_GRAPH = 120
+
+
+def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 1800) -> dict[str, Any]:
+    """Writes pictures from start to end, evenly spaced, and the interaction force below them, as PNG.
+
+    Args:
+        track: what to show.
+        path: of the file, `.png`.
+        frames: pictures on the sheet.
+        width: of the sheet, px.
+
+    Returns:
+        Size and the steps of the pictures, JSON-able.
+
+    Raises:
+        OutputExistsError: the file exists.
+        InvalidValueError: another ending, or a number of pictures or a width that makes no sheet.
+        RunError: it cannot be written.
+    """
+    if path.suffix.lower() != ".png":
+        raise InvalidValueError(str(path), "a name that ends with .png", path.suffix)
+    if path.exists():
+        raise OutputExistsError(path)
+    if not 1 <= frames <= 200:
+        raise InvalidValueError("frames", "1 to 200", frames)
+    if not 300 <= width <= 10_000:
+        raise InvalidValueError("width", "300 to 10000 px", width)
+    sheet, positions = draw_sheet(track, frames, width)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        pygame.image.save(sheet, path)
+    except pygame.error as error:
+        raise RunError(f"{path}: expected to write the picture, found {error}") from None
+    return {"out": str(path), "bytes": path.stat().st_size, "size": list(sheet.get_size()), "steps": positions}
+
+
+def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, list[int]]:
+    """The sheet, and the step of each picture."""
+    columns = math.ceil(math.sqrt(frames * 0.75))
+    rows = math.ceil(frames / columns)
+    cell = (1200 - (columns + 1) * _GAP) / columns
+    cell_height = cell * WINDOW[1] / WINDOW[0]
+    size = (1200, math.ceil(_HEAD + rows * (cell_height + _GAP) + _GRAPH + _GAP))
+    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
+    surface = pygame.Surface((width, math.ceil(width * size[1] / size[0])), depth=32)
+    canvas = Canvas(surface, size)
+    canvas.clear()
+    view = ReplayView(track)
+    positions = [round(track.steps * index / max(1, frames - 1)) for index in range(frames)]
+    for index, position in enumerate(positions):
+        row, column = divmod(index, columns)
+        x, y = _GAP + column * (cell + _GAP), _HEAD + row * (cell_height + _GAP)
+        view.draw_world(surface, canvas.rect(x, y, cell, cell_height), position)
+        canvas.text(f"{position / RECORD_HZ:.1f} s", (x + 9, y + 8), 22, INK)
+    _draw_head(canvas, track)
+    graph = canvas.rect(_GAP, size[1] - _GRAPH - _GAP, 1200 - 2 * _GAP, _GRAPH)
+    view.draw_graph(surface, graph, 20 * canvas.scale)
+    return surface, positions
+
+
+def _draw_head(canvas: Canvas, track: Track) -> None:
+    meta = track.episode.meta
+    about = [
+        meta.map_id,
+        meta.pair_id and f"pair {meta.pair_id}",
+        " and ".join(one or name for one, name in zip((meta.player_0_id, meta.player_1_id), PLAYERS, strict=True)),
+        f"{track.seconds:.1f} s",
+        meta.quality_flags.replace(",", ", "),
+    ]
+    canvas.text(track.path.name, (_GAP + 4, 10), 32, TEXT, max_width=700)
+    canvas.text("  ·  ".join(text for text in about if text), (_GAP + 4, 38), 22, MUTED, max_width=800)
+    reason = meta.termination_reason
+    text = OUTCOME_TEXTS.get(reason, reason.replace("_", " "))
+    canvas.text(text, (1200 - _GAP - 4, 32), 38, OUTCOME_COLOURS.get(reason, MUTED), "midright", 320)

@@ -1,0 +1,117 @@
+"""A recording as what can be shown of it at any moment."""
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mcap.records import Channel, Message
+
+from copolicy.dataset.episode import Episode
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.features import theta_of
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.topics import EVENT
+
+from ..intact_records import intact_records
+from ..screen import between
+
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Something that happened at a step."""
+
+    step: int
+    kind: str
+    detail: str
+
+
+@dataclass(frozen=True, repr=False)
+class Track:
+    """An episode of T steps.
+
+    Attributes:
+        path: of the recording.
+        episode: states, actions, metadata, map.
+        poses: `T + 1`, px and rad.
+        forces: `(T + 1, 4)` robot xy, human xy; none at the end.
+        interaction: `(T,)` interaction force of each step, units of a player's full force; positive pulls apart.
+        moments: what happened, in order, without start and end.
+    """
+
+    path: Path
+    episode: Episode
+    poses: tuple[Pose, ...]
+    forces: np.ndarray
+    interaction: np.ndarray
+    moments: tuple[Moment, ...] = ()
+
+    @property
+    def steps(self) -> int:
+        """T, and the position of the last state."""
+        return len(self.interaction)
+
+    @property
+    def seconds(self) -> float:
+        """Length in simulated time."""
+        return self.steps / RECORD_HZ
+
+    def pose_at(self, position: float) -> Pose:
+        """The pose at a position between 0 and T, steps; between two states a way between them."""
+        before = min(int(position), self.steps)
+        after = min(before + 1, self.steps)
+        return between(self.poses[before], self.poses[after], position - before)
+
+    def forces_at(self, position: float) -> tuple[float, float, float, float]:
+        """The forces that act at a position."""
+        a, b, c, d = self.forces[min(int(position), self.steps)].tolist()
+        return a, b, c, d
+
+    def interaction_at(self, position: float) -> float:
+        """The interaction force at a position; the last one at the end."""
+        return float(self.interaction[min(int(position), self.steps - 1)]) if self.steps else 0.0
+
+
+def read_track(path: Path | str) -> Track:
+    """Reads and verifies a recording.
+
+    Raises:
+        FileFormatError: it cannot be read, is damaged, broke off, or is no recording of this task.
+    """
+    path = Path(path)
+    if path.name.endswith(".part"):
+        raise FileFormatError(path, "a finished recording", "one that broke off (copolicy-collect recover helps)")
+    episode = read_episode(path)
+    return track_of(path, episode, _moments(path))
+
+
+def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> Track:
+    """The track of an episode in memory."""
+    states = np.vstack((episode.states, episode.final_state))
+    theta = theta_of(states)
+    poses = tuple((x, y, angle) for (x, y), angle in zip(states[:, :2].tolist(), theta.tolist(), strict=True))
+    forces = np.vstack((episode.actions, np.zeros(4)))
+    return Track(path, episode, poses, forces, interaction_force(theta[1:], episode.actions), moments)
+
+
+def _moments(path: Path) -> tuple[Moment, ...]:
+    channels = set()
+    events = []
+    for record in intact_records(path):
+        if isinstance(record, Channel) and record.topic == EVENT.name:
+            channels.add(record.id)
+        elif isinstance(record, Message) and record.channel_id in channels:
+            events.append(EpisodeEvent.FromString(record.data))
+    return tuple(Moment(event.step, event.kind, event.detail) for event in events if event.kind not in ("start", "end"))
+
+
+def sampled(track: Track, frames_per_second: float, speed: float) -> list[float]:
+    """Positions of the frames of a film of the whole track, steps; the last one is its end."""
+    stride = RECORD_HZ * speed / frames_per_second
+    positions = itertools.takewhile(lambda position: position < track.steps, itertools.count(0.0, stride))
+    return [*positions, float(track.steps)]

@@ -1,0 +1,167 @@
+"""The window of a replay."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.task import RECORD_HZ
+
+from ..sdl import pygame
+from .playback import Playback
+from .track import Track
+from .view import SIZE, ReplayView, Shown
+
+_PICTURES_HZ = 60
+_OF_DESKTOP = 0.86  # of the desktop's smaller side that the window takes
+_MESSAGE_S = 2.5
+
+
+class Viewer:
+    """Shows a track until its user has seen enough.
+
+    Attributes:
+        playback: where it stands.
+        shown: what is drawn beside the table.
+        open: the user has not quit.
+    """
+
+    def __init__(self, track: Track, clock: Callable[[], float] = time.perf_counter):
+        """Opens the window.
+
+        Raises:
+            RunError: there is no display.
+        """
+        self.playback = Playback(track.steps)
+        self.shown = Shown()
+        self.open = True
+        self._track = track
+        self._view = ReplayView(track)
+        self._clock = clock
+        self._dragging = False
+        self._was_playing = False
+        self._message_until = 0.0
+        self._full_screen = False
+        try:
+            pygame.display.init()
+            desktop = pygame.display.get_desktop_sizes()[0]
+            scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
+            self._size = (round(SIZE[0] * scale), round(SIZE[1] * scale))
+            pygame.display.set_caption(f"copolicy: {track.path.name}")
+            pygame.display.set_mode(self._size, pygame.RESIZABLE)
+        except pygame.error as error:
+            raise RunError(f"expected a display (or --video, --gif, --png), found none: {error}") from None
+        pygame.key.set_repeat(350, 40)
+
+    def run(self) -> None:
+        """Until the window is closed."""
+        before = self._clock()
+        pace = pygame.time.Clock()
+        while self.open:
+            for event in pygame.event.get():
+                self.handle(event)
+            now = self._clock()
+            self.advance(now - before)
+            before = now
+            self.draw()
+            pace.tick(_PICTURES_HZ)
+        pygame.display.quit()
+
+    def advance(self, seconds: float) -> None:
+        """Lets time pass."""
+        if not self._dragging:
+            self.playback.advance(seconds)
+        if self.shown.message and self._clock() > self._message_until:
+            self.shown.message = ""
+
+    def draw(self) -> None:
+        """Draws and shows the picture."""
+        self._view.draw(pygame.display.get_surface(), self.playback, self.shown)
+        pygame.display.flip()
+
+    def handle(self, event: pygame.event.Event) -> None:
+        """Does what a key, the mouse or the window's frame asks for."""
+        if event.type == pygame.QUIT:
+            self.open = False
+        elif event.type == pygame.KEYDOWN:
+            self._key(event.key, bool(event.mod & pygame.KMOD_SHIFT))
+        elif event.type == pygame.MOUSEWHEEL:
+            self.playback.step(RECORD_HZ * event.y)
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            self._press(event.pos)
+        elif event.type == pygame.MOUSEMOTION and self._dragging:
+            self._drag(event.pos)
+        elif event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self._dragging:
+            self._dragging = False
+            self.playback.playing = self._was_playing and self.playback.position < self.playback.steps
+
+    def _key(self, key: int, shift: bool) -> None:
+        playback, shown = self.playback, self.shown
+        stride = RECORD_HZ if shift else 1
+        if key in (pygame.K_q, pygame.K_ESCAPE):
+            if shown.help and key == pygame.K_ESCAPE:
+                shown.help = False
+            else:
+                self.open = False
+        elif key == pygame.K_SPACE:
+            playback.toggle()
+        elif key in (pygame.K_LEFT, pygame.K_RIGHT):
+            playback.step(stride if key == pygame.K_RIGHT else -stride)
+        elif key in (pygame.K_UP, pygame.K_DOWN):
+            playback.change_speed(1 if key == pygame.K_UP else -1)
+        elif key in (pygame.K_HOME, pygame.K_END):
+            playback.seek(0 if key == pygame.K_HOME else playback.steps)
+        elif key == pygame.K_t:
+            shown.trails = not shown.trails
+        elif key == pygame.K_f:
+            shown.forces = not shown.forces
+        elif key in (pygame.K_h, pygame.K_F1):
+            shown.help = not shown.help
+        elif key == pygame.K_s:
+            self._save()
+        elif key == pygame.K_F11:
+            self._toggle_full_screen()
+
+    def _press(self, point: tuple[int, int]) -> None:
+        position = self._view.position_at(pygame.display.get_surface(), point)
+        if position is None:
+            self.playback.toggle()
+            return
+        self._dragging, self._was_playing = True, self.playback.playing
+        self.playback.seek(position)
+
+    def _drag(self, point: tuple[int, int]) -> None:
+        position = self._view.position_at(pygame.display.get_surface(), point, held=True)
+        if position is not None:
+            self.playback.seek(position)
+
+    def _save(self) -> None:
+        surface = pygame.display.get_surface().copy()
+        self._view.draw(surface, self.playback, Shown(self.shown.trails, self.shown.forces, hint=False))
+        path = _free(self._track.path.with_name(f"{self._track.path.stem}_step_{int(self.playback.position):04d}.png"))
+        try:
+            pygame.image.save(surface, path)
+            self._say(f"saved {path.name}")
+        except (pygame.error, OSError) as error:
+            self._say(f"not saved: {error}")
+
+    def _say(self, message: str) -> None:
+        self.shown.message = message
+        self._message_until = self._clock() + _MESSAGE_S
+
+    def _toggle_full_screen(self) -> None:
+        if not self._full_screen:
+            self._size = pygame.display.get_surface().get_size()
+        self._full_screen = not self._full_screen
+        if self._full_screen:
+            pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        else:
+            pygame.display.set_mode(self._size, pygame.RESIZABLE)
+
+
+def _free(path: Path) -> Path:
+    """A path that does not exist yet."""
+    number, free = 2, path
+    while free.exists():
+        free, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
+    return free

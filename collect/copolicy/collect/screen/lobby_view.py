@@ -1,0 +1,82 @@
+"""The lobby: two players join, try their sticks, and see what the session will be."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .canvas import Canvas
+from .palette import GREEN, MUTED, PANEL, PANEL_EDGE, SEATS, SKY, TEXT, YELLOW, mix
+from .patch import Point
+
+
+@dataclass(frozen=True)
+class LobbyPanel:
+    """One player's half of the lobby.
+
+    Attributes:
+        seat: where they will sit.
+        player: pseudonym.
+        device: what they hold; empty until they have joined.
+        prompt: what to do next.
+        stick: raw deflection in [-1, 1]; None where there is none.
+        force: what comes of it after dead zone and range.
+        dead_zone: share of the full deflection.
+        items: of their menu.
+        cursor: the chosen one.
+        ready: done here.
+        progress: of a calibration, share in [0, 1]; None where none runs.
+    """
+
+    seat: int
+    player: str
+    device: str
+    prompt: str
+    stick: Point | None
+    force: Point
+    dead_zone: float
+    items: Sequence[str]
+    cursor: int
+    ready: bool
+    progress: float | None
+
+
+def draw_lobby(canvas: Canvas, title: str, plan: Sequence[str], panels: Sequence[LobbyPanel]) -> None:
+    """Draws the whole screen."""
+    canvas.text(title, (600, 44), 54, TEXT, "center", 1140)
+    for row, line in enumerate(plan):
+        canvas.text(line, (600, 90 + 32 * row), 27, MUTED, "center", 1140)
+    for panel in panels:
+        _draw_panel(canvas, panel, 20 + 590 * panel.seat)
+    canvas.text("F1 or H: help      Tab: swap seats      Esc: quit", (600, 738), 22, MUTED, "center")
+
+
+def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:
+    colour = GREEN if panel.ready else SEATS[panel.seat] if panel.device else PANEL_EDGE
+    canvas.box(x, 186, 570, 530, edge=colour)
+    canvas.seat_mark(panel.seat, x + 52, 238, 34)
+    seat = ("triangle, robot's seat", "circle, human's seat")[panel.seat]
+    canvas.text(panel.player, (x + 104, 208), 40, max_width=440)
+    canvas.text(seat, (x + 104, 246), 25, MUTED, max_width=440)
+    if not panel.device:
+        canvas.text(panel.prompt, (x + 285, 450), 38, YELLOW, "center", 530)
+        return
+    canvas.text(panel.device, (x + 285, 300), 30, SKY, "center", 530)
+    if panel.stick is not None:
+        canvas.stick(x + 150, 440, 98, panel.stick, panel.seat, panel.dead_zone)
+        canvas.text("stick", (x + 150, 552), 22, MUTED, "midtop")
+        canvas.text(f"force  {panel.force[0]:+.2f}  {panel.force[1]:+.2f}", (x + 150, 576), 24, TEXT, "midtop")
+    if panel.progress is not None:
+        canvas.text(panel.prompt, (x + 285, 640), 32, YELLOW, "center", 530)
+        canvas.bar(x + 60, 672, 450, 16, panel.progress, SKY)
+        return
+    left, width = (x + 284, 262) if panel.stick is not None else (x + 115, 340)
+    for row, item in enumerate(panel.items):
+        y = 322 + 36 * row
+        chosen = row == panel.cursor
+        if chosen:
+            canvas.box(left, y, width, 35, mix(PANEL, SKY, 0.30), SKY)
+        canvas.text(item, (left + 14, y + 18), 25, TEXT if chosen else MUTED, "midleft", width - 24)
+    if panel.ready:
+        canvas.box(x + 60, 654, 450, 50, mix(PANEL, GREEN, 0.45), GREEN)
+        canvas.text("ready", (x + 285, 679), 36, TEXT, "center")
+    else:
+        canvas.text(panel.prompt, (x + 285, 686), 27, YELLOW, "center", 530)

@@ -1,0 +1,111 @@
+"""What the tests of `copolicy-collect play` share: settings, a short map, and a thread that plays."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from virtual_joystick import VirtualJoystick
+
+from copolicy.collect.play.application import Application
+from copolicy.collect.play.settings import PilotSpec, PlaySettings
+from copolicy.collect.session import Balance
+from copolicy.dataset.task import MapConfig
+
+SHORT_MAP = MapConfig(start=(760.0, 300.0, 3.14), goal=(960.0, 300.0))
+"""Straight ahead, two and a half seconds away."""
+
+A, B, X, Y, START = 0, 1, 2, 3, 7
+"""Buttons of a game pad."""
+
+
+def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
+    """A session of two joysticks without waiting."""
+    values: dict[str, Any] = {
+        "pair": "P01",
+        "out": tmp_path / "recordings",
+        "pilots": (PilotSpec("joystick"), PilotSpec("joystick")),
+        "episodes": 4,
+        "config_folder": tmp_path / "config",
+        "window": (400, 320),
+        "mute": True,
+        "countdown_s": 0.0,
+    }
+    return PlaySettings(**(values | changes))
+
+
+def on_short_map(application: Application) -> None:
+    """Puts every episode of a session on the short map."""
+    game = application.game
+    game.maps = (SHORT_MAP,)
+    game.balance = Balance(game.maps, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False)
+
+
+class Players(threading.Thread):
+    """A thread that does what two people do, while the program runs in the main one.
+
+    An error in it ends the session; `finish` raises it again.
+    """
+
+    def __init__(self, application: Application, play: Callable[["Players"], None]):
+        super().__init__(daemon=True)
+        self.application = application
+        self._play = play
+        self._error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            self._play(self)
+        except BaseException as error:
+            self._error = error
+        finally:
+            self.application.game.stop = self.application.game.stop or "the players went home"
+
+    def finish(self) -> None:
+        """Waits for the thread, and raises what went wrong in it."""
+        self.join(30)
+        if self._error is not None:
+            raise self._error
+
+    def until(self, condition: Callable[[], object], what: str, seconds: float = 15.0) -> None:
+        """Waits for something to come true."""
+        limit = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > limit:
+                raise AssertionError(f"waited {seconds} s for {what}, in phase {type(self.application.phase).__name__}")
+            time.sleep(0.005)
+
+    def phase(self, name: str) -> None:
+        """Waits for a phase."""
+        self.until(lambda: type(self.application.phase).__name__ == name, name)
+
+    def press(self, pad: VirtualJoystick, button: int) -> None:
+        """Presses a button as a person does, and lets the program see it."""
+        self.until(lambda: pad.is_open, "an open joystick")
+        pad.button(button, True)
+        time.sleep(0.08)
+        pad.button(button, False)
+        time.sleep(0.08)
+
+    def carry(self, *pads: VirtualJoystick, steps: int | None = None) -> None:
+        """Pushes with both sticks towards the goal, for a number of steps or until the episode ends."""
+        game = self.application.game
+        trial = game.trial
+        assert trial is not None
+        last = trial.steps + (steps or 10**6)
+        limit = time.monotonic() + 40
+        while trial.steps < last and not trial.outcome.done and time.monotonic() < limit:
+            x, y, _ = trial.world.pose
+            dx, dy = trial.map_config.goal[0] - x, trial.map_config.goal[1] - y
+            for pad in pads:
+                pad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
+            time.sleep(0.01)
+        for pad in pads:
+            pad.move(0.0, 0.0)
+
+    def result(self) -> None:
+        """Waits for the result, and until it listens."""
+        self.phase("Result")
+        time.sleep(0.5)

@@ -1,0 +1,291 @@
+"""Two people with real (virtual) joysticks, from the lobby to the end, and back on another day."""
+
+import json
+import math
+import time
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from play_session import SHORT_MAP, A, B, Players, X, on_short_map, settings
+from virtual_joystick import VirtualJoystick
+
+from copolicy.collect.play.session_run import prepared
+from copolicy.collect.sdl import pygame
+from copolicy.collect.ticker import DT_NS
+from copolicy.dataset.log import read_episode, read_metadata
+from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+
+
+@pytest.fixture
+def pads():
+    pygame.display.init()
+    made = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    yield made
+    for pad in made:
+        pad.unplug()
+    pygame.joystick.quit()
+
+
+def _messages(path, topic, message):
+    with path.open("rb") as file:
+        return [message.FromString(one.data) for _, _, one in make_reader(file).iter_messages([topic])]
+
+
+def _events(path):
+    return [(event.kind, event.detail) for event in _messages(path, "/episode/event", EpisodeEvent)]
+
+
+def _join_and_start(players, a, b):
+    players.phase("Lobby")
+    for pad in (a, b):
+        players.press(pad, A)  # joins
+    for pad in (a, b):
+        players.press(pad, A)  # agrees
+    players.phase("Ready")
+    players.press(a, A)
+    players.phase("Running")
+
+
+def _run(application, play):
+    on_short_map(application)
+    players = Players(application, play)
+    players.start()
+    application.run()
+    players.finish()
+    return application.summary()
+
+
+def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
+    a, b = pads
+    spare = []
+
+    def first_day(players):
+        game = players.application.game
+        players.phase("Lobby")
+        players.press(b, A)
+        assert game.players[0].label == "Beta pad", "the first press takes the first seat"
+        players.press(a, A)
+        # Player b (pad a) calibrates: B goes down the menu, A chooses.
+        players.press(a, B)
+        players.press(a, B)
+        players.press(a, A)
+        a.move(0.1, 0.0)  # rests off its centre
+        time.sleep(1.4)
+        for step in range(170):
+            a.move(0.1 + 0.8 * math.cos(step / 12), 0.8 * math.sin(step / 12))
+            time.sleep(0.015)
+        a.move(0.1, 0.0)
+        time.sleep(0.1)
+        players.until(lambda: (tmp_path / "config" / "calibrations.json").exists(), "the calibration on the disk")
+        assert game.players[1].person.force(game.players[1].person.sample()) == (0.0, 0.0)
+        for _ in range(7):
+            players.press(a, B)  # round to the first item
+        # Swapped in the lobby: seats change, not the players' devices.
+        for _ in range(6):
+            players.press(b, B)
+        players.press(b, A)
+        assert [player.player_id for player in game.seats()] == ["P01-b", "P01-a"]
+        for _ in range(3):
+            players.press(b, B)
+        players.press(a, A)
+        players.press(b, A)
+        players.phase("Ready")
+        players.press(a, A)
+        players.phase("Running")
+        players.carry(a, b, steps=20)
+        # In the middle of it somebody pulls the cable.
+        b.unplug()
+        players.phase("Paused")
+        held = game.trial.steps
+        players.press(a, A)  # nobody can go on without a device
+        time.sleep(0.3)
+        assert type(players.application.phase).__name__ == "Paused"
+        assert game.trial.steps == held
+        spare.append(VirtualJoystick("Beta pad", product=2))
+        assert spare[0].instance_id != b.instance_id
+        players.press(spare[0], A)  # joins again
+        assert game.missing() == []
+        players.press(a, A)
+        players.phase("Running")
+        players.carry(a, spare[0])
+        players.result()
+        players.press(a, X)  # redo
+        players.phase("Ready")
+        players.press(a, A)
+        players.phase("Running")
+        players.carry(a, spare[0])
+        players.result()
+        players.press(a, A)  # keep
+        players.phase("Ready")
+        players.press(a, 6)  # to the last item of the menu: quit for now
+        players.press(a, A)
+
+    try:
+        with prepared(settings(tmp_path, consents=("C-17", "C-18"))) as application:
+            summary = _run(application, first_day)
+    finally:
+        for pad in spare:
+            pad.unplug()
+    assert summary["ended_by"] == "quit"
+    assert (summary["kept"], summary["discarded"], summary["outcomes"]) == (1, 1, {"goal": 2})
+    assert summary["complete"] is False
+
+    folder = tmp_path / "recordings" / "P01-01"
+    redone, kept = (read_episode(folder / f"episode_00{number}.mcap") for number in range(2))
+    assert not list(folder.glob("*.part"))
+    for episode in (redone, kept):
+        meta = episode.meta
+        assert (meta.success, meta.termination_reason, meta.source) == (True, "goal", "human")
+        assert (meta.player_0_id, meta.player_1_id) == ("P01-b", "P01-a")
+        assert (meta.controller_0, meta.controller_1) == ("joystick", "joystick")
+        assert meta.consent_id == "C-18,C-17"
+        assert episode.map_config == SHORT_MAP
+    assert (redone.meta.discarded, kept.meta.discarded) == (True, False)
+    assert "paused" in redone.meta.quality_flags.split(",")
+    kinds = [kind for kind, _ in _events(folder / "episode_000.mcap")]
+    middle = ["device_lost", "pause", "resume", "outcome", "verdict"]
+    assert [kind for kind in kinds if kind in middle] == middle
+    records = read_metadata(folder / "episode_000.mcap")
+    assert records["devices"]["seat_0_device"] == "Alpha pad"
+    assert records["episode_result"]["notes"] == "discarded: redo"
+    (calibration,) = json.loads((tmp_path / "config" / "calibrations.json").read_text()).values()
+    assert calibration["centre"] == pytest.approx([0.1, 0.0], abs=1e-3)
+    assert calibration["low"] == pytest.approx([-0.7, -0.8], abs=0.03)
+    assert str(tmp_path) not in (folder / "session.json").read_text() + (folder / "journal.jsonl").read_text()
+
+    # Every step has its own reading of the stick, and what was read is what acted.
+    path = folder / "episode_001.mcap"
+    inputs = _messages(path, "/player/1/input", PlayerInput)
+    timings = _messages(path, "/loop/timing", LoopTiming)
+    assert [one.step for one in inputs] == [one.step for one in timings] == list(range(len(kept.actions)))
+    raw = np.array([one.axes[:2] for one in inputs])
+    size = np.hypot(*raw.T)
+    deflected = size > 0.13
+    assert deflected.sum() > 20
+    expected = raw * np.where(deflected, (size - 0.12) / 0.88 / np.maximum(size, 1e-9), 0.0)[:, None]
+    np.testing.assert_allclose(kept.actions[:, 2:][deflected], np.clip(expected, -1, 1)[deflected], atol=1e-9)
+    assert max(one.age_ns for one in inputs) < DT_NS
+    starts = np.array([one.start_ns for one in timings])
+    assert np.diff(starts).min() > 0
+
+    def second_day(players):
+        game = players.application.game
+        assert game.folder.continued
+        assert game.folder.counts.kept_here.total() == 1
+        _join_and_start(players, *pads)
+        players.carry(*pads)
+        players.result()
+        players.press(pads[0], 5)  # undoes the keep of yesterday
+        players.until(lambda: game.folder.counts.kept_here.total() == 0, "the undo")
+        players.press(pads[0], A)
+        players.phase("Ready")
+        players.until(lambda: game.folder.counts.kept_here.total() == 1, "the keep")
+
+    # SDL forgets its virtual joysticks when the program closes it.
+    pads[:] = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    with prepared(settings(tmp_path)) as application:
+        summary = _run(application, second_day)
+    assert summary["kept_in_session"] == 1
+    names = sorted(path.name for path in folder.glob("episode_*"))
+    assert names == ["episode_000.mcap", "episode_001.mcap.undone", "episode_002.mcap"]
+    lines = [json.loads(line)["event"] for line in (folder / "journal.jsonl").read_text().splitlines()]
+    assert lines[0] == "begin"
+    assert {"continue", "undo", "redo", "keep", "device_lost", "swap"} <= set(lines)
+
+
+def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
+    a, b = pads
+
+    def play(players):
+        game = players.application.game
+        _join_and_start(players, a, b)
+        players.press(a, 7)  # pause
+        players.phase("Paused")
+        players.press(a, 4)  # a note, the second of the list
+        a.hat(0, -1)
+        time.sleep(0.08)
+        a.hat(0, 0)
+        time.sleep(0.08)
+        players.press(a, A)
+        assert game.trial.notes == ["hesitated"]
+        players.press(b, B)
+        players.press(a, 7)
+        players.phase("Running")
+        players.carry(a, b)
+        players.result()
+        players.press(a, 3)
+        players.press(a, A)
+        players.phase("Ready")
+        assert game.folder.counts.kept.total() == 0
+        assert game.folder.counts.tried.total() == 1
+
+    with prepared(settings(tmp_path)) as application:
+        _run(application, play)
+    (path,) = (tmp_path / "recordings").rglob("*.mcap")
+    assert read_episode(path).meta.discarded
+    assert read_metadata(path)["episode_result"]["notes"] == "discarded: was not ready; hesitated"
+
+
+def test_practice_is_recorded_but_never_counts(tmp_path, pads):
+    def play(players):
+        game = players.application.game
+        _join_and_start(players, *pads)
+        assert game.trial.practice
+        players.carry(*pads)
+        players.result()
+        players.press(pads[0], A)
+        players.phase("Ready")
+        assert not game.trial.practice
+
+    with prepared(settings(tmp_path, practice=1)) as application:
+        summary = _run(application, play)
+    (path,) = (tmp_path / "recordings").rglob("*.mcap")
+    meta = read_episode(path).meta
+    assert meta.discarded
+    assert "practice" in meta.quality_flags.split(",")
+    assert summary["kept_in_session"] == 0
+
+
+def test_headless_joysticks_join_by_order_and_rejoin(tmp_path, pads):
+    a, b = pads
+    spare = []
+
+    def play(players):
+        game = players.application.game
+        players.phase("Running")
+        assert [player.label for player in game.players] == ["Alpha pad", "Beta pad"]
+        players.carry(a, b, steps=10)
+        a.unplug()
+        players.phase("Paused")
+        spare.append(VirtualJoystick("Alpha pad", product=1))
+        players.phase("Running")
+        players.carry(b, spare[0])
+        players.until(lambda: game.finished, "the end of the session")
+
+    try:
+        with prepared(settings(tmp_path, headless=True, episodes=1, window=None)) as application:
+            summary = _run(application, play)
+    finally:
+        for pad in spare:
+            pad.unplug()
+    assert summary["complete"] is True
+    assert summary["outcomes"] == {"goal": 1}
+
+
+def test_closing_the_window_keeps_what_was_played(tmp_path, pads):
+    def play(players):
+        _join_and_start(players, *pads)
+        players.carry(*pads, steps=15)
+        pygame.event.post(pygame.event.Event(pygame.QUIT))
+        players.until(lambda: players.application.game.stop, "the end")
+
+    with prepared(settings(tmp_path)) as application:
+        summary = _run(application, play)
+    assert summary["ended_by"] == "window closed"
+    (path,) = (tmp_path / "recordings").rglob("*.mcap")
+    episode = read_episode(path)
+    assert len(episode.actions) >= 15
+    assert episode.meta.termination_reason == "operator_discard"
+    assert episode.meta.discarded
+    assert "interrupted" in episode.meta.quality_flags
