@@ -1,10 +1,11 @@
-"""LeRobot plugin of the table-carrying task: importing it registers the policy and the environment.
+"""LeRobot plugin of the table-carrying task: importing it registers policy, environment and teleoperator.
 
-LeRobot imports this module because the distribution has the same name; networks, torch modules and the simulator
-are imported only when a policy or an environment is built.
+LeRobot imports this module because the distribution has the same name; networks, torch modules, the simulator
+and pygame are imported only when a policy, an environment or a teleoperator is built.
 """
 
 from .copolicy.configuration_copolicy import CopolicyConfig
 from .env.configuration_table_carrying import TableCarryingEnvConfig
+from .teleoperator.config_copolicy_pair import CopolicyPairConfig
 
-__all__ = ["CopolicyConfig", "TableCarryingEnvConfig"]
+__all__ = ["CopolicyConfig", "CopolicyPairConfig", "TableCarryingEnvConfig"]

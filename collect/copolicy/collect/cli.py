@@ -50,6 +50,19 @@ def parser() -> argparse.ArgumentParser:
         "--damaged", action="store_true", help="also recover the intact beginning of damaged finished recordings"
     )
     add_replay_command(commands)
+    command = add_command(
+        commands,
+        "devices",
+        _devices,
+        help="list the joysticks that are plugged in, and test them",
+        example="copolicy-collect devices --test 10",
+    )
+    command.add_argument(
+        "--test", type=float, nargs="?", const=10.0, metavar="SECONDS", help="show live what they say (default 10 s)"
+    )
+    command.add_argument(
+        "--config-dir", type=Path, help="folder of the sticks' calibrations (default: the user's settings)"
+    )
     return parser
 
 
@@ -73,6 +86,13 @@ def _simulate(arguments: argparse.Namespace) -> dict:
 
 def _recover(arguments: argparse.Namespace) -> dict:
     return summary(arguments.folder, recover(arguments.folder, finished=True, damaged=arguments.damaged))
+
+
+def _devices(arguments: argparse.Namespace) -> dict:
+    # Loading pygame takes a moment that `--help` should not.
+    from .devices import devices_command
+
+    return devices_command(arguments.test, arguments.json, arguments.config_dir)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -13,18 +12,39 @@ from .inputs import CalibrationStore, InputSample, Pad, Pads, StickCalibration, 
 from .sdl import pygame
 
 _PICTURES_HZ = 20
+_OF_JOYSTICKS = (
+    pygame.JOYDEVICEADDED,
+    pygame.JOYDEVICEREMOVED,
+    pygame.JOYAXISMOTION,
+    pygame.JOYBALLMOTION,
+    pygame.JOYHATMOTION,
+    pygame.JOYBUTTONDOWN,
+    pygame.JOYBUTTONUP,
+)
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
 def open_pads() -> Pads:
     """All pads that are plugged in; needs neither a window nor a display."""
-    if not pygame.display.get_init():
-        # SDL delivers the events of joysticks through its video system; the dummy one needs no display.
-        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-        pygame.display.init()
+    _init_video()
     pads = Pads()
-    _follow(pads)
+    # Where somebody in this process has taken the events that tell of them, the pads are there all the same.
+    for index in range(pygame.joystick.get_count()):
+        pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
     return pads
+
+
+def follow_pads(pads: Pads) -> list[Pad]:
+    """Reads the sticks, and the events of plugging and unplugging; returns the pads that went.
+
+    Takes all events of joysticks from the queue, so that it never fills up, and leaves those of the window.
+    """
+    gone = []
+    for event in pygame.event.get(_OF_JOYSTICKS):
+        _, left = pads.handle(event)
+        if left is not None:
+            gone.append(left)
+    return gone
 
 
 def list_devices(pads: Pads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
@@ -58,7 +78,6 @@ def watch(
     calibrations: CalibrationStore,
     seconds: float,
     out: TextIO,
-    tick: Callable[[int], None] = lambda _: None,
 ) -> dict[int, dict[str, Any]]:
     """Shows what every pad says, live, and tells at the end what of it moved.
 
@@ -67,7 +86,6 @@ def watch(
         calibrations: turn axes into the force that is shown.
         seconds: how long.
         out: a terminal, drawn over; otherwise only the last picture is written.
-        tick: called before each reading.
 
     Returns:
         By instance id: name, range of each axis, buttons that were pressed, readings, and whether it was unplugged.
@@ -82,10 +100,9 @@ def watch(
         raise RunError("expected at least one pad, found none plugged in")
     found: dict[int, dict[str, Any]] = {}
     height, lines = 0, []
-    end, count = time.monotonic() + seconds, 0
+    end = time.monotonic() + seconds
     while time.monotonic() < end:
-        tick(count)
-        for pad in _follow(pads):
+        for pad in follow_pads(pads):
             found[pad.instance_id]["unplugged"] = True
         lines = []
         for pad in pads:
@@ -97,7 +114,6 @@ def watch(
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
             out.flush()
             height = len(lines)
-        count += 1
         time.sleep(1 / _PICTURES_HZ)
     if not out.isatty():
         out.write("".join(f"{line}\n" for line in lines))
@@ -117,14 +133,15 @@ def devices_command(seconds: float | None, as_json: bool, config_folder: Path | 
     return {"devices": devices, "test": found} if as_json else {}
 
 
-def _follow(pads: Pads) -> list[Pad]:
-    """Reads the events of plugging; returns the pads that went."""
-    gone = []
-    for event in pygame.event.get():
-        _, left = pads.handle(event)
-        if left is not None:
-            gone.append(left)
-    return gone
+def _init_video() -> None:
+    """SDL delivers the events of joysticks through its video system; that opens no window by itself."""
+    if pygame.display.get_init():
+        return
+    try:
+        pygame.display.init()
+    except pygame.error:
+        os.environ["SDL_VIDEODRIVER"] = "dummy"
+        pygame.display.init()
 
 
 def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:

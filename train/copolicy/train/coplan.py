@@ -114,7 +114,7 @@ def coplan(
     actions_per_plan: int = 8,
     fps: int = 10,
     seed: int = 0,
-    on_plan: Callable[[int], None] = lambda finished: None,
+    on_plan: Callable[[int], object] = lambda finished: None,
 ) -> list[Outcome]:
     """Runs every map `repeats` times, all of them through one call of the policy a plan.
 

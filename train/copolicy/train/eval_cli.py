@@ -78,7 +78,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
             actions_per_plan=arguments.actions_per_plan,
             fps=arguments.fps,
             seed=arguments.seed,
-            on_plan=lambda finished: bar.update(finished - bar.n) and None,
+            on_plan=lambda finished: bar.update(finished - bar.n),
         )
     summary = summarise(outcomes, planner)
     result = {

@@ -43,6 +43,10 @@ class CalibrationStore:
         except CopolicyError as error:
             raise FileFormatError(self.path, "calibrations", str(error)) from None
 
+    def __contains__(self, guid: str) -> bool:
+        """The device has been calibrated."""
+        return guid in self._by_guid
+
     def get(self, guid: str) -> StickCalibration:
         """The calibration of a device, or the one that suits most."""
         return self._by_guid.get(guid, StickCalibration())

@@ -1,0 +1,5 @@
+"""A pair of pads as one LeRobot teleoperator, `--teleop.type=copolicy_pair`."""
+
+from .config_copolicy_pair import CopolicyPairConfig
+
+__all__ = ["CopolicyPairConfig"]

@@ -1,0 +1,178 @@
+"""Two pads as one LeRobot teleoperator."""
+
+import logging
+import time
+from pathlib import Path
+from typing import Any
+
+from lerobot.teleoperators.teleoperator import Teleoperator
+from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
+from lerobot.utils.errors import DeviceNotConnectedError
+
+from copolicy.collect.devices import follow_pads, open_pads
+from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, user_config_folder
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.task import ACTION_NAMES, PLAYERS, RECORD_HZ
+
+from .config_copolicy_pair import CopolicyPairConfig
+
+logger = logging.getLogger(__name__)
+
+
+class CopolicyPair(Teleoperator):
+    """Both players' forces, from one pad each.
+
+    Action: `robot_fx, robot_fy, human_fx, human_fy` in [-1, 1], x to the right and y down on the screen, after the
+    pad's calibration and dead zone. It is one teleoperator with prefixed keys, as LeRobot's two-armed ones are,
+    since `lerobot-record` takes one.
+
+    The window's events are left to whoever has a window; those of joysticks are taken. Readings are of the moment
+    of `get_action`.
+    """
+
+    config_class = CopolicyPairConfig
+    name = "copolicy_pair"
+
+    def __init__(self, config: CopolicyPairConfig):
+        """
+        Raises:
+            InvalidValueError: one pad for both seats, or no time to wait.
+        """
+        super().__init__(config)
+        if config.robot_pad == config.human_pad or min(config.robot_pad, config.human_pad) < 0:
+            raise InvalidValueError(
+                "robot_pad, human_pad", "two different pads, from 0", (config.robot_pad, config.human_pad)
+            )
+        if not config.timeout_s > 0:
+            raise InvalidValueError("timeout_s", "a positive number", config.timeout_s)
+        self.config = config
+        self._calibrations = CalibrationStore(config.calibration_dir or user_config_folder())
+        self._pads: Pads | None = None
+        self._seats: list[Pad] = []
+
+    @property
+    def action_features(self) -> dict[str, type]:
+        """The four forces."""
+        return dict.fromkeys(ACTION_NAMES, float)
+
+    @property
+    def feedback_features(self) -> dict[str, type]:
+        """None."""
+        return {}
+
+    @property
+    def is_connected(self) -> bool:
+        """Both seats have a pad, as of the last reading."""
+        return self._pads is not None and all(self._pads.get(pad.instance_id) is not None for pad in self._seats)
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Both pads have been calibrated, here or in the lobby of `copolicy-collect play`."""
+        return bool(self._seats) and all(pad.guid in self._calibrations for pad in self._seats)
+
+    @check_if_already_connected
+    def connect(self, calibrate: bool = True) -> None:
+        """Binds a pad to each seat, and calibrates those that have never been.
+
+        Raises:
+            DeviceNotConnectedError: there are not two pads, or nobody pressed a button in time.
+        """
+        pads = open_pads()
+        follow_pads(pads)
+        if len(pads) < len(PLAYERS):
+            raise DeviceNotConnectedError(f"{self.name}: expected two pads, found {len(pads)} plugged in")
+        if self.config.join:
+            seats = self._join(pads)
+        else:
+            seats = [_by_number(pads, number) for number in (self.config.robot_pad, self.config.human_pad)]
+        self._pads, self._seats = pads, seats
+        for seat, pad in zip(PLAYERS, seats, strict=True):
+            logger.info("%s seat: %s", seat, pad.name)
+        if calibrate and not self.is_calibrated:
+            self.calibrate()
+        self.configure()
+
+    def calibrate(self) -> None:
+        """Centre and range of each pad that has no calibration; one that is not moved keeps the usual values.
+
+        Raises:
+            DeviceNotConnectedError: a pad was unplugged meanwhile.
+        """
+        for seat, pad in zip(PLAYERS, self._seats, strict=True):
+            if pad.guid in self._calibrations:
+                continue
+            run = CalibrationRun(self._calibrations.get(pad.guid))
+            logger.info("%s seat: let go of the stick, then turn it round its edge", seat)
+            end = time.monotonic() + self.config.timeout_s
+            while run.stage != "done" and time.monotonic() < end:
+                self._read()
+                run.add(pad.sample(time.monotonic_ns()).axes)
+                time.sleep(1 / RECORD_HZ)
+            if run.stage == "done":
+                self._calibrations.put(pad.guid, run.result())
+            else:
+                logger.warning("%s seat: not turned round in time, the usual range is assumed", seat)
+
+    def configure(self) -> None:
+        """Nothing to set on a pad."""
+
+    @check_if_not_connected
+    def get_action(self) -> dict[str, float]:
+        """The forces of this moment.
+
+        Raises:
+            DeviceNotConnectedError: a pad was unplugged; `disconnect` and `connect` bind anew.
+        """
+        self._read()
+        forces: list[float] = []
+        for pad in self._seats:
+            forces += self._calibrations.get(pad.guid).force(pad.sample(time.monotonic_ns()).axes)
+        return dict(zip(ACTION_NAMES, forces, strict=True))
+
+    def send_feedback(self, feedback: dict[str, Any]) -> None:
+        """Pads take none."""
+
+    def disconnect(self) -> None:
+        """Lets go of the pads; SDL stays as it is, since a window of this process may use it."""
+        self._pads, self._seats = None, []
+
+    def _load_calibration(self, fpath: Path | None = None) -> None:
+        """LeRobot's file of motors does not apply; `CalibrationStore` reads ours."""
+
+    def _save_calibration(self, fpath: Path | None = None) -> None:
+        """See `_load_calibration`."""
+
+    def _read(self) -> None:
+        assert self._pads is not None
+        for pad in follow_pads(self._pads):
+            for seat, bound in zip(PLAYERS, self._seats, strict=True):
+                if bound.instance_id == pad.instance_id:
+                    # Its axes would read as zero from now on, as if the player had let go.
+                    raise DeviceNotConnectedError(f"{self.name}: the pad of the {seat} seat ({pad.name}) was unplugged")
+
+    def _join(self, pads: Pads) -> list[Pad]:
+        seats: list[Pad] = []
+        for seat in PLAYERS:
+            logger.info("%s seat: press a button", seat)
+            end = time.monotonic() + self.config.timeout_s
+            while True:
+                follow_pads(pads)
+                free = [pad for pad in pads if pad.instance_id not in {bound.instance_id for bound in seats}]
+                pressed = next((pad for pad in free if any(pad.sample(0).buttons)), None)
+                if pressed is not None:
+                    seats.append(pressed)
+                    break
+                if time.monotonic() > end:
+                    raise DeviceNotConnectedError(
+                        f"{self.name}: expected a press of a button for the {seat} seat within "
+                        f"{self.config.timeout_s:g} s, found none"
+                    )
+                time.sleep(1 / RECORD_HZ)
+        return seats
+
+
+def _by_number(pads: Pads, number: int) -> Pad:
+    ordered = sorted(pads, key=lambda pad: pad.instance_id)
+    if number >= len(ordered):
+        raise DeviceNotConnectedError(f"copolicy_pair: expected a pad number {number}, found {len(ordered)} plugged in")
+    return ordered[number]
