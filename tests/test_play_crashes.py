@@ -29,11 +29,12 @@ def _start(out: Path, *flags: str, seconds: float = 2.0, limit: int | None = Non
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
+    before = set(out.rglob("*.part"))
     program = subprocess.Popen(
         _command(out, *flags), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=limited
     )
     end = time.monotonic() + 60
-    while not list(out.rglob("*.part")):
+    while set(out.rglob("*.part")) <= before:
         if time.monotonic() > end or program.poll() is not None:
             program.kill()
             raise AssertionError(f"no recording began: {program.communicate()}")

@@ -16,6 +16,7 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunErr
 from copolicy.dataset.task import MAP_SETS, identify
 
 FIXED = {"maps": "training", "seed": 0}
+_AN_ID = "letters, digits, '.', '_' or '-' (an id, no name of a person)"
 
 
 def _record(folder, pair="P01", seating=0, map_index=0, discarded=False, flags="", reason="goal"):
@@ -188,13 +189,13 @@ def test_a_discarded_configuration_comes_back_after_the_others():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"pair": "Ann & Bob"}, "pair: expected letters, digits, '.', '_' or '-' (an id, no name of a person), found 'Ann & Bob'"),
-        ({"consents": ("", "a b")}, "consent-1: expected letters, digits, '.', '_' or '-' (an id, no name of a person), found 'a b'"),
+        ({"pair": "Ann & Bob"}, f"pair: expected {_AN_ID}, found 'Ann & Bob'"),
+        ({"consents": ("", "a b")}, f"consent-1: expected {_AN_ID}, found 'a b'"),
         ({"episodes": 0}, "episodes: expected at least 1, found 0"),
         ({"maps": "mine"}, "unknown map set 'mine'; available: holdout, paper36, training, unseen"),
         ({"window": (10, 10)}, "window: expected WxH of at least 320x320, found '10x10'"),
     ],
-)  # fmt: skip
+)
 def test_settings_that_cannot_be(changes, message):
     values = {"pair": "P01", "out": Path("x")} | changes
     with pytest.raises(CopolicyError) as error:

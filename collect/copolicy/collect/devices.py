@@ -137,11 +137,9 @@ def _init_video() -> None:
     """SDL delivers the events of joysticks through its video system; that opens no window by itself."""
     if pygame.display.get_init():
         return
-    try:
-        pygame.display.init()
-    except pygame.error:
-        os.environ["SDL_VIDEODRIVER"] = "dummy"
-        pygame.display.init()
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    pygame.display.init()
 
 
 def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:

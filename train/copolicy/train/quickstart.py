@@ -40,8 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
-    parser.add_argument("--episodes", type=int, default=600, help="simulated episodes (default: 600)")
-    parser.add_argument("--steps", type=int, default=2500, help="training steps of 512 samples (default: 2500)")
+    parser.add_argument("--episodes", type=int, default=800, help="simulated episodes (default: 800)")
+    parser.add_argument("--steps", type=int, default=4000, help="training steps of 512 samples (default: 4000)")
     parser.add_argument("--limit", type=int, help="evaluate on the first N maps of each set only")
     parser.add_argument("--seed", type=int, default=0, help="default: 0")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="default: one a core")
@@ -91,6 +91,9 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
                     *("copolicy-collect", "simulate", "--episodes", str(arguments.episodes)),
                     *("--seed", str(arguments.seed), "--maps", "training", "--out", recordings),
                     *("--workers", str(arguments.workers)),
+                    # Demonstrators who keep wide and start from around the start: easier to learn from in minutes
+                    # than people, who pass nearer.
+                    *("--clearance", "2.6", "--start-noise", "1"),
                 ),
             ),
             Step(
