@@ -140,7 +140,7 @@ def test_a_full_disk_leaves_finished_episodes_alone(mounted):
     filler.unlink()
     results = recover(disk)
     assert [result.status for result in results] == ["recovered"]
-    assert read_episode(results[0].output).meta.termination_reason == "crash_recovered"
+    assert read_episode(str(results[0].output)).meta.termination_reason == "crash_recovered"
 
 
 def test_a_read_only_folder_is_named_before_anything_begins(mounted):

@@ -105,7 +105,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         spare.append(VirtualJoystick("Beta pad", product=2))
         assert spare[0].instance_id != b.instance_id
         players.press(spare[0], A)  # joins again
-        assert game.missing() == []
+        assert game.roster.missing() == []
         players.press(a, A)
         players.phase("Running")
         players.carry(a, spare[0])

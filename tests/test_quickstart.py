@@ -50,7 +50,7 @@ def test_the_chain_from_simulated_pairs(tmp_path):
     assert "[1/6]" in said
     assert "$ copolicy-collect simulate --episodes 4" in said
     for command in summary["what to type next"].values():
-        assert command.split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
+        assert command.removeprefix("uv run ").split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
 
 
 @pytest.mark.parametrize("form", ["raw", "table_10Hz.zarr"])

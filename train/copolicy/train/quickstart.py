@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
     parser.add_argument("--episodes", type=int, default=800, help="simulated episodes (default: 800)")
-    parser.add_argument("--steps", type=int, default=4000, help="training steps of 512 samples (default: 4000)")
+    parser.add_argument("--steps", type=int, default=6000, help="training steps of 512 samples (default: 6000)")
     parser.add_argument("--limit", type=int, help="evaluate on the first N maps of each set only")
     parser.add_argument("--seed", type=int, default=0, help="default: 0")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="default: one a core")
@@ -159,21 +159,23 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
         "results": f"{out / 'eval' / 'holdout.json'}, {out / 'eval' / 'unseen.json'}",
         "pictures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
     }
+    # As the user typed this command: through uv, or from an environment that is on the path.
+    prefix = "uv run " if "UV_RUN_RECURSION_DEPTH" in os.environ else ""
     return {
         "what was reached": {
-            "label": f"trained on {source} for {arguments.steps} short steps, co-planning in simulation: "
-            "no person took part",
+            "label": f"trained on {source}, shortly ({arguments.steps} steps of 512 samples); co-planning in "
+            "simulation: no person took part",
             **reached,
             "minutes": round(seconds / 60, 1),
         },
         "where it is": where,
         "what to type next": {
-            "a longer training": f"copolicy-train --policy.type=copolicy --policy.preset=small --policy.device=cpu "
+            "a longer training": f"{prefix}copolicy-train --policy.type=copolicy --policy.preset=small --policy.device=cpu "
             f"--dataset.repo_id={REPO_ID} --dataset.root={out / 'dataset'} --output_dir={out / 'longer'} "
-            f"--batch_size=512 --steps={4 * arguments.steps}",
-            "other maps": f"copolicy-eval coplan --policy {training} --maps unseen --orientations "
+            f"--batch_size=512 --steps={3 * arguments.steps}",
+            "other maps": f"{prefix}copolicy-eval coplan --policy {training} --maps unseen --orientations "
             f"--out {out / 'eval' / 'orientations.json'}",
-            "LeRobot's own evaluation": f"lerobot-eval --policy.path={training} --policy.device=cpu "
+            "LeRobot's own evaluation": f"{prefix}lerobot-eval --policy.path={training} --policy.device=cpu "
             f"--env.type=table_carrying --eval.n_episodes=4 --eval.batch_size=2 --output_dir={out / 'lerobot-eval'}",
         },
     }

@@ -47,6 +47,8 @@ class Pads:
     def __init__(self):
         pygame.joystick.init()
         self._pads: dict[int, Pad] = {}
+        for index in range(pygame.joystick.get_count()):
+            self._open(index)
 
     def handle(self, event: pygame.event.Event) -> tuple[Pad | None, Pad | None]:
         """Follows plugging and unplugging.
@@ -55,17 +57,20 @@ class Pads:
             The pad that came, the pad that went; None where none did.
         """
         if event.type == pygame.JOYDEVICEADDED:
-            try:
-                pad = Pad(pygame.joystick.Joystick(event.device_index))
-            except pygame.error:
-                return None, None  # gone again before the event was read
-            if pad.instance_id in self._pads:
-                return None, None  # SDL may tell twice
-            self._pads[pad.instance_id] = pad
-            return pad, None
+            return self._open(event.device_index), None
         if event.type == pygame.JOYDEVICEREMOVED:
             return None, self._pads.pop(event.instance_id, None)
         return None, None
+
+    def _open(self, device_index: int) -> Pad | None:
+        try:
+            pad = Pad(pygame.joystick.Joystick(device_index))
+        except pygame.error:
+            return None  # gone again before the event was read
+        if pad.instance_id in self._pads:
+            return None  # SDL tells of what was there at the start, and may tell twice
+        self._pads[pad.instance_id] = pad
+        return pad
 
     def get(self, instance_id: int) -> Pad | None:
         """The pad with a number, if it is plugged in."""

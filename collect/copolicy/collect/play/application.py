@@ -72,11 +72,19 @@ class Application:
                     self._draw()
                 else:
                     self._sleep(remaining)
-            game.break_off(game.stop or "quit")
+            self._break_off()
         except BaseException as error:
             if game.trial is not None:
                 game.trial.abandon(error)
             raise
+
+    def _break_off(self) -> None:
+        game = self.game
+        try:
+            game.break_off(game.stop or "quit")
+        except OSError as error:
+            game.lose_trial(error)
+            raise game.no_room() from None
 
     def summary(self) -> dict:
         """What the command prints."""
@@ -115,11 +123,11 @@ class Application:
         if event.type == pygame.WINDOWFOCUSLOST and self._window:
             phase.focus_lost()
             return
-        added, removed = game.pads.handle(event)
+        added, removed = game.roster.pads.handle(event)
         if added and game.settings.headless:
-            game.give(added)
+            game.roster.give(added)
         if removed:
-            player = game.take_away(removed)
+            player = game.roster.take_away(removed)
             if player:
                 phase.device_lost(player)
         if phase.entry is not None:
@@ -144,7 +152,7 @@ class Application:
             return
         if press.command == Command.HELP:
             self._help = True
-        if not isinstance(phase, Lobby) and not isinstance(phase, Running) and game.join(press):
+        if not isinstance(phase, Lobby) and not isinstance(phase, Running) and game.roster.join(press):
             return  # a press that gives a lost seat a device chooses nothing
         phase.handle(press)
 

@@ -1,7 +1,5 @@
 """When the disk says no: what happened, what is left, and how to go on."""
 
-from copolicy.dataset.exceptions import RunError
-
 from ..inputs import Command, Press
 from ..screen import SIZE, Canvas
 from ..screen.dialogs import Line, draw_dialog
@@ -29,10 +27,7 @@ class Failure(Phase):
         """
         self.game.sounds.play("alarm")
         if self.game.settings.headless:
-            raise RunError(
-                f"{self.game.folder.path}: expected room for a recording, found: {self._problem}; "
-                "finished episodes are complete, what there is of this one stays as .part"
-            )
+            raise self.game.no_room()
 
     def handle(self, press: Press) -> None:
         """Moves in the menu."""

@@ -8,16 +8,16 @@ from importlib.metadata import version
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import RECORD_HZ, MapConfig, identify
 
-from ..controllers import Controller
-from ..inputs import CalibrationStore, KeyboardHalf, Pad, Pads, Press, StickCalibration
 from ..screen import TableView
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
 from ..ticker import Ticker
 from ..wall_clock import WallClockAnchor
-from .player import Player, keyboard_half, replayed_map
+from .player import Player, replayed_map
+from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
 from .trial import Trial
@@ -29,6 +29,7 @@ class Game:
     """The state of a session that outlives its phases.
 
     Attributes:
+        roster: the players and what they hold.
         swapped: the players changed the seats that the schedule gave them.
         trial: the episode that is played or about to be.
         stop: why the session is to end; empty while it goes on.
@@ -41,18 +42,15 @@ class Game:
     def __init__(
         self,
         settings: PlaySettings,
-        players: tuple[Player, Player],
+        roster: Roster,
         folder: SessionFolder,
-        pads: Pads,
-        store: CalibrationStore,
         sounds: Sounds,
         clock: Callable[[], int] = time.monotonic_ns,
     ):
         self.settings = settings
-        self.players = players
+        self.roster = roster
+        self.players = players = roster.players
         self.folder = folder
-        self.pads = pads
-        self.store = store
         self.sounds = sounds
         self.clock = clock
         self.ticker = Ticker(clock)
@@ -70,6 +68,7 @@ class Game:
         self.problem = ""
         self.results: list[tuple[str, str]] = []
         self._again: tuple[MapConfig, int] | None = None
+        self._last_seating: int | None = None
         self._toast = ("", 0)
         self._view: TableView | None = None
 
@@ -90,8 +89,11 @@ class Game:
             seating = self.balance.seating(self.folder.counts)
         else:
             config, seating = self.balance.next(self.folder.counts)
-        self.trial = self._make_trial(config, seating, practice)
-        return self.trial
+        self.trial = trial = self._make_trial(config, seating, practice)
+        if self._last_seating not in (None, trial.seating):
+            self.say("You have changed seats: look at your colours")
+        self._last_seating = trial.seating
+        return trial
 
     def reseat(self) -> None:
         """Swaps the seats of the players, for the episode that is about to begin and the rest of the block."""
@@ -176,8 +178,19 @@ class Game:
 
     def undo(self) -> None:
         """Takes the last keep back and says so."""
-        undone = self.folder.undo_last_keep()
+        try:
+            undone = self.folder.undo_last_keep()
+        except OSError as error:
+            self.say(f"not undone: {error.strerror}")
+            return
         self.say(f"undone: {undone.path.name}; its map comes again" if undone else "nothing to undo")
+
+    def no_room(self) -> RunError:
+        """What to tell where nobody can be asked what to do."""
+        return RunError(
+            f"{self.folder.path}: expected room for a recording, found: {self.problem}; "
+            "finished episodes are complete, what there is of this one stays as .part"
+        )
 
     def _closed(self, trial: Trial, verdict: str, reason: str) -> None:
         self.trial = None
@@ -191,64 +204,12 @@ class Game:
             practice=trial.practice,
         )  # fmt: skip
 
-    # The players and what they hold.
+    # The seats.
 
     def seats(self, trial: Trial | None = None) -> tuple[Player, Player]:
         """Who sits on the robot's and on the human's seat."""
         seating = trial.seating if trial else self.balance.seating(self.folder.counts) ^ self.swapped
         return self.players[seating], self.players[1 - seating]
-
-    def player_of(self, press: Press) -> Player | None:
-        """Whose device a press came from."""
-        return next((one for one in self.players if one.device_id == press.device), None)
-
-    def missing(self) -> list[Player]:
-        """People without a device."""
-        return [player for player in self.players if player.missing]
-
-    def join(self, press: Press) -> Player | None:
-        """Gives the device behind a press to the first person who waits for one of its kind.
-
-        Returns:
-            Who that is; None where the device is taken or nobody waits for it.
-        """
-        if press.moved or self.player_of(press):
-            return None
-        device = self.pads.get(press.device) if isinstance(press.device, int) else keyboard_half(press.device)
-        return self.give(device) if device else None
-
-    def give(self, device: Pad | KeyboardHalf) -> Player | None:
-        """Gives a device to the first person who waits for one of its kind."""
-        for player in self.players:
-            if player.person and player.wants(device):
-                player.person.device = device
-                if isinstance(device, Pad):
-                    player.person.calibration = self.store.get(device.guid)
-                self.folder.journal("join", player=player.player_id, device=player.label)
-                return player
-        return None
-
-    def take_away(self, pad: Pad) -> Player | None:
-        """A joystick is gone; returns whose it was."""
-        for player in self.players:
-            if player.person and player.device is pad:
-                player.person.device = None
-                self.folder.journal("device_lost", player=player.player_id, device=pad.name)
-                return player
-        return None
-
-    def calibrate(self, player: Player, calibration: StickCalibration) -> None:
-        """Sets and keeps the calibration of a player's joystick, and of all others of its kind."""
-        device = player.device
-        if not isinstance(device, Pad):
-            return
-        for one in self.players:
-            if one.person and isinstance(one.device, Pad) and one.device.guid == device.guid:
-                one.person.calibration = calibration
-        try:
-            self.store.put(device.guid, calibration)
-        except OSError as error:
-            self.say(f"calibration not saved: {error.strerror}")
 
     def describe_devices(self, trial: Trial) -> dict[str, str]:
         """For the recording's record `devices`."""
@@ -298,7 +259,3 @@ class Game:
             late=trial.loop.late + trial.loop.skipped,
             practice=trial.practice,
         )
-
-    def controllers(self) -> list[Controller]:
-        """Of both players."""
-        return [player.controller for player in self.players]

@@ -42,9 +42,9 @@ class Lobby(Phase):
         if press.command == Command.SWAP:
             self._swap()
             return
-        player = game.player_of(press)
+        player = game.roster.player_of(press)
         if player is None:
-            joined = game.join(press)
+            joined = game.roster.join(press)
             if joined:
                 game.sounds.play("go")
                 joined.ready = False
@@ -85,7 +85,7 @@ class Lobby(Phase):
                 run.add(player.person.sample().axes)
                 if run.stage == "done":
                     del self._runs[player.index]
-                    game.calibrate(player, run.result())
+                    self._calibrate(player, run.result())
                     game.sounds.play("goal")
         if self.entry is None and all(player.ready and not player.missing for player in game.players):
             self._ready_ticks += 1
@@ -204,7 +204,13 @@ class Lobby(Phase):
                 changed = replace(calibration, invert=(not x, y))
             case _:
                 changed = replace(calibration, invert=(x, not y))
-        self.game.calibrate(player, changed)
+        self._calibrate(player, changed)
+
+    def _calibrate(self, player: Player, calibration: StickCalibration) -> None:
+        try:
+            self.game.roster.calibrate(player, calibration)
+        except OSError as error:
+            self.game.say(f"calibration not saved: {error.strerror}")
 
     def _swap(self) -> None:
         self.game.reseat()

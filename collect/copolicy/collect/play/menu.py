@@ -69,7 +69,7 @@ class TextEntry:
 
 def note_menu() -> Menu:
     """Notes that need no keyboard, and one that does."""
-    return Menu("Note", [*((note, f"note:{note}") for note in NOTES), ("write it on the keyboard", "write")])
+    return Menu("Note (no names)", [*((note, f"note:{note}") for note in NOTES), ("write it on the keyboard", "write")])
 
 
 def reason_menu() -> Menu:

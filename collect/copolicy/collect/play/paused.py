@@ -24,6 +24,7 @@ class Paused(Phase):
         super().__init__(game)
         self._reason = reason = game.pause_reason
         self._choice = ""
+        self._events: list[tuple[str, str]] = []
         self._top = Menu(
             _WHY[reason],
             [
@@ -46,7 +47,7 @@ class Paused(Phase):
         """Moves in the menu, or goes on."""
         shortcuts = {Command.NOTE: "note", Command.REDO: "redo", Command.DISCARD: "discard", Command.PAUSE: "resume"}
         choice = shortcuts.get(press.command)
-        if press.moved and self._reason == "device_lost" and self.game.missing():
+        if press.moved and self._reason == "device_lost" and self.game.roster.missing():
             return
         if choice is None or choice not in [value for _, value in self._menus[-1].items]:
             choice = self._menus[-1].handle(press)
@@ -54,14 +55,14 @@ class Paused(Phase):
 
     def device_lost(self, player: Player) -> None:
         """One more reason to wait."""
-        self.trial.event("device_lost", player.player_id)
+        self._events.append(("device_lost", player.player_id))
         self._reason = "device_lost"
         self._top.title = _WHY[self._reason]
 
     def tick(self, tick: Tick) -> To:
         """Follows the players' choice."""
         game = self.game
-        if game.settings.headless and not game.missing():
+        if game.settings.headless and not game.roster.missing():
             self._choice = "resume"
         if self.entry and (self.entry.done or self.entry.left):
             if self.entry.done and self.entry.text.strip():
@@ -69,6 +70,8 @@ class Paused(Phase):
             self.entry = None
         choice, self._choice = self._choice, ""
         try:
+            while self._events:
+                self.trial.event(*self._events.pop(0))
             return self._follow(choice) if choice else To.STAY
         except OSError as error:
             game.lose_trial(error)
@@ -78,8 +81,8 @@ class Paused(Phase):
         game = self.game
         kind, _, detail = choice.partition(":")
         match kind:
-            case "resume" if game.missing():
-                game.say(f"{game.missing()[0].player_id}: press any button to join")
+            case "resume" if game.roster.missing():
+                game.say(f"{game.roster.missing()[0].player_id}: press any button to join")
             case "resume":
                 return To.COUNTDOWN
             case "note" if not detail:
@@ -87,7 +90,7 @@ class Paused(Phase):
             case "note":
                 self._note(detail)
             case "write":
-                self.entry = TextEntry("Note")
+                self.entry = TextEntry("Note (no names)")
                 self._menus = [self._top]
             case "discard" if not detail:
                 self._menus.append(reason_menu())
@@ -110,11 +113,11 @@ class Paused(Phase):
             return
         menu = self._menus[-1]
         lines = []
-        for player in self.game.missing():
+        for player in self.game.roster.missing():
             lines.append(Line(f"{player.player_id}: plug it in and press any button to join", 28, YELLOW))
         if self.trial.notes:
             lines.append(Line(f"notes: {'; '.join(self.trial.notes)}", 24, MUTED))
-        colour = VERMILION if self._reason == "device_lost" and self.game.missing() else YELLOW
+        colour = VERMILION if self._reason == "device_lost" and self.game.roster.missing() else YELLOW
         draw_dialog(canvas, menu.title, lines, menu.labels, menu.cursor, colour)
 
     def _note(self, text: str) -> None:

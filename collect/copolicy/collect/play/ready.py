@@ -48,10 +48,10 @@ class Ready(Phase):
         if game.settings.headless:
             choice = "start"
         match choice:
-            case "start" if not game.missing():
+            case "start" if not game.roster.missing():
                 return To.COUNTDOWN
             case "start":
-                game.say(f"{game.missing()[0].player_id} has no device")
+                game.say(f"{game.roster.missing()[0].player_id} has no device")
             case "swap":
                 game.reseat()
             case "undo":
@@ -80,7 +80,7 @@ class Ready(Phase):
         ]
         if trial.practice:
             lines.append(Line("practice: it does not count", 26, YELLOW))
-        missing = game.missing()
+        missing = game.roster.missing()
         if missing:
             lines.append(Line(f"{missing[0].player_id}: press any button to join", 28, YELLOW))
         else:

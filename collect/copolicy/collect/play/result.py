@@ -91,7 +91,7 @@ class Result(Phase):
                 self._note(detail)
                 return To.STAY
             case "write":
-                self.entry = TextEntry("Note")
+                self.entry = TextEntry("Note (no names)")
                 self._menus = [self._top]
                 return To.STAY
             case "undo":

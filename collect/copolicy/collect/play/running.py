@@ -18,6 +18,7 @@ class Running(Phase):
     def __init__(self, game: Game):
         super().__init__(game)
         self._pause = ""
+        self._events: list[tuple[str, str]] = []
         self._failed: OSError | None = None
 
     def enter(self) -> None:
@@ -41,12 +42,12 @@ class Running(Phase):
 
     def device_lost(self, player: Player) -> None:
         """Pauses: a device that is gone reads as zero force, which nobody meant."""
-        self.trial.event("device_lost", player.player_id)
+        self._events.append(("device_lost", player.player_id))
         self._pause = "device_lost"
 
     def focus_lost(self) -> None:
         """Pauses: keys go to another window."""
-        self.trial.event("focus_lost")
+        self._events.append(("focus_lost", ""))
         self._pause = self._pause or "focus_lost"
 
     def tick(self, tick: Tick) -> To:
@@ -57,6 +58,8 @@ class Running(Phase):
                 raise self._failed
             if self._pause:
                 gc.enable()
+                for event in self._events:
+                    trial.event(*event)
                 trial.pause(self._pause)
                 game.pause_reason = self._pause
                 return To.PAUSED

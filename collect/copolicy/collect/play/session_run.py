@@ -18,6 +18,7 @@ from .application import Application
 from .game import Game
 from .phase import To
 from .player import default_pilots, make_players
+from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
 from .window import Window, open_without_window
@@ -56,8 +57,6 @@ def prepared(settings: PlaySettings) -> Iterator[Application]:
             window = Window(settings.window, settings.fullscreen)
         stack.callback(_close_pygame)
         pads = Pads()
-        for event in pygame.event.get((pygame.JOYDEVICEADDED, pygame.JOYDEVICEREMOVED)):
-            pads.handle(event)
         players = make_players(settings.pair, settings.pilots or default_pilots(len(pads)), settings.consents)
         for player in players:
             stack.callback(player.controller.close)
@@ -65,7 +64,7 @@ def prepared(settings: PlaySettings) -> Iterator[Application]:
         folder = SessionFolder(settings.out, settings.pair, fixed, settings.episodes, settings.new_session)
         sounds = Sounds(settings.mute or settings.headless)
         stack.callback(sounds.close)
-        game = Game(settings, players, folder, pads, store, sounds)
+        game = Game(settings, Roster(players, pads, store, folder.journal), folder, sounds)
         if recovered:
             game.say(f"{len(recovered)} recording(s) of a broken-off run recovered")
         if settings.headless:
@@ -92,13 +91,13 @@ def _lock(settings: PlaySettings) -> CollectionLock:
 
 def _join_by_order(game: Game) -> None:
     """Without a lobby, devices are given out in the order in which they are there."""
-    for device in (*game.pads, *HALVES.values()):
-        game.give(device)
-    missing = game.missing()
+    for device in (*game.roster.pads, *HALVES.values()):
+        game.roster.give(device)
+    missing = game.roster.missing()
     if any(player.spec.kind == "keyboard" for player in game.players):
         raise RunError("pilots: expected no keyboard with --headless, found one: keys need a window")
     if missing:
-        raise RunError(f"{missing[0].player_id}: expected a joystick, found {len(game.pads)} for both players")
+        raise RunError(f"{missing[0].player_id}: expected a joystick, found {len(game.roster.pads)} for both players")
 
 
 @contextmanager

@@ -52,7 +52,7 @@ def verify(
             raise InvalidValueError(name, "a positive number", limit)
     names = [angular_limit] if angular_limit else list(ANGULAR_LIMITS)
     runs = {name: _simulate(track, ANGULAR_LIMITS[name]) for name in names}
-    chosen = min(runs, key=lambda name: float(runs[name][0].max()))
+    chosen = min(runs, key=lambda name: max(runs[name][0].max() / limit_px, runs[name][1].max() / limit_rad))
     px, rad, outcome, ended = runs[chosen]
     beyond = np.flatnonzero((px > limit_px) | (rad > limit_rad))
     recorded = track.episode.meta.termination_reason

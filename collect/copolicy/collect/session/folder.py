@@ -1,6 +1,7 @@
 """The folder of a session: one tool at a time, one session after the other, nothing ever overwritten."""
 
 import json
+import logging
 import os
 import re
 import uuid
@@ -127,10 +128,13 @@ class SessionFolder:
         return last
 
     def journal(self, event: str, **entries: Any) -> None:
-        """Adds a line to the journal."""
+        """Adds a line to the journal; one that cannot be written stops nothing, since recordings are what counts."""
         line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": event, **entries}
-        with (self.path / _JOURNAL).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
+        try:
+            with (self.path / _JOURNAL).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line) + "\n")
+        except OSError as error:
+            logging.warning("%s: not written: %s", self.path / _JOURNAL, error.strerror)
 
     @staticmethod
     def _last_number(out: Path, pair: str) -> int:

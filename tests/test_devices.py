@@ -1,0 +1,143 @@
+"""`copolicy-collect devices`: which pads there are, and what they say."""
+
+import io
+import json
+import threading
+import time
+
+import pytest
+from virtual_joystick import VirtualJoystick
+
+from copolicy.collect.cli import main
+from copolicy.collect.devices import follow_pads, list_devices, open_pads, table, watch
+from copolicy.collect.inputs import CalibrationStore, StickCalibration
+from copolicy.collect.sdl import pygame
+from copolicy.dataset.exceptions import InvalidValueError, RunError
+
+
+@pytest.fixture(autouse=True)
+def _own_joysticks():
+    """SDL's joysticks from nothing, and nothing left of them."""
+    pygame.joystick.quit()
+    pygame.display.quit()
+    pygame.display.init()
+    pygame.joystick.init()
+    yield
+    pygame.joystick.quit()
+    pygame.display.quit()
+
+
+@pytest.fixture
+def sticks():
+    plugged = [VirtualJoystick("Left pad", product=1), VirtualJoystick("Right pad", product=2, axes=2, buttons=4)]
+    yield plugged
+    for stick in plugged:
+        stick.unplug()
+
+
+def test_every_pad_is_listed_with_what_it_is(tmp_path, sticks):
+    calibrations = CalibrationStore(tmp_path)
+    left, right = list_devices(open_pads(), calibrations)
+    assert left | {"guid": ""} == {
+        "instance": sticks[0].instance_id, "name": "Left pad", "guid": "", "axes": 4, "buttons": 10, "hats": 1,
+        "calibrated": False,
+    }  # fmt: skip
+    assert (right["name"], right["axes"], right["buttons"]) == ("Right pad", 2, 4)
+    assert left["guid"] != right["guid"]
+    assert len(left["guid"]) == 32
+    calibrations.put(right["guid"], StickCalibration())
+    assert [one["calibrated"] for one in list_devices(open_pads(), calibrations)] == [False, True]
+
+
+def test_pads_are_found_where_the_events_that_told_of_them_are_gone(sticks):
+    pygame.event.get()
+    assert len(open_pads()) == 2
+
+
+def test_events_of_a_window_are_left_to_it(sticks):
+    pads = open_pads()
+    key = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a)
+    pygame.event.post(key)
+    sticks[0].move(1.0, 0.0)
+    sticks[1].unplug()
+    assert [pad.name for pad in follow_pads(pads)] == ["Right pad"]
+    kinds = [event.type for event in pygame.event.get()]
+    assert pygame.KEYDOWN in kinds
+    assert not {pygame.JOYAXISMOTION, pygame.JOYDEVICEREMOVED} & set(kinds)
+
+
+def test_the_table_aligns(sticks, tmp_path):
+    lines = table(list_devices(open_pads(), CalibrationStore(tmp_path)))
+    assert lines[0].split() == ["instance", "name", "guid", "axes", "buttons", "hats", "calibrated"]
+    assert len({line.index(word) for line, word in zip(lines, ("guid", "ff", "ff"), strict=True)}) == 1
+    assert [line.split()[-1] for line in lines[1:]] == ["no", "no"]
+    assert table([]) == ["no pad is plugged in"]
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def move_while_watched(sticks):
+    """A player's hands: deflect, press, unplug."""
+    while not sticks[0].is_open:
+        time.sleep(0.01)
+    sticks[0].move(-1.0, 0.5)
+    sticks[0].button(3, True)
+    time.sleep(0.3)
+    sticks[0].move(0.0, 0.0)
+    sticks[0].button(3, False)
+    sticks[1].unplug()
+
+
+@pytest.mark.parametrize("kind", [Terminal, io.StringIO])
+def test_the_test_shows_and_remembers_what_moved(tmp_path, sticks, kind):
+    out = kind()
+    player = threading.Thread(target=move_while_watched, args=(sticks,))
+    pads = open_pads()
+    player.start()
+    found = watch(pads, CalibrationStore(tmp_path), 0.8, out)
+    player.join()
+    left, right = found[sticks[0].instance_id], found[sticks[1].instance_id]
+    assert left["axes"][:2] == [[-1.0, 0.0], [0.0, 0.5]]
+    assert (left["buttons"], left["unplugged"]) == ([3], False)
+    assert (right["buttons"], right["unplugged"]) == ([], True)
+    assert 0 < right["readings"] < left["readings"]
+    text = out.getvalue()
+    if kind is Terminal:
+        assert "force -1.00 +0.51" in text
+        assert "[###########          ] -1.00" in text
+        assert "buttons  3" in text
+        assert "\x1b[" in text
+    else:
+        assert "\x1b[" not in text
+        assert text.count("Left pad") == 1
+
+
+def test_nothing_to_watch(tmp_path, sticks):
+    calibrations = CalibrationStore(tmp_path)
+    with pytest.raises(InvalidValueError, match="seconds: expected a positive number, found 0"):
+        watch(open_pads(), calibrations, 0, io.StringIO())
+    for stick in sticks:
+        stick.unplug()
+    with pytest.raises(RunError, match="expected at least one pad, found none plugged in"):
+        watch(open_pads(), calibrations, 1.0, io.StringIO())
+
+
+def test_the_command(tmp_path, sticks, capsys):
+    assert main(["devices", "--config-dir", str(tmp_path)]) == 0
+    assert "Right pad" in capsys.readouterr().out.splitlines()[2]
+    assert main(["devices", "--json", "--test", "0.2", "--config-dir", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    told = json.loads(captured.out)
+    assert [one["name"] for one in told["devices"]] == ["Left pad", "Right pad"]
+    assert told["test"][str(sticks[0].instance_id)]["axes"] == [[0.0, 0.0]] * 4
+    assert "axis 0" in captured.err
+
+
+def test_no_pads_are_no_error_in_a_list(tmp_path, capsys):
+    assert main(["devices", "--config-dir", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == "no pad is plugged in\n"
+    assert main(["devices", "--test", "1", "--config-dir", str(tmp_path)]) == 1
+    assert capsys.readouterr().err == "copolicy-collect: expected at least one pad, found none plugged in\n"

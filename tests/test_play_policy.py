@@ -1,0 +1,217 @@
+"""A policy at the stick: its plans are taken up on its own grid of frames, and a slow one never holds the loop."""
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.policies.factory import make_pre_post_processors
+from mcap.reader import make_reader
+
+from copolicy.collect.cli import main
+from copolicy.collect.controllers.checkpoint import Checkpoint
+from copolicy.collect.controllers.policy import PolicyController
+from copolicy.collect.world import TableWorld
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
+from copolicy.dataset.task import MAP_SETS, MapConfig
+from copolicy.train.planner import Planner
+from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
+from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
+
+MAP = MAP_SETS["training"][0]
+KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_ACTION: FeatureType.STATE}
+
+
+class Counter:
+    """A planner whose every action tells which plan it is from and which of its actions it is."""
+
+    name = "policy:counter"
+    frames = 2
+    actions_per_plan = 3
+
+    def __init__(self):
+        self.histories: list[dict[str, np.ndarray]] = []
+        self.seeds: list[int] = []
+        self.gate = threading.Event()
+        self.gate.set()
+
+    def seed(self, seed: int) -> None:
+        self.seeds.append(seed)
+
+    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        self.gate.wait(10)
+        self.histories.append(history)
+        plan = np.zeros((6, 4))
+        plan[:, 0] = 0.1 * len(self.histories)
+        plan[:, 1] = 0.1 * np.arange(6)
+        plan[:, 2:] = -plan[:, :2]
+        return plan
+
+
+@pytest.fixture
+def counter():
+    return Counter()
+
+
+@pytest.fixture
+def controller(counter):
+    one = PolicyController(counter)
+    one.begin(0, MAP, 5)
+    yield one
+    counter.gate.set()
+    one.close()
+
+
+def _run(controller, world, steps, human=(0.0, 0.0), wait=True):
+    """The forces of some steps; the human's force grows by 0.01 a step."""
+    forces = []
+    for _ in range(steps):
+        if wait:
+            controller.wait(10)
+        reading = controller.read(world.observation)
+        shift = 0.01 * world.step_count
+        action = np.array([*reading.force, human[0] + shift, human[1]])
+        world.step(action)
+        controller.executed(action)
+        forces.append(reading.force)
+    return np.array(forces)
+
+
+def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(controller, counter):
+    forces = _run(controller, TableWorld(MAP), 24)
+    # Plan 1 from frame 0; the next is asked for at frame 2, and taken up at frame 3, at its second action.
+    first = [[0.1, 0.0], [0.1, 0.1], [0.1, 0.2]]
+    second, third = [[0.2, 0.1], [0.2, 0.2]], [[0.3, 0.1], [0.3, 0.2]]
+    np.testing.assert_allclose(forces[::3][:7], [*first, *second, *third])
+    np.testing.assert_array_equal(forces[::3].repeat(3, axis=0), forces)
+    assert counter.seeds == [5]
+
+
+def test_the_other_seat_gets_the_other_half(counter):
+    controller = PolicyController(counter)
+    controller.begin(1, MAP, 0)
+    forces = _run(controller, TableWorld(MAP), 3)
+    controller.close()
+    np.testing.assert_allclose(forces, [[-0.1, 0.0]] * 3)
+
+
+def test_the_history_is_on_the_grid_of_the_data_set(controller, counter):
+    world = TableWorld(MAP)
+    rest = world.observation
+    _run(controller, world, 6)
+    seen = world.observation
+    _run(controller, world, 3)
+    controller.wait(10)
+    before, at_frame_two = counter.histories[:2]
+    np.testing.assert_array_equal(before[STATE], [rest, rest])
+    np.testing.assert_array_equal(before[HUMAN_ACTION], np.zeros((2, 2)))
+    np.testing.assert_array_equal(at_frame_two[STATE][1], seen)
+    # The human's action of a frame is the mean of its three steps, and it is that of the frame before.
+    np.testing.assert_allclose(at_frame_two[HUMAN_ACTION][:, 0], [0.01, 0.04])
+
+
+def test_a_slow_plan_lets_go_and_is_taken_up_where_it_is_due(controller, counter):
+    world = TableWorld(MAP)
+    _run(controller, world, 6)
+    counter.gate.clear()
+    started = time.monotonic()
+    forces = _run(controller, world, 18, wait=False)  # frames 2 to 7 while the plan for frame 2 is being made
+    assert time.monotonic() - started < 0.5, "the loop waited for a plan"
+    np.testing.assert_allclose(forces[::3], [[0.1, 0.2], [0.1, 0.3], [0.1, 0.4], [0.1, 0.5], [0, 0], [0, 0]])
+    counter.gate.set()
+    controller.wait(10)
+    # Frame 8 is the seventh action of the plan for frame 2, which has six: it lets go, and asks again.
+    assert _run(controller, world, 1).tolist() == [[0.0, 0.0]]
+    assert len(controller.latencies) == 2
+    assert controller.latencies[1] > 0
+
+
+def test_the_age_of_a_plan_is_recorded(controller):
+    world = TableWorld(MAP)
+    controller.wait(10)
+    time.sleep(0.05)
+    message = controller.read(world.observation).message
+    assert message.age_ns > 50e6
+    assert list(message.axes) == pytest.approx([0.1, 0.0])
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory) -> Path:
+    """An untrained co-policy as a checkpoint folder."""
+    folder = tmp_path_factory.mktemp("checkpoint")
+    config = CopolicyConfig(
+        preset="small",
+        device="cpu",
+        input_features={key: PolicyFeature(kind, FEATURES[key]["shape"]) for key, kind in KINDS.items()},
+        output_features={ACTION: PolicyFeature(FeatureType.ACTION, FEATURES[ACTION]["shape"])},
+    )
+    CopolicyPolicy(config).save_pretrained(folder)
+    for processor in make_pre_post_processors(config):
+        processor.save_pretrained(folder)
+    return folder
+
+
+def test_a_checkpoint_plans_what_the_evaluation_plans(checkpoint):
+    history = {
+        STATE: np.tile(TableWorld(MAP).observation, (3, 1)),
+        ENVIRONMENT_STATE: np.random.default_rng(0).random((3, 11)),
+        HUMAN_ACTION: np.zeros((3, 2)),
+    }
+    planner = Planner.load(checkpoint)
+    frames = planner.policy.config.n_obs_steps
+    history = {key: value[-frames:] for key, value in history.items()}
+    import torch
+
+    mine = Checkpoint(checkpoint)
+    mine.seed(3)
+    expected = planner.plan({key: value[None] for key, value in history.items()}, torch.Generator().manual_seed(3))
+    np.testing.assert_allclose(mine.plan(history), expected[0])
+    assert (mine.frames, mine.actions_per_plan) == (frames, planner.policy.config.n_action_steps)
+    assert mine.name.startswith("policy:copolicy-")
+
+
+def test_a_folder_without_a_checkpoint_is_named(tmp_path):
+    with pytest.raises(FileFormatError) as error:
+        Checkpoint(tmp_path)
+    assert str(error.value) == (
+        f"{tmp_path}: expected a checkpoint folder with config.json and model.safetensors, found none"
+    )
+
+
+def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_path, capsys):
+    from copolicy.collect.recorder import EpisodeRecorder
+    from copolicy.collect.wall_clock import WallClockAnchor
+    from copolicy.dataset.episode import EpisodeMeta
+
+    # A recorded human who pulls hard: the episode is over in seconds, whatever an untrained policy does.
+    config = MapConfig(start=(780.0, 300.0, 3.14), goal=(960.0, 300.0))
+    world, path = TableWorld(config), tmp_path / "earlier.mcap"
+    with EpisodeRecorder(path, config, EpisodeMeta("u"), WallClockAnchor.simulated(0)) as recorder:
+        for _ in range(120):
+            world.step((0, 0, 1, 0))
+            recorder.step((0, 0, 1, 0), world.pose, world.velocity, 0.0)
+        recorder.finish(True, "goal")
+    out = tmp_path / "out"
+    flags = ["--pair", "H1", "--out", str(out), "--headless", "--episodes", "1", "--countdown", "0.5", "--json"]
+    assert main(["play", *flags, "--pilots", f"policy:{checkpoint}", f"replay:{path}"]) == 0
+    assert '"complete": true' in capsys.readouterr().out
+    (recorded,) = out.rglob("*.mcap")
+    episode = read_episode(recorded)
+    assert episode.map_config == config
+    assert episode.meta.controller_0.startswith("policy:copolicy-")
+    assert episode.meta.controller_1 == "replay:earlier"
+    assert episode.meta.source == "simulated"
+    np.testing.assert_array_equal(episode.actions[:, 2:], np.tile([1.0, 0.0], (len(episode.actions), 1))[:120])
+    with recorded.open("rb") as file:
+        messages = list(make_reader(file).iter_messages(["/player/0/input", "/episode/event"]))
+    events = [EpisodeEvent.FromString(m.data) for _, channel, m in messages if channel.topic == "/episode/event"]
+    (plans,) = [event.detail for event in events if event.kind == "plans"]
+    assert plans.startswith("seat 0: ")
+    inputs = [PlayerInput.FromString(m.data) for _, channel, m in messages if channel.topic == "/player/0/input"]
+    assert len(inputs) == len(episode.actions)
+    assert max(one.age_ns for one in inputs) > 10**7
