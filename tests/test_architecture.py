@@ -13,7 +13,7 @@ ROOMS = {
     "train": {"dataset", "collect"},
     "cards": {"dataset"},
 }
-HEAVY = {"torch", "lerobot", "datasets", "huggingface_hub", "matplotlib", "pandas", "pyarrow", "diffusers", "gymnasium"}
+HEAVY = {"torch", "torchvision", "lerobot", "datasets", "matplotlib", "pandas", "diffusers", "gymnasium"}
 
 
 def _imports(path: Path) -> set[str]:

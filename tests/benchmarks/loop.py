@@ -122,15 +122,17 @@ class _Hands(threading.Thread):
         begin, count = time.monotonic(), 0
         while time.monotonic() - begin < self._seconds:
             count += 1
+            phase = type(self._application.phase).__name__
             trial = game.trial
             y = trial.world.pose[1] if trial else 300.0
             for pad in pads:
                 if not pad.is_open:
                     continue
-                pad.move(0.0, 0.7 * np.sign(300.0 - y + 60 * np.sin(count / 200)))  # up and down, hitting nothing
+                # Up and down, hitting nothing; still while there is a menu, which a stick would move in.
+                push = 0.7 * np.sign(300.0 - y + 60 * np.sin(count / 200))
+                pad.move(0.0, push if phase == "Running" else 0.0)
                 pad.axis(4, 2 * (count % _CODES) / _CODES - 1)
             self.set_ns[count] = time.monotonic_ns()
-            phase = type(self._application.phase).__name__
             if phase in ("Ready", "Result", "Paused") and count % 50 == 0:
                 pads[0].button(0, count % 100 == 0)
             time.sleep(max(0.0, begin + count / _HZ - time.monotonic()))

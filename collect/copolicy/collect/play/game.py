@@ -257,5 +257,6 @@ class Game:
             seats=(statuses[0], statuses[1]),
             interaction=trial.interaction,
             late=trial.loop.late + trial.loop.skipped,
+            hz=trial.loop.achieved_hz,
             practice=trial.practice,
         )

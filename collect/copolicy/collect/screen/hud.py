@@ -39,6 +39,7 @@ class Hud:
         seats: robot, human.
         interaction: units of a player's full force, positive where they pull apart.
         late: late and skipped ticks of this episode.
+        hz: rate that the loop keeps, nan before it runs.
         practice: it does not count.
     """
 
@@ -50,6 +51,7 @@ class Hud:
     seats: tuple[SeatStatus, SeatStatus]
     interaction: float = 0.0
     late: int = 0
+    hz: float = math.nan
     practice: bool = False
 
 
@@ -96,5 +98,5 @@ def _draw_interaction(canvas: Canvas, hud: Hud) -> None:
     pygame.draw.rect(canvas.surface, TEXT, canvas.rect(middle - 2, y - 5, 4, 22))
     if hud.late:
         canvas.text(f"late ticks: {hud.late}", (600, 742), 22, YELLOW, "center")
-    else:
-        canvas.text("30 steps a second", (600, 742), 20, MUTED, "center")
+    elif math.isfinite(hud.hz):
+        canvas.text(f"{hud.hz:.1f} steps a second", (600, 742), 20, MUTED, "center")
