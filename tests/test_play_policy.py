@@ -19,7 +19,6 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
 from copolicy.dataset.task import MAP_SETS, MapConfig
-from copolicy.train.planner import Planner
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
@@ -156,30 +155,27 @@ def checkpoint(tmp_path_factory) -> Path:
     return folder
 
 
-def test_a_checkpoint_plans_what_the_evaluation_plans(checkpoint):
+def test_one_table_is_planned_for_as_a_batch_of_one(checkpoint):
     history = {
         STATE: np.tile(TableWorld(MAP).observation, (3, 1)),
         ENVIRONMENT_STATE: np.random.default_rng(0).random((3, 11)),
         HUMAN_ACTION: np.zeros((3, 2)),
     }
-    planner = Planner.load(checkpoint)
-    frames = planner.policy.config.n_obs_steps
-    history = {key: value[-frames:] for key, value in history.items()}
-    import torch
-
-    mine = Checkpoint(checkpoint)
-    mine.seed(3)
-    expected = planner.plan({key: value[None] for key, value in history.items()}, torch.Generator().manual_seed(3))
-    np.testing.assert_allclose(mine.plan(history), expected[0])
-    assert (mine.frames, mine.actions_per_plan) == (frames, planner.policy.config.n_action_steps)
-    assert mine.name.startswith("policy:copolicy-")
+    policy = Checkpoint(checkpoint)
+    policy.seed(3)
+    expected = policy.plan_batch({key: value[None] for key, value in history.items()})
+    policy.seed(3)
+    np.testing.assert_array_equal(policy.plan(history), expected[0])
+    assert expected.shape == (1, policy.planned_frames, 4)
+    assert (policy.frames, policy.planned_frames, policy.actions_per_plan) == (3, 10, 8)
+    assert policy.name.startswith("policy:copolicy-")
 
 
 def test_a_folder_without_a_checkpoint_is_named(tmp_path):
     with pytest.raises(FileFormatError) as error:
         Checkpoint(tmp_path)
     assert str(error.value) == (
-        f"{tmp_path}: expected a checkpoint folder with config.json and model.safetensors, found none"
+        f"{tmp_path}: expected a checkpoint folder with config.json and model.safetensors, found an empty folder"
     )
 
 

@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from copolicy.collect.world import TableWorld
 
+from copolicy.collect.world import TableWorld
 from copolicy.dataset import clock
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
 from copolicy.dataset.interaction import interaction_force
@@ -127,11 +126,10 @@ def coplan(
         One outcome for each map and repeat, in that order.
     """
     hold = clock.stride(fps)
-    length = planner.policy.config.n_obs_steps
-    tables = [_Table(i, m, r, physics, length) for i, m in enumerate(maps) for r in range(repeats)]
-    generator = torch.Generator().manual_seed(seed)
+    tables = [_Table(i, m, r, physics, planner.frames) for i, m in enumerate(maps) for r in range(repeats)]
+    planner.seed(seed)
     while running := [table for table in tables if table.outcome is None]:
-        plans = planner.plan(_history(running), generator)
+        plans = planner.plan(_history(running))
         for table, plan in zip(running, plans, strict=True):
             table.plans += 1
             for action in plan[:actions_per_plan]:

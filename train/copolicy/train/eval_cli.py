@@ -63,8 +63,8 @@ def _coplan(arguments: argparse.Namespace) -> dict:
         for name in ("num_inference_steps", "initial_noise_scale")
         if getattr(arguments, name) is not None
     }
-    planner = Planner.load(arguments.policy, arguments.device, **changed)
-    available = planner.policy.config.horizon - planner.policy.config.n_obs_steps + 1
+    planner = Planner(arguments.policy, arguments.device, **changed)
+    available = planner.checkpoint.planned_frames
     if arguments.actions_per_plan > available:
         raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
     maps = map_set(arguments.maps, arguments.orientations)[: arguments.limit]

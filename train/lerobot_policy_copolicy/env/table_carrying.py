@@ -11,7 +11,7 @@ from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.task import MapConfig, Physics
+from copolicy.dataset.task import WINDOW, MapConfig, Physics
 from copolicy.dataset.task import map_set as maps_of
 
 _TASK = "table_carrying"
@@ -130,9 +130,15 @@ class TableCarryingEnv(gymnasium.Env):
 
     def render(self) -> np.ndarray | None:
         """`(300, 600, 3)` uint8 picture of the world at half size, or None without a render mode."""
-        from .picture import draw  # here, because training without videos needs no pygame
+        if not self.render_mode:
+            return None
+        # Here, because training without videos needs no pygame.
+        from copolicy.collect.screen import TableView
+        from copolicy.collect.sdl import pygame
 
-        return draw(self.world.map_config, self.world.pose, self._action) if self.render_mode else None
+        surface = pygame.Surface((WINDOW[0] // 2, WINDOW[1] // 2), depth=24)
+        TableView(self.world.map_config).draw(surface, surface.get_rect(), self.world.pose, self._action.tolist())
+        return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(*surface.get_size()[::-1], 3)
 
     def _observation(self) -> dict[str, np.ndarray]:
         return {

@@ -7,8 +7,10 @@ a checkpoint is loaded, never before.
 import contextlib
 import hashlib
 import io
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +22,24 @@ class Checkpoint:
 
     Attributes:
         name: type and the beginning of its weights' digest.
+        folder: where `config.json` and the weights are.
+        weights_sha256: digest of the weights.
+        policy: LeRobot's policy.
         frames: how many observations a plan is made from.
+        planned_frames: how many actions a plan holds from the newest observation on.
         actions_per_plan: frames of a plan that are executed before the next one (LeRobot's `n_action_steps`).
     """
 
-    def __init__(self, path: Path, seed: int = 0):
+    def __init__(self, path: Path, seed: int = 0, device: str = "cpu", settings: Mapping[str, Any] | None = None):
         """
+        Args:
+            path: the folder of the policy, one that holds `pretrained_model`, or that of a training run.
+            seed: of the plans' noise.
+            device: where it plans.
+            settings: fields of the policy's configuration to change, such as `num_inference_steps`.
+
         Raises:
-            FileFormatError: the folder holds no policy that plans for both players.
+            FileFormatError: the folder holds no policy that plans for both players, or one without such a setting.
             MissingExtraError: torch or LeRobot is not installed.
         """
         folder = _pretrained_model(path)
@@ -40,16 +52,20 @@ class Checkpoint:
             raise MissingExtraError(error.name or "lerobot") from None
         try:
             config = config_class.from_pretrained(folder)
-            config.device = "cpu"
+            config.device = device
             config.pretrained_path = folder
+            for setting, value in (settings or {}).items():
+                if not hasattr(config, setting):
+                    raise FileFormatError(folder, f"a policy with the setting {setting!r}", f"{config.type} without it")
+                setattr(config, setting, value)
             policy_class = factory.get_policy_class(config.type)
             if not hasattr(policy_class, "plan"):
                 raise FileFormatError(folder, "a policy that plans for both players (method `plan`)", config.type)
             with contextlib.redirect_stdout(io.StringIO()):  # LeRobot prints while it loads
-                self._policy = policy_class.from_pretrained(folder, config=config)
-            self._policy.eval()
+                self.policy = policy_class.from_pretrained(folder, config=config)
+            self.policy.eval()
             self._preprocess, self._postprocess = factory.make_pre_post_processors(
-                config, pretrained_path=str(folder), preprocessor_overrides={"device_processor": {"device": "cpu"}}
+                config, pretrained_path=str(folder), preprocessor_overrides={"device_processor": {"device": device}}
             )
         except CopolicyError:
             raise
@@ -57,9 +73,11 @@ class Checkpoint:
             raise FileFormatError(
                 folder, "a policy that LeRobot can load", f"{type(error).__name__}: {error}"
             ) from error
-        digest = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
-        self.name = f"policy:{config.type}-{digest[:8]}"
+        self.folder = folder
+        self.weights_sha256 = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
+        self.name = f"policy:{config.type}-{self.weights_sha256[:8]}"
         self.frames = int(config.n_obs_steps)
+        self.planned_frames = int(config.horizon) - self.frames + 1
         self.actions_per_plan = int(config.n_action_steps)
         self._generator = self._torch.Generator().manual_seed(seed)
 
@@ -68,19 +86,23 @@ class Checkpoint:
         self._generator.manual_seed(seed)
 
     def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        """Plans from the last frames.
+        """Plans for one table from its last frames.
 
         Args:
             history: observation keys to `(frames, n)`, oldest first, in physical units.
 
         Returns:
-            `(frames of the plan, 4)` joint actions, the first for the newest frame.
+            `(planned_frames, 4)` joint actions, the first for the newest frame.
         """
+        return self.plan_batch({key: value[None] for key, value in history.items()})[0]
+
+    def plan_batch(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        """Plans for several tables at once: histories `(B, frames, n)` to plans `(B, planned_frames, 4)`."""
         torch = self._torch
-        batch = {key: torch.from_numpy(value[None].astype(np.float32)) for key, value in history.items()}
+        batch = {key: torch.from_numpy(value.astype(np.float32)) for key, value in history.items()}
         with torch.inference_mode():
-            plan = self._policy.plan(self._preprocess(batch), generator=self._generator)
-        return self._postprocess(plan[:, self.frames - 1 :])[0].cpu().numpy().astype(float)
+            plan = self.policy.plan(self._preprocess(batch), generator=self._generator)
+        return self._postprocess(plan[:, self.frames - 1 :]).cpu().numpy().astype(float)
 
 
 def _pretrained_model(path: Path) -> Path:
@@ -88,4 +110,7 @@ def _pretrained_model(path: Path) -> Path:
     for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
         if (folder / "config.json").is_file() and (folder / "model.safetensors").is_file():
             return folder
-    raise FileFormatError(path, "a checkpoint folder with config.json and model.safetensors", "none")
+    found = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) if path.is_dir() else "no such folder"
+    raise FileFormatError(
+        path, "a checkpoint folder with config.json and model.safetensors", found or "an empty folder"
+    )
