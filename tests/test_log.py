@@ -1,6 +1,7 @@
 """Reading a recording: exactly what was recorded, or an error of ours."""
 
 import hashlib
+import math
 import struct
 import tracemalloc
 from dataclasses import replace
@@ -15,11 +16,12 @@ from mcap.writer import CompressionType, Writer
 from copolicy.collect.recorder import EpisodeRecorder
 from copolicy.collect.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.episode_records import decode_physics
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.features import state_vector
 from copolicy.dataset.log import read_episode, read_metadata
 from copolicy.dataset.messages.copolicy_pb2 import PlayerAction, TableState
-from copolicy.dataset.task import MAP_SETS, MapConfig
+from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
 
 MAP = MapConfig((240.0, 120.0, 3.14), (960.0, 180.0), ((480.0, 300.0), (0.1 + 0.2, 420.0)), 45)
 META = EpisodeMeta(
@@ -124,7 +126,7 @@ def test_metadata_is_read_without_the_rest(recording):
     path, *_ = recording
     records = read_metadata(path)
     assert list(records) == [
-        "session", "episode", "players", "devices", "software", "consent", "dataset_info", "episode_result",
+        "session", "episode", "players", "devices", "software", "consent", "physics", "dataset_info", "episode_result",
     ]  # fmt: skip
     assert records["players"]["player_1_id"] == "P01-b"
     assert records["episode_result"]["steps"] == "40"
@@ -329,3 +331,19 @@ def test_memory_is_bounded_by_the_numbers_not_by_the_file(tmp_path):
     assert same_bits(episode.final_state, states[-1])
     numbers = steps * 8 * (7 + 4)
     assert peak < 4 * numbers + (6 << 20)
+
+
+def test_the_physics_of_a_recording_come_back(tmp_path):
+    physics = Physics(angular_acceleration_limit=math.pi / 8, step_limit=77)
+    path = tmp_path / "episode.mcap"
+    with EpisodeRecorder(path, MAP_SETS["training"][0], EpisodeMeta("eighth"), physics=physics) as recorder:
+        recorder.finish(False, "operator_discard")
+    assert read_episode(path).physics == physics
+
+
+def test_a_recording_without_its_physics_is_refused():
+    with pytest.raises(InvalidValueError) as error:
+        decode_physics({"physics": {"angular_acceleration_limit": "fast"}})
+    assert str(error.value) == (
+        "metadata record 'physics', entry 'angular_acceleration_limit': expected a number, found 'fast'"
+    )

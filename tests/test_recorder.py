@@ -115,7 +115,7 @@ def test_records_that_describe_the_file(finished):
     assert (attachment.name, attachment.media_type) == ("map_config.json", "application/json")
     names = [record.name for record in records(path, Metadata)]
     assert names == [
-        "session", "episode", "players", "devices", "software", "consent", "dataset_info", "episode_result",
+        "session", "episode", "players", "devices", "software", "consent", "physics", "dataset_info", "episode_result",
     ]  # fmt: skip
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()

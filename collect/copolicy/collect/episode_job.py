@@ -69,7 +69,7 @@ def record_episode(
         physics: settings of the dynamics.
     """
     world = TableWorld(map_config, physics)
-    with EpisodeRecorder(path, map_config, meta, anchor) as recorder:
+    with EpisodeRecorder(path, map_config, meta, anchor, physics=physics) as recorder:
         outcome = RUNNING
         while not outcome.done:
             state = world.observation

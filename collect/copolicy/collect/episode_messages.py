@@ -19,7 +19,7 @@ from copolicy.dataset.messages.copolicy_pb2 import (
     PlayerInput,
     TableState,
 )
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task import RECORD_HZ, Physics
 from copolicy.dataset.topics import ACTIONS, EVENT, INPUTS, INTERACTION, LOOP_TIMING, TABLE_STATE, Topic
 
 from .wall_clock import WallClockAnchor
@@ -30,7 +30,9 @@ Record = tuple[Topic, bytes]
 _PACKAGES = ("mcap", "numpy", "protobuf", "pygame", "pymunk")
 
 
-def start_records(meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def start_records(
+    meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[str, str], physics: Physics
+) -> dict[str, dict[str, str]]:
     """The metadata records at the start of a recording, by name; no host, user or path is among them."""
     more = {
         "session": {
@@ -44,6 +46,7 @@ def start_records(meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[s
             "system": f"{platform.system()} {platform.machine()}",
             **{package: version(package) for package in _PACKAGES},
         },
+        "physics": episode_records.encode_physics(physics),
         "dataset_info": episode_records.dataset_info(),
     }
     records = {

@@ -16,7 +16,7 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunErr
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
 from copolicy.dataset.routes import route_class
-from copolicy.dataset.task import RECORD_HZ, MapConfig
+from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics
 from copolicy.dataset.topics import SCENE, SCENE_MAP
 
 from . import episode_messages
@@ -64,6 +64,7 @@ class EpisodeRecorder:
         velocity: Triple = (0.0, 0.0, 0.0),
         monotonic_ns: int | None = None,
         devices: Mapping[str, str] | None = None,
+        physics: Physics | None = None,
     ):
         """Prepares a recording; the file appears when the `with` block is entered.
 
@@ -76,6 +77,7 @@ class EpisodeRecorder:
             velocity: of s_0 (px/s, px/s, rad/s).
             monotonic_ns: when s_0 was read, by default the anchor's moment.
             devices: what is known of the devices; no serial numbers, since those identify people.
+            physics: settings of the world that the states come from.
         """
         self.meta = meta
         self.steps = 0
@@ -83,6 +85,7 @@ class EpisodeRecorder:
         self._map_config = map_config
         self._anchor = anchor or WallClockAnchor.now()
         self._devices = dict(devices or {})
+        self._physics = physics or Physics()
         self._begin_ns = self._anchor.monotonic_ns if monotonic_ns is None else monotonic_ns
         self._time_ns = self._begin_ns  # of the present step
         self._flushed_ns = self._begin_ns
@@ -226,7 +229,7 @@ class EpisodeRecorder:
         self._file.publish()
 
     def _write_start(self) -> None:
-        records = episode_messages.start_records(self.meta, self._anchor, self._devices)
+        records = episode_messages.start_records(self.meta, self._anchor, self._devices, self._physics)
         for name, entries in records.items():
             self._file.add_metadata(name, entries)
         time_ns = self._anchor.at(self._time_ns)

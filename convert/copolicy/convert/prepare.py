@@ -10,7 +10,6 @@ import numpy as np
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, RunError
-from copolicy.dataset.task import Physics
 
 from .frames import frame_columns
 from .replay import replay_drift
@@ -92,7 +91,7 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
         meta = replace(meta, license=conversion.license)
     if conversion.drift and np.isnan(meta.replay_drift_px):
         # Positions do not depend on the rotation, so that its settings do not matter here.
-        meta = replace(meta, replay_drift_px=replay_drift(episode, Physics()))
+        meta = replace(meta, replay_drift_px=replay_drift(episode, episode.physics))
     return PreparedEpisode(columns, episode_statistics(columns), meta, episode.notes)
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from .exceptions import InvalidValueError, ShapeError
-from .task import MapConfig
+from .task import MapConfig, Physics
 
 Source = Literal["human", "simulated", "upstream"]
 TerminationReason = Literal[
@@ -72,6 +72,7 @@ class Episode:
         actions: `(T, 4)` robot xy, human xy in [-1, 1].
         final_state: `(7,)` the state that the last action led to.
         fps: states a second; 30, except for data that was stored at another rate.
+        physics: the dynamics that led from state to state.
     """
 
     states: np.ndarray
@@ -80,6 +81,7 @@ class Episode:
     meta: EpisodeMeta
     map_config: MapConfig
     fps: int = 30
+    physics: Physics = field(default_factory=Physics)
     notes: tuple[str, ...] = field(default=())  # what an importer noticed and wants said
 
     def __post_init__(self):

@@ -4,12 +4,13 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from typing import Any, get_args
 
 from .episode import EPISODE_COLUMNS, EpisodeMeta, Source, TerminationReason
 from .exceptions import InvalidValueError
 from .features import ACTION, FEATURES, STATE
-from .task import RECORD_HZ
+from .task import RECORD_HZ, Physics
 
 SCHEMA_VERSION = "1"
 """Version of what a recording holds; a reader refuses one that it does not know."""
@@ -24,6 +25,7 @@ COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "devices": (),
     "software": ("software_version",),
     "consent": ("consent_id", "license"),
+    "physics": (),
     "dataset_info": (),
 }
 """The metadata records at the start of a recording and the episode columns that each holds."""
@@ -58,6 +60,28 @@ def dataset_info() -> dict[str, str]:
         "action_units": "a player's full force, [-1, 1]",
         "alignment": "the action of step k was taken in the state of step k; one more state follows the last action",
     }
+
+
+def encode_physics(physics: Physics) -> dict[str, str]:
+    """The record `physics`: every setting of the dynamics, in exact digits."""
+    return {name: repr(value) for name, value in asdict(physics).items()}
+
+
+def decode_physics(records: Mapping[str, Mapping[str, str]]) -> Physics:
+    """The inverse of `encode_physics` over all records of a recording.
+
+    Raises:
+        InvalidValueError: a setting is missing or no number.
+    """
+    entries = records.get("physics", {})
+    settings: dict[str, Any] = {}
+    for setting in fields(Physics):
+        text = entries.get(setting.name)
+        try:
+            settings[setting.name] = int(text or "") if setting.name == "step_limit" else float(text or "")
+        except ValueError:
+            raise InvalidValueError(f"metadata record 'physics', entry {setting.name!r}", "a number", text) from None
+    return Physics(**settings)
 
 
 def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:

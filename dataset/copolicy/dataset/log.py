@@ -135,6 +135,7 @@ class _Contents:
     def episode(self, path: Path, sha256: str) -> Episode:
         """The episode, once the whole file has been walked."""
         meta = episode_records.decode(self._records)
+        physics = episode_records.decode_physics(self._records)
         if self._map is None:
             raise FileFormatError(path, f"an attachment {episode_records.MAP_ATTACHMENT!r}", "none")
         fps = self._records["dataset_info"].get("fps")
@@ -156,7 +157,7 @@ class _Contents:
             raise FileFormatError(path, "actions in [-1, 1]", "others")
         states = _state_vectors(table)
         meta = replace(meta, source_sha256=sha256)
-        return Episode(states[:-1], actions, states[-1], meta, self._map, RECORD_HZ)
+        return Episode(states[:-1], actions, states[-1], meta, self._map, RECORD_HZ, physics)
 
 
 def _check_schema(channel: Channel, schema: Schema, topic: Topic) -> None:

@@ -101,7 +101,13 @@ class Trial:
             OSError: the file cannot be written.
         """
         recorder = EpisodeRecorder(
-            self.path, self.map_config, self.meta, self._anchor, monotonic_ns=self._clock(), devices=devices
+            self.path,
+            self.map_config,
+            self.meta,
+            self._anchor,
+            monotonic_ns=self._clock(),
+            devices=devices,
+            physics=self.world.physics,
         )
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:

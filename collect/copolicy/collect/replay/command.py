@@ -43,7 +43,7 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--angular-limit",
         choices=("pi/2", "pi/8"),
-        help="of --verify: the recording's bound on the angular acceleration (default: the one that fits better)",
+        help="of --verify: another bound on the angular acceleration than the recording states",
     )
     command.add_argument("--limit-px", type=float, default=0.01, help="of --verify: largest drift, px (default 0.01)")
     command.add_argument("--limit-rad", type=float, default=1e-4, help="of --verify: the same, rad (default 0.0001)")

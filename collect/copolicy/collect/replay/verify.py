@@ -1,13 +1,13 @@
 """Whether the recorded actions, simulated again from the recorded start, lead through the recorded states."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import theta_of
-from copolicy.dataset.task import Physics
 
 from ..world import RUNNING, Outcome, TableWorld
 from .track import Track
@@ -34,7 +34,7 @@ def verify(
 
     Args:
         track: the recording.
-        angular_limit: one of `ANGULAR_LIMITS`; by default the one that fits better, which the result names.
+        angular_limit: one of `ANGULAR_LIMITS`; by default the bound that the recording states.
         limit_px: largest drift of the position that passes, px.
         limit_rad: largest drift of the orientation that passes, rad.
 
@@ -50,10 +50,9 @@ def verify(
     for name, limit in (("limit in px", limit_px), ("limit in rad", limit_rad)):
         if not 0 < limit < math.inf:
             raise InvalidValueError(name, "a positive number", limit)
-    names = [angular_limit] if angular_limit else list(ANGULAR_LIMITS)
-    runs = {name: _simulate(track, ANGULAR_LIMITS[name]) for name in names}
-    chosen = min(runs, key=lambda name: max(runs[name][0].max() / limit_px, runs[name][1].max() / limit_rad))
-    px, rad, outcome, ended = runs[chosen]
+    recorded_limit = track.episode.physics.angular_acceleration_limit
+    limit_used = ANGULAR_LIMITS[angular_limit] if angular_limit else recorded_limit
+    px, rad, outcome, ended = _simulate(track, limit_used)
     beyond = np.flatnonzero((px > limit_px) | (rad > limit_rad))
     recorded = track.episode.meta.termination_reason
     physical = recorded in _PHYSICAL
@@ -63,7 +62,7 @@ def verify(
     return {
         "file": track.path.name,
         "steps": track.steps,
-        "angular_limit": chosen,
+        "angular_limit": limit_used,
         "max_drift_px": float(px.max()),
         "max_drift_rad": float(rad.max()),
         "last_drift_px": float(px[-1]),
@@ -81,8 +80,8 @@ def verify(
 def _simulate(track: Track, angular_limit: float) -> tuple[np.ndarray, np.ndarray, Outcome, int]:
     """Drift `(T + 1,)` in px and in rad, and the first contact that ends an episode with its step."""
     # The step limit is a setting of the session, not of the motion.
-    physics = Physics(angular_acceleration_limit=angular_limit, step_limit=track.steps + 1)
     episode = track.episode
+    physics = replace(episode.physics, angular_acceleration_limit=angular_limit, step_limit=track.steps + 1)
     states = np.vstack((episode.states, episode.final_state))
     world = TableWorld(episode.map_config, physics)
     world.reset(track.poses[0], states[0, 4:].tolist())

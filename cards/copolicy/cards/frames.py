@@ -1,0 +1,97 @@
+"""The frames of a data set, episode by episode: what figures and the report are drawn from."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, map_of, theta_of
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.task import MAP_SETS, MapConfig
+
+from .facts import DatasetFacts
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+except ModuleNotFoundError:
+    raise MissingExtraError("pyarrow") from None
+
+_COLUMNS = ["episode_index", "frame_index", STATE, ENVIRONMENT_STATE, ACTION]
+
+
+@dataclass(frozen=True)
+class EpisodeFrames:
+    """The frames of one episode at the data set's rate.
+
+    Attributes:
+        index: `episode_index`.
+        states: `(T, 7)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s).
+        actions: `(T, 4)` robot xy, human xy in [-1, 1].
+    """
+
+    index: int
+    states: np.ndarray
+    actions: np.ndarray
+    map_config: MapConfig
+
+    @property
+    def theta(self) -> np.ndarray:
+        """`(T,)` orientation in [0, 2 pi), rad."""
+        return theta_of(self.states)
+
+    @property
+    def interaction(self) -> np.ndarray:
+        """`(T,)` interaction force, units of a player's full force.
+
+        It is defined with the orientation after the step, which is that of the next frame; the last frame has none
+        and uses its own.
+        """
+        theta = self.theta
+        return interaction_force(np.append(theta[1:], theta[-1:]), self.actions)
+
+
+def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
+    """The episodes' frames in order, one data file in memory at a time.
+
+    Raises:
+        FileFormatError: a data file is missing, damaged, without the columns of this task, or holds other episodes
+            than meta/episodes says.
+    """
+    expected = iter(facts.episodes)
+    for path in sorted((facts.root / "data").glob("*/*.parquet")):
+        try:
+            table = parquet.read_table(path, columns=_COLUMNS).combine_chunks()
+        except (pa.ArrowInvalid, OSError, KeyError) as error:
+            raise FileFormatError(path, "a complete parquet file", str(error).splitlines()[0]) from None
+        missing = [name for name in _COLUMNS if name not in table.column_names]
+        if missing:
+            raise FileFormatError(path, "the columns of this task", f"none named {', '.join(missing)}")
+        indices = table["episode_index"].to_numpy()
+        columns = {key: _matrix(table, key) for key in (STATE, ENVIRONMENT_STATE, ACTION)}
+        cuts = [0, *(np.flatnonzero(np.diff(indices)) + 1), len(indices)] if len(indices) else []
+        for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+            episode = next(expected, None)
+            found = (int(indices[start]), int(end - start))
+            if episode is None or found != (episode["episode_index"], episode["length"]):
+                named = f"episode {episode['episode_index']} with {episode['length']} frames" if episode else "its end"
+                raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
+            config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode["map_set"]))
+            yield EpisodeFrames(found[0], columns[STATE][start:end], columns[ACTION][start:end], config)
+    left = next(expected, None)
+    if left is not None:
+        raise FileFormatError(facts.root / "data", f"the frames of episode {left['episode_index']}", "none")
+
+
+def _matrix(table: "pa.Table", key: str) -> np.ndarray:
+    column = table[key]
+    width = column.type.list_size if pa.types.is_fixed_size_list(column.type) else len(column[0])
+    values = column.combine_chunks().flatten() if column.num_chunks != 1 else column.chunk(0).flatten()
+    return values.to_numpy(zero_copy_only=False).astype(float).reshape(-1, width)
+
+
+def _obstacle_size(map_set: str) -> int:
+    # The observation has no room for it; all maps of a set have one size.
+    maps = MAP_SETS.get(map_set)
+    return maps[0].obstacle_size if maps else MapConfig.obstacle_size

@@ -1,0 +1,45 @@
+"""`copolicy-cards report`."""
+
+import argparse
+from pathlib import Path
+
+from copolicy.dataset.commandline import add_command
+
+REPORT_NAME = "report.html"
+
+
+def add_report_command(commands: argparse._SubParsersAction) -> None:
+    """Adds the command `report`."""
+    report = add_command(
+        commands,
+        "report",
+        _report,
+        "write one HTML page that shows a data set: paths, heat maps, pairs, findings, and every episode in a player",
+        "copolicy-cards report outputs/dataset",
+    )
+    report.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
+    report.add_argument("--out", type=Path, help=f"the page (default: {REPORT_NAME} in the data set's folder)")
+    report.add_argument("--title", help="heading of the page (default: the folder's name)")
+    report.add_argument("--overwrite", action="store_true", help="replace an existing page")
+
+
+def _report(arguments: argparse.Namespace) -> dict:
+    from ..facts import DatasetFacts
+    from ..new_file import require_new, write_whole
+    from .page import render_page
+    from .payload import build_payload
+
+    path = arguments.out or arguments.root / REPORT_NAME
+    facts = DatasetFacts.read(arguments.root)
+    require_new(path, arguments.overwrite)
+    payload = build_payload(facts, arguments.title or arguments.root.resolve().name)
+    text = render_page(payload)
+    write_whole(path, text)
+    return {
+        "report": str(path),
+        "episodes": len(facts.episodes),
+        "megabytes": round(len(text.encode()) / 1e6, 2),
+        "frames_shown": "all" if payload["frame_step"] == 1 else f"one in {payload['frame_step']}",
+        "findings": "copolicy-dataset check was not run" if payload["check"] is None else "shown",
+        "statistics": "copolicy-dataset stats was not run" if payload["statistics"] is None else "shown",
+    }

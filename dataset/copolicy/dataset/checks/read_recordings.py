@@ -1,0 +1,68 @@
+"""A folder of recordings, one MCAP file an episode, as an `EpisodeTable`."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..commandline import progress
+from ..episode import EPISODE_COLUMNS, Episode
+from ..exceptions import CopolicyError
+from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
+from ..log import read_episode
+from ..task import RECORD_HZ
+from .episode_table import EpisodeTable
+from .finding import Finding
+
+
+def read_recordings(root: Path) -> EpisodeTable:
+    """Every `*.mcap` below a folder; a file that fails its check sums becomes a finding, as does one that broke off."""
+    paths = sorted(root.rglob("*.mcap"))
+    episodes: list[Episode] = []
+    labels: list[str] = []
+    damage = [
+        Finding(path.relative_to(root).as_posix(), "unfinished", None, None, "warning",
+                "a recording that broke off; copolicy-collect recover makes it readable")
+        for path in sorted(root.rglob("*.mcap.part"))
+    ]  # fmt: skip
+    for path in progress(paths, len(paths), "reading"):
+        label = path.relative_to(root).as_posix()
+        try:
+            episode = read_episode(path)
+        except CopolicyError as error:
+            message = str(error).removeprefix(f"{path}: ")
+            damage.append(Finding(label, "check_sum", None, None, "error", message))
+            continue
+        if len(episode.actions):
+            episodes.append(episode)
+            labels.append(label)
+        else:
+            damage.append(Finding(label, "empty", 0, 1, "error", "a recording without a single step"))
+    return _table(root, labels, episodes, tuple(damage))
+
+
+def _table(root: Path, labels: list[str], episodes: list[Episode], damage: tuple[Finding, ...]) -> EpisodeTable:
+    lengths = np.array([len(episode.actions) for episode in episodes], np.int64)
+    columns = {name: np.array([getattr(episode.meta, name) for episode in episodes]) for name in EPISODE_COLUMNS}
+    frames: dict[str, np.ndarray] = {}
+    final_states = None
+    if episodes:
+        maps = np.array([environment_state(episode.map_config) for episode in episodes])
+        frames = {
+            STATE: np.concatenate([episode.states for episode in episodes]),
+            ACTION: np.concatenate([episode.actions for episode in episodes]),
+            ENVIRONMENT_STATE: np.repeat(maps, lengths, axis=0),
+        }
+        final_states = np.array([episode.final_state for episode in episodes])
+    return EpisodeTable(
+        root,
+        "recordings",
+        float(RECORD_HZ),
+        tuple(labels),
+        {**columns, "length": lengths},
+        frames,
+        np.arange(len(episodes)),
+        np.cumsum(lengths) - lengths,
+        final_states,
+        np.array([episode.map_config.obstacle_size for episode in episodes]),
+        damage=damage,
+    )

@@ -1,0 +1,117 @@
+"""The form of the data: feature table, rate, episode columns and what may stand in them."""
+
+from collections.abc import Iterable, Iterator
+from typing import get_args
+
+import numpy as np
+
+from ..episode import EPISODE_COLUMNS, Source, TerminationReason
+from ..features import ACTION, FEATURES, HUMAN_ACTION
+from ..task import RECORD_HZ
+from .episode_table import EpisodeTable
+from .finding import Finding
+from .limits import limit
+from .rule import Rule, each
+
+_CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
+
+
+def _format(table: EpisodeTable) -> Iterator[Finding]:
+    version = str(table.info.get("codebase_version"))
+    if not version.startswith("v3."):
+        yield Finding("", "schema", version, "v3.x", "error", "another version of LeRobot's format")
+    if table.fps not in [rate for rate in range(1, RECORD_HZ + 1) if RECORD_HZ % rate == 0]:
+        message = f"the rate is no divisor of {RECORD_HZ} Hz"
+        yield Finding("", "schema", table.fps, f"a divisor of {RECORD_HZ}", "error", message)
+
+
+def _features(table: EpisodeTable) -> Iterator[Finding]:
+    features = table.info.get("features")
+    features = features if isinstance(features, dict) else {}
+    for name, expected in FEATURES.items():
+        entry = features.get(name)
+        if not isinstance(entry, dict):
+            yield Finding("", "schema", None, None, "error", f"no feature {name} in meta/info.json")
+            continue
+        for part in ("dtype", "shape", "names"):
+            found, wanted = entry.get(part), expected[part]
+            if part == "shape":
+                found, wanted = tuple(found or ()), tuple(wanted)
+            if found != wanted and not (part == "names" and wanted is None):
+                yield Finding("", "schema", str(found), str(wanted), "error", f"feature {name} with another {part}")
+        if name not in table.files:
+            yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
+            continue
+        kind, width = {"float32": "float"}.get(expected["dtype"], expected["dtype"]), expected["shape"][0]
+        # A list without a fixed size, as some tools write it, is judged by its rows.
+        rows = table.frames.get(name)
+        found_width = rows.shape[1] if rows is not None and rows.ndim == 2 else table.files[name][1]
+        found_kind = str(rows.dtype).replace("float32", "float") if rows is not None else table.files[name][0]
+        if (found_kind, found_width) != (kind, width):
+            message = f"column {name} of the data files is of another type"
+            yield Finding("", "schema", f"{found_kind} x {found_width}", f"{kind} x {width}", "error", message)
+
+
+def _columns(table: EpisodeTable) -> Iterator[Finding]:
+    missing = [name for name in EPISODE_COLUMNS if name not in table.columns]
+    if missing:
+        message = f"meta/episodes has no columns {', '.join(missing)}"
+        yield Finding("", "schema", len(missing), 0, "error", message)
+    kinds = {"str": "U", "int": "i", "float": "f", "bool": "b"}
+    for name, kind in EPISODE_COLUMNS.items():
+        if name in table.columns and len(table.labels) and table.columns[name].dtype.kind != kinds[kind]:
+            yield Finding("", "schema", str(table.columns[name].dtype), kind, "error", f"episode column {name}")
+    for name, choices in _CHOICES.items():
+        if name in table.columns:
+            values = table.columns[name]
+            unknown = ~np.isin(values, choices)
+            yield from each(table, unknown, "schema", values, "one of the known", "error", f"unknown {name}")
+    if "episode_uuid" in table.columns:
+        uuids = table.columns["episode_uuid"]
+        yield from each(table, uuids == "", "schema", uuids, "a name", "error", "no episode_uuid")
+
+
+def _outcome(table: EpisodeTable) -> Iterator[Finding]:
+    reached = table.columns["termination_reason"] == "goal"
+    figures = table.columns["termination_reason"]
+    differs = reached & ~table.columns["success"]
+    yield from each(table, differs, "outcome", figures, "success", "error", "ended at the goal but is no success")
+    # An episode of the original program may be a success by its own flag; ours end as soon as the goal is touched.
+    differs = ~reached & table.columns["success"]
+    yield from each(table, differs, "outcome", figures, "goal", "error", "a success that did not end at the goal")
+
+
+def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:
+    done, success = (table.frames[name].reshape(-1).astype(bool) for name in ("next.done", "next.success"))
+    last = np.zeros(table.frame_count, bool)
+    last[table.ends] = True
+    marks = np.add.reduceat((done != last).astype(int), table.starts)
+    message = "next.done is not true at the last frame alone"
+    yield from each(table, marks > 0, "outcome", marks, 0, "error", message, table.framed)
+    expected = last & np.repeat(table.of_framed("success"), table.counts)
+    marks = np.add.reduceat((success != expected).astype(int), table.starts)
+    message = "next.success contradicts the episode's success"
+    yield from each(table, marks > 0, "outcome", marks, 0, "error", message, table.framed)
+
+
+def _alignment(table: EpisodeTable) -> Iterable[Finding]:
+    human, stored = table.frames[ACTION][:, 2:], table.frames[HUMAN_ACTION]
+    previous = np.zeros_like(human)
+    previous[1:] = human[:-1]
+    previous[table.starts] = 0
+    off = np.maximum.reduceat(np.abs(stored - previous).max(axis=1), table.starts).astype(float)
+    bound = limit("previous_action")
+    message = f"{HUMAN_ACTION} is not the human action of the frame before"
+    return each(table, ~(off <= bound), "alignment", off, bound, "error", message, table.framed)
+
+
+RULES = (
+    Rule("format", "version and rate of a LeRobot data set", _format, kinds=("lerobot",)),
+    Rule("features", "the feature table, in meta/info.json and in the files", _features, kinds=("lerobot",)),
+    Rule("columns", "the episode columns and what stands in them", _columns),
+    Rule("outcome", "success and how the episode ended agree", _outcome, columns=("success", "termination_reason")),
+    Rule("outcome_of_frames", "next.done and next.success agree with the episode", _outcome_of_frames,
+         ("next.done", "next.success"), ("success",), ("lerobot",)),
+    Rule("alignment", "the past human action is the one a frame before", _alignment, (ACTION, HUMAN_ACTION), (),
+         ("lerobot",)),
+)  # fmt: skip

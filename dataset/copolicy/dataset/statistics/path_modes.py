@@ -1,0 +1,114 @@
+"""How many different paths there are in a configuration, without asking which side of what they pass."""
+
+import warnings
+from collections import Counter
+
+import numpy as np
+
+from ..exceptions import MissingExtraError
+from .estimate import Estimate
+from .resampling import Bootstrap
+from .route_entropy import routes_taken
+from .trajectories import Trajectories
+
+try:
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.metrics import adjusted_rand_score
+    from sklearn.mixture import GaussianMixture
+except ModuleNotFoundError:
+    raise MissingExtraError("scikit-learn") from None
+
+POINTS = 20
+"""Points, evenly spaced in arc length, that stand for a path."""
+
+MIN_EPISODES = 8
+"""Successful episodes of a configuration below which its paths are not counted."""
+
+MOST_MODES = 8
+RESOLUTION_PX = 10.0
+"""Spread within a mode below which it is not believed: paths that differ by less, rms, are one mode."""
+
+_COMPONENTS = 5
+_SUBSAMPLES = 10
+_SUBSAMPLE_SHARE = 0.8
+
+
+def resample_path(path: np.ndarray, points: int = POINTS) -> np.ndarray:
+    """`(points, 2)` of a path `(T, 2)`, evenly spaced along its length."""
+    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))))
+    places = np.linspace(0, along[-1], points)
+    return np.column_stack([np.interp(places, along, path[:, axis]) for axis in range(2)])
+
+
+def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
+    """Number of Gaussian modes with the least BIC, and the mode of each path.
+
+    Args:
+        paths: `(n, points, 2)`, px.
+        seed: of the mixtures' starts.
+    """
+    # Divided so that a distance is the root mean square one between paths, px.
+    flat = paths.reshape(len(paths), -1) / np.sqrt(paths.shape[1])
+    centred = flat - flat.mean(axis=0)
+    directions = np.linalg.svd(centred, full_matrices=False)[2][: min(_COMPONENTS, len(paths) - 1)]
+    scores = centred @ directions.T
+    best = (np.inf, 1, np.zeros(len(paths), dtype=int))
+    for modes in range(1, min(MOST_MODES, len(paths) // 3) + 1):
+        mixture = GaussianMixture(
+            modes, covariance_type="diag", reg_covar=RESOLUTION_PX**2, n_init=1, random_state=seed, tol=1e-2
+        )
+        with warnings.catch_warnings():
+            # Fewer distinct paths than modes: that mixture loses on its BIC.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            label = mixture.fit_predict(scores)
+            bic = float(mixture.bic(scores))
+        if bic < best[0] - 1e-9:
+            best = (bic, len(np.unique(label)), label)
+    return best[1], best[2]
+
+
+def path_mode_statistics(data: Trajectories, bootstrap: Bootstrap, seed: int) -> dict[str, Estimate]:
+    """Modes of the paths of each configuration, and their mean over configurations."""
+    definition = (
+        f"Path modes in a configuration, averaged over configurations by their episodes: paths of the episodes that "
+        f"reached the goal, {POINTS} points even in arc length, principal components, Gaussian mixture (diagonal, "
+        f"spread of at least {RESOLUTION_PX:g} px rms) of 1 to {MOST_MODES} modes with the least BIC and three "
+        f"episodes a mode or more. A configuration's range is that of {_SUBSAMPLES} subsamples of "
+        f"{_SUBSAMPLE_SHARE:.0%}; adjusted_rand compares the modes with the route classes (1 the same)."
+    )
+    words = routes_taken(data)
+    success = np.array([row.success for row in data.rows])
+    rng = np.random.default_rng(seed)
+    per_configuration: dict[str, dict] = {}
+    modes = np.full(len(data.rows), np.nan)
+    for name in np.unique(data.configurations):
+        members = np.flatnonzero((data.configurations == name) & success)
+        if len(members) < MIN_EPISODES:
+            continue
+        paths = np.array([resample_path(data.path(index)) for index in members])
+        count, label = count_modes(paths, seed)
+        modes[members] = count
+        keep = max(MIN_EPISODES - 1, round(_SUBSAMPLE_SHARE * len(members)))
+        again = [
+            count_modes(paths[rng.choice(len(paths), keep, replace=False)], seed)[0] for _ in range(_SUBSAMPLES)
+        ]
+        entry = {"episodes": len(members), "modes": count, "range": [min(again), max(again)]}
+        entry["subsamples"] = dict(sorted(Counter(again).items()))
+        known = [words[index] or "" for index in members]
+        if any(known):
+            entry["adjusted_rand"] = float(adjusted_rand_score(known, label))
+        per_configuration[str(name)] = entry
+    if not per_configuration:
+        note = f"no configuration has {MIN_EPISODES} episodes that reached the goal"
+        return {"path_modes": Estimate(None, "modes", definition, 0, note=note)}
+    value, bounds = bootstrap.mean(modes)
+    agreement = [entry["adjusted_rand"] for entry in per_configuration.values() if "adjusted_rand" in entry]
+    details = {
+        "adjusted_rand_with_routes": float(np.mean(agreement)) if agreement else None,
+        "configurations_used": len(per_configuration),
+        "configurations": per_configuration,
+    }
+    episodes = int(np.isfinite(modes).sum())
+    return {
+        "path_modes": Estimate(value, "modes", definition, episodes, bounds, bootstrap.resampled, details=details)
+    }

@@ -1,0 +1,141 @@
+"""What differs between two contents, and how large a step of the version it asks for.
+
+| step | what changed |
+|---|---|
+| major | rate, robot type, features; an episode column or a task went; an episode went, got other frames or another number |
+| minor | episodes, an episode column or a task were added; exclusions changed |
+| patch | values of episode columns were corrected; other files (card, statistics, figures, layout) |
+"""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .content import Content, EpisodeContent
+from .data_version import BUMPS, Bump
+
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Change:
+    """One line of what changed, and the smallest step of the version for it."""
+
+    bump: Bump
+    text: str
+
+
+@dataclass(frozen=True)
+class Difference:
+    """From one content to another.
+
+    Attributes:
+        schema: changes of rate, robot type, features, tasks and the set of episode columns.
+        episodes_added, episodes_removed: by `episode_uuid`, in order.
+        episodes_changed: for each `episode_uuid` in both, the features and episode columns whose values differ.
+        renumbered: episodes in both whose number differs.
+        frames_changed: those of `episodes_changed` with other frames, not only other episode columns.
+        exclusions_changed: whether `copolicy-dataset exclude` left other flags.
+    """
+
+    schema: tuple[Change, ...]
+    episodes_added: tuple[str, ...]
+    episodes_removed: tuple[str, ...]
+    episodes_changed: dict[str, tuple[str, ...]]
+    renumbered: tuple[str, ...]
+    frames_changed: tuple[str, ...]
+    exclusions_changed: bool
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing differs."""
+        return not self.changes
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All changes, the largest step first."""
+        metadata = [uuid for uuid in self.episodes_changed if uuid not in self.frames_changed]
+        columns = {name for uuid in metadata for name in self.episodes_changed[uuid]}
+        found = [
+            *self.schema,
+            *_counted("major", "removed", self.episodes_removed),
+            *_counted("major", "with other frames", self.frames_changed),
+            *_counted("major", "with another number", self.renumbered),
+            *_counted("minor", "added", self.episodes_added),
+            *_counted("patch", f"with other values of {', '.join(sorted(columns))}", metadata),
+        ]
+        if self.exclusions_changed:
+            found.append(Change("minor", "exclusions changed"))
+        return tuple(sorted(found, key=lambda change: -BUMPS.index(change.bump)))
+
+    def to_json(self) -> dict[str, Any]:
+        """For `--json`."""
+        fields = asdict(self)
+        return {**fields, "schema": [change.text for change in self.schema]}
+
+
+def compare(before: Content, after: Content) -> Difference:
+    """What changed from one content to the next; episodes are told apart by `episode_uuid`."""
+    old = {episode.episode_uuid: (number, episode) for number, episode in enumerate(before.episodes)}
+    new = {episode.episode_uuid: (number, episode) for number, episode in enumerate(after.episodes)}
+    common = [uuid for uuid in new if uuid in old]
+    kept_features = before.features.keys() & after.features.keys()
+    changed, frames = {}, []
+    for uuid in common:
+        a, b = old[uuid][1], new[uuid][1]
+        features = _differing(a.features, b.features, kept_features)
+        columns = _differing(a.columns, b.columns, a.columns.keys() & b.columns.keys())
+        if a.frames != b.frames:
+            features.append("length")
+        if features or columns:
+            changed[uuid] = (*features, *columns)
+        if features:
+            frames.append(uuid)
+    return Difference(
+        schema=tuple(_schema_changes(before, after)),
+        episodes_added=tuple(uuid for uuid in new if uuid not in old),
+        episodes_removed=tuple(uuid for uuid in old if uuid not in new),
+        episodes_changed=changed,
+        renumbered=tuple(uuid for uuid in common if old[uuid][0] != new[uuid][0]),
+        frames_changed=tuple(frames),
+        exclusions_changed=before.exclusions != after.exclusions,
+    )
+
+
+def _schema_changes(before: Content, after: Content) -> Iterable[Change]:
+    for name in ("fps", "robot_type"):
+        a, b = getattr(before, name), getattr(after, name)
+        if a != b:
+            yield Change("major", f"{name}: {a} -> {b}")
+    for name in sorted(before.features.keys() | after.features.keys()):
+        a, b = before.features.get(name), after.features.get(name)
+        if a is None or b is None:
+            yield Change("major", f"feature {name} {'added' if a is None else 'removed'}")
+        elif a != b:
+            parts = (f"{key} {a.get(key)} -> {b.get(key)}" for key in sorted({*a, *b}) if a.get(key) != b.get(key))
+            yield Change("major", f"feature {name}: {', '.join(parts)}")
+    yield from _set_changes("task", before.tasks, after.tasks)
+    if before.episodes and after.episodes:
+        yield from _set_changes("episode column", _columns(before.episodes), _columns(after.episodes))
+
+
+def _set_changes(kind: str, before: Iterable[str], after: Iterable[str]) -> Iterable[Change]:
+    for name in sorted(set(before) - set(after)):
+        yield Change("major", f"{kind} {name!r} removed")
+    for name in sorted(set(after) - set(before)):
+        yield Change("minor", f"{kind} {name!r} added")
+
+
+def _columns(episodes: tuple[EpisodeContent, ...]) -> Iterable[str]:
+    return episodes[0].columns  # the same in all
+
+
+def _differing(a: dict[str, str], b: dict[str, str], names: Iterable[str]) -> list[str]:
+    return sorted(name for name in names if a.get(name) != b.get(name))
+
+
+def _counted(bump: Bump, what: str, uuids: Iterable[str]) -> Iterable[Change]:
+    uuids = list(uuids)
+    if uuids:
+        shown = ", ".join(uuids[:_SHOWN]) + (", ..." if len(uuids) > _SHOWN else "")
+        yield Change(bump, f"{len(uuids)} {'episode' if len(uuids) == 1 else 'episodes'} {what}: {shown}")

@@ -1,0 +1,98 @@
+"""The files of a data set with size and sha256: `meta/manifest.json`."""
+
+import hashlib
+import json
+import os
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..exceptions import FileFormatError
+from .canonical import digest
+
+MANIFEST_FILE = "meta/manifest.json"
+_SCHEMA = "copolicy-manifest-1"
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """One file."""
+
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Files by their path below the folder, with forward slashes."""
+
+    files: dict[str, FileEntry]
+
+    @classmethod
+    def of_folder(cls, root: Path) -> "Manifest":
+        """Hashes the files of a folder, without the manifest itself and without what belongs to no data set.
+
+        Those are hidden files and folders (`.cache`, `.gitattributes`), and `images/`, where LeRobot keeps pictures
+        until they are encoded.
+        """
+        return cls({name: file_entry(root / name) for name in data_set_files(root)})
+
+    @classmethod
+    def read(cls, path: Path) -> "Manifest":
+        """Reads a manifest.
+
+        Raises:
+            FileFormatError: none there, or something else.
+        """
+        try:
+            fields = json.loads(path.read_text())
+            if fields["schema"] != _SCHEMA:
+                raise ValueError(f"schema {fields['schema']!r}")
+            return cls({name: FileEntry(entry["size"], entry["sha256"]) for name, entry in fields["files"].items()})
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise FileFormatError(path, f"a manifest ({_SCHEMA})", _reason(error)) from None
+
+    def to_text(self) -> str:
+        """The text of the file."""
+        files = {name: {"size": entry.size, "sha256": entry.sha256} for name, entry in sorted(self.files.items())}
+        return json.dumps({"schema": _SCHEMA, "files": files}, indent=2) + "\n"
+
+    def differences(self, other: "Manifest") -> list[str]:
+        """One line for each file that is not the same in both; `other` is what was found."""
+        lines = []
+        for name in sorted(self.files.keys() | other.files.keys()):
+            told, found = self.files.get(name), other.files.get(name)
+            if found is None:
+                lines.append(f"{name} is missing")
+            elif told is None:
+                lines.append(f"{name} is not in the manifest")
+            elif told != found:
+                lines.append(f"{name} has other content")
+        return lines
+
+    def digest(self, without: Collection[str] = ()) -> str:
+        """One sha256 over all entries but some."""
+        return digest({name: entry.sha256 for name, entry in self.files.items() if name not in without})
+
+
+def data_set_files(root: Path) -> list[str]:
+    """What `Manifest.of_folder` hashes, sorted."""
+    names = []
+    for folder, folders, files in os.walk(root):
+        inside = Path(folder).relative_to(root)
+        folders[:] = [name for name in folders if not name.startswith(".") and (inside / name) != Path("images")]
+        names += [(inside / name).as_posix() for name in files if not name.startswith(".")]
+    return sorted(name for name in names if name != MANIFEST_FILE)
+
+
+def file_entry(path: Path) -> FileEntry:
+    """Size and sha256 of a file, read once."""
+    with path.open("rb") as file:
+        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+        return FileEntry(file.tell(), sha256)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,104 @@
+"""Makes a release of a data set folder."""
+
+import datetime
+import os
+import secrets
+from pathlib import Path
+
+from ..exceptions import InvalidValueError, RunError
+from .changelog import CHANGELOG_FILE, with_release
+from .content import Content, read_content
+from .data_version import BUMPS, Bump, DataVersion
+from .difference import Change, compare
+from .manifest import MANIFEST_FILE, FileEntry, Manifest, file_entry
+from .release_record import EARLIER_FOLDER, RELEASE_FILE, ReleaseRecord, read_release
+
+
+def release(root: Path, bump: Bump, notes: str, date: datetime.date | None = None) -> ReleaseRecord:
+    """Gives the folder's present content the next version: change log, record, manifest.
+
+    The first release counts from 0.0.0. The record is put in place last: a release that breaks off before has not
+    happened, and running it again completes it.
+
+    Args:
+        date: of the release; today (UTC) by default.
+
+    Raises:
+        FileFormatError: no data set, or one that contradicts itself.
+        InvalidValueError: empty notes, or a bump smaller than what changed asks for.
+        RunError: nothing changed since the last release.
+    """
+    notes = notes.strip()
+    if not notes or any(line.startswith("## ") for line in notes.splitlines()):
+        raise InvalidValueError("--notes", "a text without headings of its own", notes)
+    content = read_content(root)
+    manifest = Manifest.of_folder(root)
+    files_sha256 = manifest.digest(without=_own_files(manifest))
+    last = read_release(root) if (root / RELEASE_FILE).exists() else None
+    changes = _changes(last, content, files_sha256)
+    if last is not None:
+        if not changes:
+            raise RunError(f"{root}: expected a change since release {last.version}, found none; nothing was written")
+        needed = max((change.bump for change in changes), key=BUMPS.index)
+        if BUMPS.index(bump) < BUMPS.index(needed):
+            reason = next(change.text for change in changes if change.bump == needed)
+            raise InvalidValueError("--bump", f"{needed} or larger ({reason})", bump)
+    version = str((last.data_version if last else DataVersion(0, 0, 0)).bumped(bump))
+    day = (date or datetime.datetime.now(datetime.UTC).date()).isoformat()
+    lines = [change.text for change in changes]
+    record = ReleaseRecord(version, day, notes, lines, content.hash, files_sha256, content)
+    _write(root, record, changes, last, manifest)
+    return record
+
+
+def _changes(last: ReleaseRecord | None, content: Content, files_sha256: str) -> tuple[Change, ...]:
+    if last is None:
+        frames = sum(episode.frames for episode in content.episodes)
+        return (Change("minor", f"{len(content.episodes)} episodes added, {frames} frames"),)
+    changes = compare(last.content, content).changes
+    if not changes and files_sha256 != last.files_sha256:
+        return (Change("patch", "files changed beside the content (card, statistics, figures or layout)"),)
+    return changes
+
+
+def _own_files(manifest: Manifest) -> set[str]:
+    """What a release writes; it changes by releasing."""
+    earlier = {name for name in manifest.files if name.startswith(EARLIER_FOLDER + "/")}
+    return {CHANGELOG_FILE, RELEASE_FILE, *earlier}
+
+
+def _write(
+    root: Path, record: ReleaseRecord, changes: tuple[Change, ...], last: ReleaseRecord | None, manifest: Manifest
+) -> None:
+    changelog = root / CHANGELOG_FILE
+    before = changelog.read_text() if changelog.exists() else ""
+    texts: dict[str, str] = {}
+    if last is not None:
+        texts[f"{EARLIER_FOLDER}/{last.version}.json"] = last.to_text()
+    texts[CHANGELOG_FILE] = with_release(
+        before, record.version, record.date, record.notes, changes, record.content_hash
+    )
+    texts[RELEASE_FILE] = record.to_text()
+    staged: dict[str, Path] = {}
+    entries: dict[str, FileEntry] = dict(manifest.files)
+    try:
+        for name, text in texts.items():
+            staged[name] = _stage(root / name, text)
+            entries[name] = file_entry(staged[name])
+        staged[MANIFEST_FILE] = _stage(root / MANIFEST_FILE, Manifest(entries).to_text())
+        for name in sorted(staged, key=lambda name: name == RELEASE_FILE):
+            os.replace(staged[name], root / name)
+    finally:
+        for path in staged.values():
+            path.unlink(missing_ok=True)
+
+
+def _stage(path: Path, text: str) -> Path:
+    """A hidden file beside `path`, on disk before anything is renamed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
+    with partial.open("w") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    return partial

@@ -1,0 +1,100 @@
+"""The record of a release, `meta/copolicy_release.json`: its version and everything to compare a later state with."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from ..exceptions import FileFormatError, UnknownNameError
+from .content import Content
+from .data_version import DataVersion
+
+RELEASE_FILE = "meta/copolicy_release.json"
+"""The newest release."""
+
+EARLIER_FOLDER = "meta/copolicy_releases"
+"""The records of the releases before it, `x.y.z.json`."""
+
+_SCHEMA = "copolicy-release-1"
+
+
+@dataclass(frozen=True)
+class ReleaseRecord:
+    """One release.
+
+    Attributes:
+        date: UTC, `YYYY-MM-DD`.
+        changes: what changed since the release before, a line each.
+        files_sha256: digest of all other files, which tells that a card or the layout changed.
+        content: digests of each episode, feature and episode column.
+    """
+
+    version: str
+    date: str
+    notes: str
+    changes: list[str]
+    content_hash: str
+    files_sha256: str
+    content: Content
+
+    @property
+    def data_version(self) -> DataVersion:
+        return DataVersion.parse(self.version)
+
+    def to_text(self) -> str:
+        """The text of the file."""
+        fields = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
+        return json.dumps(fields, indent=1) + "\n"
+
+    @classmethod
+    def read(cls, path: Path) -> "ReleaseRecord":
+        """Reads a record.
+
+        Raises:
+            FileFormatError: none there, or something else.
+        """
+        try:
+            return cls.from_text(path.read_text())
+        except OSError as error:
+            raise FileFormatError(path, f"the record of a release ({_SCHEMA})", error.strerror or str(error)) from None
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            found = f"{type(error).__name__}: {error}"
+            raise FileFormatError(path, f"the record of a release ({_SCHEMA})", found) from None
+
+    @classmethod
+    def from_text(cls, text: str) -> "ReleaseRecord":
+        """The inverse of `to_text`.
+
+        Raises:
+            ValueError, KeyError, TypeError: something else.
+        """
+        fields = json.loads(text)
+        if fields.pop("schema") != _SCHEMA:
+            raise ValueError("another schema")
+        fields.pop("tag")
+        record = cls(**{**fields, "content": Content.from_json(fields["content"])})
+        if record.content.hash != record.content_hash:
+            raise ValueError("a content hash that is not that of the episodes listed")
+        return record
+
+
+def read_release(root: Path, version: str | None = None) -> ReleaseRecord:
+    """The record of the newest release in a folder, or of an earlier one.
+
+    Raises:
+        FileFormatError: no release there, or a damaged record.
+        InvalidValueError: `version` is none.
+        UnknownNameError: that version was never released here.
+    """
+    if not (root / RELEASE_FILE).exists():
+        raise FileFormatError(root, f"a release ({RELEASE_FILE}); make one with copolicy-dataset release", "none")
+    newest = ReleaseRecord.read(root / RELEASE_FILE)
+    if version is None:
+        return newest
+    wanted = str(DataVersion.parse(version))
+    if wanted == newest.version:
+        return newest
+    path = root / EARLIER_FOLDER / f"{wanted}.json"
+    if not path.exists():
+        earlier = [file.stem for file in (root / EARLIER_FOLDER).glob("*.json")]
+        raise UnknownNameError(f"release of {root}", wanted, [newest.version, *earlier])
+    return ReleaseRecord.read(path)
