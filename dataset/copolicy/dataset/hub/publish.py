@@ -1,0 +1,193 @@
+"""Publishes a released data set: one commit, then its tags.
+
+The data tag is set last, so that its being there says that a publication is complete. Whatever breaks off before can
+be run again: files that arrived are not sent twice, a commit that arrived is found by its manifest, and what is
+missing is done.
+"""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from huggingface_hub import CommitOperationAdd, CommitOperationDelete
+
+from ..exceptions import FileFormatError, OutputExistsError, RunError
+from ..versions.content import read_content
+from ..versions.data_version import newest
+from ..versions.manifest import MANIFEST_FILE, Manifest
+from ..versions.release_record import RELEASE_FILE, ReleaseRecord, read_release
+from .client import HfApi, hub_api, hub_errors
+from .raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings
+from .repository import BRANCH, Repository, read_file, read_repository, require_repo_id
+
+_CHECKED = ("data/", "meta/", "videos/")
+CARD_FILE = "README.md"
+
+
+@dataclass(frozen=True)
+class Published:
+    """What stands on the Hub now.
+
+    Attributes:
+        committed: False where an earlier call that broke off had committed already.
+    """
+
+    repo_id: str
+    tag: str
+    commit: str
+    content_hash: str
+    files: int
+    committed: bool
+    recordings_left_out: list[str]
+
+
+def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = None) -> Published:
+    """Uploads the folder's newest release and tags it.
+
+    The caller sees to it that the data set's checks pass.
+
+    Args:
+        private: of a repository that does not exist yet; one that is there must be private already.
+        raw: folder of the recordings that the episodes were made from, to go up as `raw/`.
+
+    Raises:
+        FileFormatError: no release, no card, or a folder that is no data set.
+        RunError: the folder is not what was released; this version, or a newer one, is on the Hub.
+        HubError: the Hub did not do what was asked.
+    """
+    require_repo_id(repo_id)
+    record, manifest = verify_release(root)
+    recordings = _recordings(root, raw)
+    codebase_tag = json.loads((root / "meta" / "info.json").read_text())["codebase_version"]
+    api = hub_api()
+    repository = read_repository(api, repo_id)
+    if repository is None:
+        with hub_errors(repo_id, "creating the repository"):
+            api.create_repo(repo_id, repo_type="dataset", private=private, exist_ok=True)
+        repository = read_repository(api, repo_id)
+        if repository is None:
+            raise RunError(f"{repo_id}: expected the repository just created, found none")
+    if private and not repository.private:
+        raise RunError(f"{repo_id}: expected a private repository, found a public one; nothing was uploaded")
+    _refuse_published(api, repository, record)
+    commit = _committed(api, repository, manifest, recordings)
+    committed = commit is None
+    if commit is None:
+        commit = _commit(api, repository, root, record, manifest, recordings)
+    with hub_errors(repo_id, f"setting the tags {codebase_tag} and {record.data_version.tag}"):
+        _move_tag(api, repository, codebase_tag, commit)
+        api.create_tag(repo_id, tag=record.data_version.tag, revision=commit, repo_type="dataset")
+    files = len(manifest.files) + 1 + (len(recordings.files) + 1 if recordings else 0)
+    left_out = recordings.left_out if recordings else []
+    return Published(repo_id, record.data_version.tag, commit, record.content_hash, files, committed, left_out)
+
+
+def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
+    """Checks that the folder holds what its newest release says, and brings the manifest up to date with the card.
+
+    Card, figures and report may be made anew after a release, so that they can name its version; data and metadata
+    may not change.
+
+    Raises:
+        FileFormatError: no release, no card, a damaged manifest, or a folder that is no data set.
+        RunError: data or metadata changed since the release.
+    """
+    record = read_release(root)
+    if not (root / CARD_FILE).is_file():
+        raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", "none")
+    told, found = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
+    differences = told.differences(found)
+    changed = [line for line in differences if line.startswith(_CHECKED)]
+    content_hash = read_content(root).hash
+    if content_hash != record.content_hash or changed:
+        reason = changed[0] if changed else f"content hash {content_hash}"
+        raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
+    if differences:
+        partial = root / "meta" / ".manifest.json.part"
+        partial.write_text(found.to_text())
+        os.replace(partial, root / MANIFEST_FILE)
+    return record, found
+
+
+def _recordings(root: Path, raw: Path | None) -> RawRecordings | None:
+    if raw is None:
+        return None
+    if (root / RAW_FOLDER).exists():
+        raise OutputExistsError(root / RAW_FOLDER)
+    return find_raw_recordings(root, raw)
+
+
+def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:
+    tag = record.data_version.tag
+    if tag in repository.tags:
+        text = read_file(api, repository.repo_id, repository.tags[tag], RELEASE_FILE)
+        there = json.loads(text).get("content_hash") if text else None
+        what = "this content" if there == record.content_hash else f"other content ({there})"
+        raise RunError(f"{repository.repo_id}: {tag} is on the Hub already, with {what}; nothing was uploaded")
+    latest = newest(list(repository.tags))
+    if latest is not None and latest > record.data_version:
+        raise RunError(
+            f"{repository.repo_id}: expected a release after {latest.tag}, which is on the Hub, found {tag}; "
+            "nothing was uploaded"
+        )
+
+
+def _committed(
+    api: HfApi, repository: Repository, manifest: Manifest, recordings: RawRecordings | None
+) -> str | None:
+    """The head, where it holds exactly what would be committed."""
+    wanted = {MANIFEST_FILE: manifest}
+    if recordings is not None:
+        wanted[RAW_MANIFEST_FILE] = recordings.manifest
+    for name, expected in wanted.items():
+        if read_file(api, repository.repo_id, repository.head, name) != expected.to_text().encode():
+            return None
+    return repository.head
+
+
+def _commit(
+    api: HfApi,
+    repository: Repository,
+    root: Path,
+    record: ReleaseRecord,
+    manifest: Manifest,
+    recordings: RawRecordings | None,
+) -> str:
+    sources: dict[str, Path | bytes] = {name: root / name for name in manifest.files}
+    sources[MANIFEST_FILE] = manifest.to_text().encode()
+    if recordings is not None:
+        sources.update(recordings.files)
+        sources[RAW_MANIFEST_FILE] = recordings.manifest.to_text().encode()
+    with hub_errors(repository.repo_id, "uploading"):
+        there = api.list_repo_files(repository.repo_id, repo_type="dataset", revision=repository.head)
+        # Recordings stay when a later release comes without them; only who has them can put them back.
+        stale = [
+            name
+            for name in there
+            if name not in sources
+            and not name.startswith(".")
+            and (recordings is not None or not name.startswith(RAW_FOLDER + "/"))
+        ]
+        commit = api.create_commit(
+            repository.repo_id,
+            [
+                *(CommitOperationDelete(name) for name in stale),
+                *(CommitOperationAdd(name, source) for name, source in sources.items()),
+            ],
+            commit_message=record.data_version.tag,
+            commit_description=f"{record.notes}\n\nContent hash: {record.content_hash}",
+            repo_type="dataset",
+            revision=BRANCH,
+            parent_commit=repository.head,
+        )
+    return commit.oid
+
+
+def _move_tag(api: HfApi, repository: Repository, tag: str, commit: str) -> None:
+    """LeRobot loads what its format's tag names; the Hub moves no tag, so it is set anew."""
+    if repository.tags.get(tag) == commit:
+        return
+    if tag in repository.tags:
+        api.delete_tag(repository.repo_id, tag=tag, repo_type="dataset")
+    api.create_tag(repository.repo_id, tag=tag, revision=commit, repo_type="dataset")

@@ -1,0 +1,60 @@
+"""Brings a published data set back from the Hub and proves that it is what was released."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..exceptions import FileFormatError, OutputExistsError, RunError
+from ..versions.content import read_content
+from ..versions.manifest import MANIFEST_FILE, Manifest
+from ..versions.release_record import ReleaseRecord, read_release
+from .download import download, forget_progress, resolve
+from .raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
+
+
+@dataclass(frozen=True)
+class Pulled:
+    """What was downloaded and verified."""
+
+    root: str
+    repo_id: str
+    revision: str
+    commit: str
+    version: str
+    content_hash: str
+    files: int
+
+
+def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> Pulled:
+    """Downloads a data version to `root`, which appears complete and verified or not at all.
+
+    A download that breaks off leaves its files in a hidden folder beside `root`, and the next call goes on with them.
+
+    Args:
+        revision: a tag, branch or commit; the newest `data-x.y.z` by default.
+        raw: with the recordings under `raw/`, where there are some.
+
+    Raises:
+        OutputExistsError: there is something at `root`.
+        HubError: the Hub does not answer, or has no such data set or revision.
+        RunError: what arrived is not what its manifest and its release say.
+    """
+    if root.exists() or root.is_symlink():
+        raise OutputExistsError(root)
+    revision, commit = resolve(repo_id, revision)
+    partial = root.parent / f".{root.name}.{commit[:12]}.partial"
+    everything = [MANIFEST_FILE, "*"]
+    download(repo_id, revision, partial, everything if raw else _without_raw(repo_id, commit), commit)
+    try:
+        forget_progress(partial)
+        (partial / ".gitattributes").unlink(missing_ok=True)
+        record, files = _verify(partial, f"{repo_id}@{revision}", raw)
+        if revision.startswith("data-") and revision != record.data_version.tag:
+            raise RunError(f"{repo_id}@{revision}: expected release {revision}, found {record.data_version.tag}")
+        if root.exists():
+            raise OutputExistsError(root)
+        partial.rename(root)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+    return Pulled(str(root), repo_id, revision, commit, record.version, record.content_hash, files)

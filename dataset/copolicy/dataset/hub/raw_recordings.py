@@ -1,0 +1,60 @@
+"""Which raw recordings go up with a data set: those that its episodes were made from, and no other."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..exceptions import FileFormatError, RunError
+from ..versions import parquet
+from ..versions.manifest import FileEntry, Manifest, file_entry
+
+RAW_FOLDER = "raw"
+RAW_MANIFEST_FILE = f"{RAW_FOLDER}/manifest.json"
+
+
+@dataclass(frozen=True)
+class RawRecordings:
+    """Recordings by their path in the repository.
+
+    Attributes:
+        left_out: names of recordings that no episode was made from (discarded, withdrawn, another session).
+    """
+
+    files: dict[str, Path]
+    manifest: Manifest
+    left_out: list[str]
+
+
+def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
+    """The recordings in `folder` of the episodes in the data set at `root`, matched by their sha256.
+
+    Raises:
+        FileFormatError: no recording in `folder`.
+        RunError: an episode's recording is not among them.
+    """
+    paths = sorted(folder.rglob("*.mcap"))
+    if not paths:
+        raise FileFormatError(folder, "recordings (*.mcap)", "none")
+    wanted = {
+        row["source_sha256"]: row["episode_uuid"]
+        for path in parquet.files_under(root, "meta/episodes")
+        for row in parquet.read_rows(path, ["episode_uuid", "source_sha256"])
+    }
+    files: dict[str, Path] = {}
+    entries: dict[str, FileEntry] = {}
+    left_out = []
+    found = set()
+    for path in paths:
+        entry = file_entry(path)
+        if entry.sha256 in wanted and entry.sha256 not in found:
+            name = f"{RAW_FOLDER}/{path.relative_to(folder).as_posix()}"
+            files[name], entries[name] = path, entry
+            found.add(entry.sha256)
+        else:
+            left_out.append(path.name)
+    missing = [uuid for sha256, uuid in wanted.items() if sha256 not in found]
+    if missing:
+        raise RunError(
+            f"{folder}: expected the recording of every episode, "
+            f"found none of {len(missing)}, first of episode {missing[0]}"
+        )
+    return RawRecordings(files, Manifest(entries), left_out)

@@ -1,0 +1,72 @@
+"""What the Hub holds of one data set repository: its head and its tags."""
+
+import re
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from huggingface_hub.errors import RemoteEntryNotFoundError, RepositoryNotFoundError
+
+from ..exceptions import InvalidValueError
+from .client import HfApi, hub_errors
+
+BRANCH = "main"
+
+
+@dataclass(frozen=True)
+class Repository:
+    """A data set repository as it was when asked.
+
+    Attributes:
+        head: commit of `main`.
+        tags: commit of each tag.
+    """
+
+    repo_id: str
+    private: bool
+    head: str
+    tags: dict[str, str]
+
+
+def require_repo_id(repo_id: str) -> None:
+    """Checks a name before anything is asked of the Hub.
+
+    Raises:
+        InvalidValueError: not `user/name`.
+    """
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo_id):
+        raise InvalidValueError("repo id", "user/name in letters, digits, '-', '_' and '.'", repo_id)
+
+
+def read_repository(api: HfApi, repo_id: str) -> Repository | None:
+    """Head and tags, or `None` where the Hub has no such data set that the token may see.
+
+    Raises:
+        HubError: the Hub does not answer, or does not accept the token.
+    """
+    with hub_errors(repo_id, "asking the Hub"):
+        try:
+            info = api.dataset_info(repo_id)
+            refs = api.list_repo_refs(repo_id, repo_type="dataset")
+        except RepositoryNotFoundError as error:
+            if error.response.status_code == 404:
+                return None
+            raise
+    heads = {ref.name: ref.target_commit for ref in refs.branches}
+    return Repository(
+        repo_id, bool(info.private), heads.get(BRANCH, info.sha or ""), {ref.name: ref.target_commit for ref in refs.tags}
+    )
+
+
+def read_file(api: HfApi, repo_id: str, commit: str, path: str) -> bytes | None:
+    """A small file at a commit, or `None` where it holds none.
+
+    Raises:
+        HubError: the Hub does not answer.
+    """
+    with hub_errors(repo_id, f"reading {path}"), tempfile.TemporaryDirectory() as folder:
+        try:
+            local = api.hf_hub_download(repo_id, path, repo_type="dataset", revision=commit, local_dir=folder)
+        except RemoteEntryNotFoundError:
+            return None
+        return Path(local).read_bytes()
