@@ -1,3 +1,4 @@
+import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -57,6 +58,82 @@ def test_a_card_states_what_the_metadata_holds(dataset):
     assert "| `observation.human_action` | float32 | 2 | human_fx, human_fy |" in text
 
 
+def test_a_card_is_a_datasheet_with_figures(dataset):
+    assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
+    text = (dataset / "README.md").read_text()
+    headings = [line[3:] for line in text.splitlines() if line.startswith("## ")]
+    assert headings[4:] == [
+        "Motivation", "Composition", "Collection: who played, and how it was recorded", "Preprocessing", "Uses",
+        "Distribution and licence", "Maintenance", "Consent and withdrawal", "Citation",
+    ]  # fmt: skip
+    assert "No episode is marked as played by people, so there is no consent to state." in text
+    assert "- Converted by `copolicy-convert upstream` " in text
+    assert "- The action of a frame is the mean of the recorded actions until the next frame" in text
+    assert "eprint  = {2305.12171}" in text
+    for name in ("trajectories", "routes"):
+        assert f"](figures/{name}.png)" in text
+        assert (dataset / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert len(list((dataset / "figures").iterdir())) == 2
+
+
+def test_figures_can_be_left_out(dataset):
+    assert main(["dataset", str(dataset), "--no-figures"]) == 0
+    assert "](figures/" not in (dataset / "README.md").read_text()
+    assert not (dataset / "figures").exists()
+
+
+def test_statistics_come_with_their_interval_and_their_null(dataset):
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "Not computed: `copolicy-dataset stats` was not run on this data set." in text
+    stored = {
+        "version": 1,
+        "statistics": {
+            "route_entropy": {
+                "one obstacle": {
+                    "value": 0.98765, "unit": "bits", "interval": [0.8, 1], "episodes": 6, "definition": "of | routes",
+                    "null": {"mean": 0.1, "low": 0.0, "high": 0.25, "p": 0.01}, "details": {"value": 1, "unit": "no"},
+                },
+                "two": {"value": None, "unit": "bits", "interval": None, "episodes": 0, "note": "too few",
+                        "definition": "of routes"},
+            }
+        },
+    }  # fmt: skip
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(stored))
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "| route entropy: one obstacle | 0.9877 | bits | 0.8 to 1 | 0.1 (0 to 0.25) | 6 |" in text
+    assert "| route entropy: two | - | bits | - | - | 0 |" in text
+    assert "- **route entropy: two**: of routes (too few)" in text
+    (dataset / "meta" / "copolicy_stats.json").write_text("{")
+    with pytest.raises(FileFormatError, match=r"copolicy_stats.json: expected JSON, found"):
+        render(DatasetFacts.read(dataset), "lab/table")
+
+
+def test_a_release_is_named(dataset):
+    release = {"version": "1.2.0", "date": "2026-01-02", "content_hash": "abc"}
+    (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release))
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert 'LeRobotDataset("lab/table", revision="data-1.2.0")' in text
+    assert "- Version 1.2.0 of 2026-01-02; changes are in `CHANGELOG.md`." in text
+
+
+def test_croissant_names_every_file_and_field(dataset):
+    assert main(["dataset", str(dataset), "--repo-id", "lab/table", "--croissant", "--no-figures"]) == 0
+    metadata = json.loads((dataset / "meta" / "croissant.json").read_text())
+    assert (metadata["@type"], metadata["conformsTo"]) == ("sc:Dataset", "http://mlcommons.org/croissant/1.0")
+    assert metadata["license"] == "cc-by-4.0"
+    files = [entry for entry in metadata["distribution"] if entry["@type"] == "cr:FileObject"]
+    assert files
+    for entry in files:
+        content = (dataset / entry["contentUrl"]).read_bytes()
+        assert entry["sha256"] == hashlib.sha256(content).hexdigest()
+    (records,) = metadata["recordSet"]
+    info = json.loads((dataset / "meta" / "info.json").read_text())
+    assert [field["source"]["extract"]["column"] for field in records["field"]] == list(info["features"])
+    repeated = {field["name"] for field in records["field"] if field.get("repeated")}
+    assert "frames/action" in repeated
+    assert "frames/timestamp" not in repeated
+
+
 def test_simulated_episodes_are_called_that(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
     text = render(DatasetFacts.read(dataset), "lab/table")
@@ -68,7 +145,7 @@ def test_a_mixture_names_each_source(dataset):
     _set_column(dataset, "source", ["simulated"] * 2 + ["human"] * 4)
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "human (4), simulated (2)" in text
-    assert "Consent: 0 of 6 (0.0 %) episodes name a consent record" in text
+    assert "Consent: 0 of 4 (0.0 %) episodes played by people name a consent record" in text
 
 
 @pytest.mark.parametrize(

@@ -370,5 +370,6 @@ def test_metadata_of_the_source_stays_in_order(tmp_path, whole):
     with (tmp_path / "episode.recovered.mcap").open("rb") as file:
         names = [record.name for record in StreamReader(file).records if isinstance(record, Metadata)]
     assert names == [
-        "session", "episode", "players", "devices", "software", "consent", "physics", "dataset_info", "episode_result", "recovery",
+        "session", "episode", "players", "devices", "software", "consent", "physics", "dataset_info",
+        "episode_result", "recovery",
     ]  # fmt: skip

@@ -28,3 +28,30 @@ def read_json(path: Path) -> dict[str, Any] | None:
     if not isinstance(value, dict):
         raise FileFormatError(path, "a JSON object", type(value).__name__)
     return value
+
+
+RELEASE_FILE = Path("meta/copolicy_release.json")
+"""The newest release, made by `copolicy-dataset release`."""
+
+EXCLUSIONS_FILE = Path("meta/copolicy_exclusions.json")
+"""Episodes that people took out, made by `copolicy-dataset exclude`."""
+
+CONVERSION_FILE = Path("meta/copolicy.json")
+"""How the data set was converted, made by `copolicy-convert`."""
+
+
+def estimates(node: Any, path: tuple[str, ...] = ()) -> list[dict[str, Any]]:
+    """The statistics in a JSON tree: every object with a value and a unit, named by where it lies.
+
+    What an estimate is made of (`details`) is left out.
+    """
+    if not isinstance(node, dict):
+        return []
+    if "value" in node and "unit" in node:
+        entry = {key: value for key, value in node.items() if key != "details"}
+        return [{"name": ": ".join(path).replace("_", " "), **entry}]
+    return [
+        entry
+        for key, child in node.items()
+        for entry in estimates(child, path if key == "statistics" else (*path, str(key)))
+    ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
         indices = table["episode_index"].to_numpy()
         columns = {key: _matrix(table, key) for key in (STATE, ENVIRONMENT_STATE, ACTION)}
         cuts = [0, *(np.flatnonzero(np.diff(indices)) + 1), len(indices)] if len(indices) else []
-        for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+        for start, end in pairwise(cuts):
             episode = next(expected, None)
             found = (int(indices[start]), int(end - start))
             if episode is None or found != (episode["episode_index"], episode["length"]):

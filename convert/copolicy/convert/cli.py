@@ -1,4 +1,4 @@
-"""`copolicy-convert`: recordings, and files of the original program, to LeRobot v3 data sets."""
+"""`copolicy-convert`: recordings, and files of the original program, to LeRobot v3 data sets, and these to others."""
 
 import argparse
 import re
@@ -10,10 +10,13 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import InvalidValueError
 
+from .export.command import add_export_command
 from .prepare import Conversion
 from .recordings import convert_recordings
 from .upstream import convert_upstream
 from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
+
+_DEFAULT_FPS = 10
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,13 +25,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser, commands = command_parser("copolicy-convert", "Make LeRobot v3 data sets.")
+    parser, commands = command_parser("copolicy-convert", "Make LeRobot v3 data sets, and export them.")
     mcap = add_command(
         commands, "mcap", _mcap, "convert recordings, one MCAP file an episode, to a LeRobot v3 data set",
         "copolicy-convert mcap recordings --root datasets/table --repo-id me/table",
     )  # fmt: skip
     mcap.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="folders of recordings, or single files")
     _add_output_flags(mcap)
+    mcap.add_argument(
+        "--append", action="store_true",
+        help="add what is new to the data set at OUT, at its rate and hold, without rewriting its files",
+    )  # fmt: skip
     mcap.add_argument("--keep-discarded", action="store_true", help="keep episodes that the operator discarded")
     mcap.add_argument("--no-drift", action="store_true", help="leave out the re-simulation (replay_drift_px)")
     mcap.add_argument(
@@ -50,13 +57,14 @@ def _parser() -> argparse.ArgumentParser:
         "--obstacle-size", type=int, default=50, metavar="PX",
         help="side of the obstacles, which the files do not tell (default: %(default)s, as in the training maps)",
     )  # fmt: skip
+    add_export_command(commands)
     return parser
 
 
 def _add_output_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must not exist")
+    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must be new")
     parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
-    parser.add_argument("--fps", type=int, default=10, help="frames a second, a divisor of 30 (default: %(default)s)")
+    parser.add_argument("--fps", type=int, help=f"frames a second, a divisor of 30 (default: {_DEFAULT_FPS})")
     parser.add_argument(
         "--hold", choices=get_args(Hold), default=None,
         help="a frame's action: the mean of its steps or the first (default: mean; first for a zarr store)",
@@ -68,14 +76,21 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def _mcap(arguments: argparse.Namespace) -> dict:
+    fps, hold = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.hold or "mean"
+    convert = convert_recordings
+    if arguments.append:
+        from .append import append_recordings, stored_clock
+
+        fps, hold = stored_clock(arguments.root, arguments.fps, arguments.hold)
+        convert = append_recordings
     conversion = Conversion(
-        arguments.fps,
-        arguments.hold or "mean",
+        fps,
+        hold,
         arguments.license,
         keep_discarded=arguments.keep_discarded,
         drift=not arguments.no_drift,
     )
-    return convert_recordings(
+    return convert(
         arguments.folders,
         arguments.root,
         _repo_id(arguments.repo_id),
@@ -90,7 +105,7 @@ def _upstream(arguments: argparse.Namespace) -> dict:
         arguments.path,
         arguments.root,
         _repo_id(arguments.repo_id),
-        arguments.fps,
+        _DEFAULT_FPS if arguments.fps is None else arguments.fps,
         arguments.hold,
         UpstreamOptions(arguments.angular_limit, arguments.obstacle_size),
         arguments.license,

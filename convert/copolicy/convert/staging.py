@@ -1,4 +1,4 @@
-"""A folder that appears complete or not at all."""
+"""A folder or file that appears complete or not at all."""
 
 import os
 import secrets
@@ -37,3 +37,17 @@ def new_folder(path: Path) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """The same for one file."""
+    require_new(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
+    try:
+        yield partial
+        require_new(path)
+        partial.rename(path)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -149,5 +149,5 @@ def build_episode(
     )
     limit = next(name for name, value in ANGULAR_LIMITS.items() if value == physics.angular_acceleration_limit)
     notes = (f"from {origin}, angular limit {limit}", *notes)
-    episode = Episode(states, trajectory.actions, final_state, meta, config, fps, notes)
+    episode = Episode(states, trajectory.actions, final_state, meta, config, fps, physics, notes)
     return replace(episode, meta=replace(meta, replay_drift_px=replay_drift(episode, physics)))

@@ -98,9 +98,10 @@ def _undo(obs: np.ndarray, actions: np.ndarray, past: np.ndarray, physics: Physi
     arc = earlier - theta[:-1] - (earlier_spins + omega[:-1]) * physics.dt / 2
     arc = np.abs((arc + np.pi) % (2 * np.pi) - np.pi)
     too_fast = np.abs(earlier_spins - omega[:-1]) > physics.angular_acceleration_limit * physics.dt + 1e-6
-    arc = np.where(np.isnan(arc) | too_fast, np.inf, arc)
+    # Where none follows, as where a stored action before is not the true one, any that exists is taken.
+    arc = np.where(np.isnan(arc) | too_fast, np.pi, arc)
     errors[:, 1:] = arc.min(axis=0)
-    errors = np.where(np.isnan(errors), np.inf, errors)
+    errors = np.where(np.isnan(angles), np.inf, errors)
     chosen = errors.argmin(axis=0)
     column = np.arange(len(obs))
     states = np.column_stack((position, angles[chosen, column] % (2 * np.pi), velocity, spins[chosen, column]))

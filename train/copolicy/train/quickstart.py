@@ -171,8 +171,8 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
         "where it is": where,
         "what to type next": {
             "a longer training": f"{prefix}copolicy-train --policy.type=copolicy --policy.preset=small "
-            f"--policy.device=cpu --dataset.repo_id={REPO_ID} --dataset.root={out / 'dataset'} --output_dir={out / 'longer'} "
-            f"--batch_size=512 --steps={3 * arguments.steps}",
+            f"--policy.device=cpu --dataset.repo_id={REPO_ID} --dataset.root={out / 'dataset'} "
+            f"--output_dir={out / 'longer'} --batch_size=512 --steps={3 * arguments.steps}",
             "other maps": f"{prefix}copolicy-eval coplan --policy {training} --maps unseen --orientations "
             f"--out {out / 'eval' / 'orientations.json'}",
             "LeRobot's own evaluation": f"{prefix}lerobot-eval --policy.path={training} --policy.device=cpu "

@@ -4,6 +4,9 @@ import argparse
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
+from copolicy.dataset.exceptions import FileFormatError
+
+from ..artefacts import CHECK_FILE, STATISTICS_FILE, read_json
 
 REPORT_NAME = "report.html"
 
@@ -20,6 +23,9 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
     report.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     report.add_argument("--out", type=Path, help=f"the page (default: {REPORT_NAME} in the data set's folder)")
     report.add_argument("--title", help="heading of the page (default: the folder's name)")
+    report.add_argument(
+        "--findings", type=Path, help=f"output of `copolicy-dataset check --json` (default: {CHECK_FILE}, if there)"
+    )
     report.add_argument("--overwrite", action="store_true", help="replace an existing page")
 
 
@@ -32,7 +38,11 @@ def _report(arguments: argparse.Namespace) -> dict:
     path = arguments.out or arguments.root / REPORT_NAME
     facts = DatasetFacts.read(arguments.root)
     require_new(path, arguments.overwrite)
-    payload = build_payload(facts, arguments.title or arguments.root.resolve().name)
+    findings = read_json(arguments.findings or arguments.root / CHECK_FILE)
+    if findings is None and arguments.findings is not None:
+        raise FileFormatError(arguments.findings, "a file with the output of `copolicy-dataset check --json`", "none")
+    statistics = read_json(arguments.root / STATISTICS_FILE)
+    payload = build_payload(facts, arguments.title or arguments.root.resolve().name, findings, statistics)
     text = render_page(payload)
     write_whole(path, text)
     return {

@@ -7,9 +7,10 @@ const HEIGHT = data.window[1];
 const FRAME_SECONDS = data.frame_step / data.fps;
 
 const frameValues = decodeFrames(data.frames);
+const sizes = new Set(data.episodes.map((row) => row.map.size));
 const episodes = data.episodes.map((row) => ({
   ...row,
-  layout: layoutName(row.map.obstacles, row.map.size),
+  layout: layoutName(row.map),
   outcome: row.success ? "reached the goal" : "did not",
 }));
 
@@ -30,9 +31,11 @@ function column(episode, name) {
   return values;
 }
 
-function layoutName(obstacles, size) {
+function layoutName({ obstacles, size }) {
   if (!obstacles.length) return "no obstacle";
-  return `${obstacles.map(([x, y]) => `(${x.toFixed(0)}, ${y.toFixed(0)})`).join(" ")} · ${size} px`;
+  const places = obstacles.map(([x, y]) => `(${x.toFixed(0)}, ${y.toFixed(0)})`).join(" ");
+  const wide = sizes.size > 1 ? ` of ${size} px` : "";
+  return `${obstacles.length} obstacle${obstacles.length > 1 ? "s" : ""}${wide} at ${places}`;
 }
 
 /** Members of a list by the value of a function, in order of appearance. */

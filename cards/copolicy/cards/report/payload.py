@@ -10,7 +10,7 @@ import numpy as np
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.task import GOAL_SIZE, RECORD_HZ, WINDOW
 
-from ..artefacts import CHECK_FILE, STATISTICS_FILE, read_json
+from ..artefacts import estimates
 from ..facts import DatasetFacts
 from ..frames import EpisodeFrames, read_frames
 
@@ -26,11 +26,21 @@ FRAME_BYTES = 6_000_000
 _COLUMNS = (*EPISODE_COLUMNS, "episode_index", "length")
 
 
-def build_payload(facts: DatasetFacts, title: str, frame_bytes: int = FRAME_BYTES) -> dict[str, Any]:
+def build_payload(
+    facts: DatasetFacts,
+    title: str,
+    findings: dict[str, Any] | None = None,
+    statistics: dict[str, Any] | None = None,
+    frame_bytes: int = FRAME_BYTES,
+) -> dict[str, Any]:
     """Everything that the page shows, JSON-able: numbers that are not finite become null.
 
+    Args:
+        findings: what `copolicy-dataset check --json` printed, None where it was not run.
+        statistics: what `copolicy-dataset stats` stored, None where it was not run.
+
     Raises:
-        FileFormatError: frames, findings or statistics cannot be read.
+        FileFormatError: the frames cannot be read.
     """
     step = max(1, math.ceil(facts.info["total_frames"] * 2 * len(FRAME_SCALES) / frame_bytes))
     blocks: list[np.ndarray] = []
@@ -69,8 +79,8 @@ def build_payload(facts: DatasetFacts, title: str, frame_bytes: int = FRAME_BYTE
         "scales": FRAME_SCALES,
         "episodes": rows,
         "frames": base64.b64encode(np.concatenate(blocks).astype("<i2").tobytes()).decode(),
-        "check": read_json(facts.root / CHECK_FILE),
-        "statistics": read_json(facts.root / STATISTICS_FILE),
+        "check": findings,
+        "statistics": None if statistics is None else estimates(statistics),
     }
 
 

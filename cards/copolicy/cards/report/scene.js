@@ -7,16 +7,25 @@ const DISC = [-78, 0, 17.5]; // human seat
 const GRIPS = [[75.5, 6], [-78, 0]]; // where the robot and the human seat hold
 const ARROW = 95; // px of a full force
 
-/** Obstacles, goal and start; lengths in px of the window. */
-function drawMap(context, map, thin = 1) {
+/** Goal, obstacles and start; lengths in px of the window. */
+function drawMap(context, map) {
+  drawGoal(context, map);
+  drawObstacles(context, map);
+  drawStart(context, map);
+}
+
+function drawGoal(context, map) {
   const side = data.goal_size;
   context.fillStyle = `${GOAL_COLOUR}44`;
   context.strokeStyle = GOAL_COLOUR;
-  context.lineWidth = 3 * thin;
+  context.lineWidth = 3;
   context.fillRect(map.goal[0] - side / 2, map.goal[1] - side / 2, side, side);
   context.strokeRect(map.goal[0] - side / 2, map.goal[1] - side / 2, side, side);
-  drawObstacles(context, map);
+}
+
+function drawStart(context, map) {
   context.strokeStyle = colour("--muted");
+  context.lineWidth = 3;
   context.beginPath();
   context.arc(map.start[0], map.start[1], 10, 0, 2 * Math.PI);
   context.stroke();

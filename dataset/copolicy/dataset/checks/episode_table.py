@@ -8,6 +8,9 @@ import numpy as np
 
 from .finding import Finding
 
+COLUMN_TYPES: dict[str, type] = {"str": str, "float": float, "int": np.int64, "bool": bool}
+"""How the kinds of episode columns are held in arrays."""
+
 
 @dataclass(frozen=True, repr=False)
 class EpisodeTable:

@@ -38,4 +38,4 @@ class Finding:
 
 
 def _text(value: Figure) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value).strip() or "nothing"

@@ -15,7 +15,9 @@ class Limit:
 LIMITS: dict[str, Limit] = {
     "timestamp": Limit(1e-4, "s", "LeRobot's own tolerance between a timestamp and its frame"),
     "duration": Limit(1.0, "frames", "the last frame may hold fewer steps than the others"),
-    "jump": Limit(52.0, "px/s", "terminal speed of an axis under two full forces is 50 px/s; 4 % for other integrators"),
+    "jump": Limit(
+        52.0, "px/s", "terminal speed of an axis under two full forces is 50 px/s; 4 % for other integrators"
+    ),
     "late_ticks.warning": Limit(0.01, "share", "the 99th percentile of the periods should be on time"),
     "late_ticks.error": Limit(0.10, "share", "every tenth action was given to a world that people did not see yet"),
     "achieved_hz.warning": Limit(0.01, "share of 30 Hz", "a loop on a monotonic clock keeps far closer"),
@@ -26,7 +28,9 @@ LIMITS: dict[str, Limit] = {
     "unit_circle": Limit(1e-3, "1", "cos^2 + sin^2 is 1 up to single precision"),
     "previous_action": Limit(1e-6, "full force", "observation.human_action is a copy of the action one frame before"),
     "idle_force": Limit(0.1, "full force", "below it a stick is at rest, whatever its dead zone"),
-    "idle.warning": Limit(0.9, "share of frames", "a player who gives no force in nine of ten frames hardly takes part"),
+    "idle.warning": Limit(
+        0.9, "share of frames", "a player who gives no force in nine of ten frames hardly takes part"
+    ),
     "idle.error": Limit(1.0, "share of frames", "no force in the whole episode: the device was not connected"),
     "idle_run": Limit(5.0, "s", "people pause to negotiate, but rarely this long with the table in hand"),
     "saturated_force": Limit(0.98, "full force", "at the stop of the stick, with room for its calibration"),

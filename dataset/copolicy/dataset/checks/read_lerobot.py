@@ -8,7 +8,7 @@ import numpy as np
 
 from ..episode import EPISODE_COLUMNS
 from ..exceptions import FileFormatError, MissingExtraError
-from .episode_table import EpisodeTable
+from .episode_table import COLUMN_TYPES, EpisodeTable
 from .finding import Finding
 
 try:
@@ -20,6 +20,7 @@ except ModuleNotFoundError:
 CLOCK = ("timestamp", "frame_index", "episode_index", "index")
 """The columns of the frames that LeRobot itself adds."""
 
+_EMPTY: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
 _META = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 
 
@@ -33,8 +34,16 @@ def read_lerobot(root: Path) -> EpisodeTable:
     damage: list[Finding] = []
     meta = _concatenated(root, "meta/episodes", damage)
     if meta is None or any(name not in meta.column_names for name in ("episode_index", "length")):
-        raise FileFormatError(root / "meta" / "episodes", "a table with episode_index and length", "none that can be read")
+        raise FileFormatError(
+            root / "meta" / "episodes", "a table with episode_index and length", "none that can be read"
+        )
     columns = {name: _column(meta, name) for name in (*_META, *EPISODE_COLUMNS) if name in meta.column_names}
+    for name in columns:
+        nulls = meta.column(name).null_count
+        # LeRobot's merge writes NaN, "not measured", as null.
+        if nulls and EPISODE_COLUMNS.get(name) != "float":
+            message = f"episodes with nothing in column {name}, as after a merge with a set that lacks it"
+            damage.append(Finding("", "schema", nulls, 0, "error", message))
     order = np.argsort(columns["episode_index"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
     labels = tuple(str(index) for index in columns["episode_index"])
@@ -136,10 +145,9 @@ def _column(meta: "pa.Table", name: str) -> np.ndarray:
     """`(E,)` an episode column; a missing entry is an empty text, NaN, -1 or False, and `schema` reports it."""
     column = meta.column(name)
     kind = EPISODE_COLUMNS.get(name, "int")
-    empty: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
-    values = [empty[kind] if value is None else value for value in column.to_pylist()]
+    values = [_EMPTY[kind] if value is None else value for value in column.to_pylist()]
     try:
-        return np.array(values, {"str": str, "float": float, "int": np.int64, "bool": bool}[kind])
+        return np.array(values, COLUMN_TYPES[kind])
     except (TypeError, ValueError):
         return np.array([str(value) for value in values])
 

@@ -10,7 +10,7 @@ from ..exceptions import CopolicyError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
 from ..log import read_episode
 from ..task import RECORD_HZ
-from .episode_table import EpisodeTable
+from .episode_table import COLUMN_TYPES, EpisodeTable
 from .finding import Finding
 
 
@@ -42,7 +42,10 @@ def read_recordings(root: Path) -> EpisodeTable:
 
 def _table(root: Path, labels: list[str], episodes: list[Episode], damage: tuple[Finding, ...]) -> EpisodeTable:
     lengths = np.array([len(episode.actions) for episode in episodes], np.int64)
-    columns = {name: np.array([getattr(episode.meta, name) for episode in episodes]) for name in EPISODE_COLUMNS}
+    columns = {
+        name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[kind])
+        for name, kind in EPISODE_COLUMNS.items()
+    }
     frames: dict[str, np.ndarray] = {}
     final_states = None
     if episodes:
@@ -63,6 +66,6 @@ def _table(root: Path, labels: list[str], episodes: list[Episode], damage: tuple
         np.arange(len(episodes)),
         np.cumsum(lengths) - lengths,
         final_states,
-        np.array([episode.map_config.obstacle_size for episode in episodes]),
+        np.array([episode.map_config.obstacle_size for episode in episodes], float),
         damage=damage,
     )

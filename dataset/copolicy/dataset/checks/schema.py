@@ -39,6 +39,8 @@ def _features(table: EpisodeTable) -> Iterator[Finding]:
                 found, wanted = tuple(found or ()), tuple(wanted)
             if found != wanted and not (part == "names" and wanted is None):
                 yield Finding("", "schema", str(found), str(wanted), "error", f"feature {name} with another {part}")
+        if not table.files:
+            continue  # that no file can be read is said elsewhere, once
         if name not in table.files:
             yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
             continue

@@ -1,17 +1,38 @@
 """The Hub's client, and what its errors mean in one line."""
 
 import contextlib
+import logging
 from collections.abc import Iterator
 
 from ..exceptions import CopolicyError, MissingExtraError, RunError
 
 try:
     import httpx
-    from huggingface_hub import HfApi
-    from huggingface_hub.errors import HfHubHTTPError, LocalTokenNotFoundError, OfflineModeIsEnabled
-    from huggingface_hub.utils import get_token
+    from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi, get_token, snapshot_download
+    from huggingface_hub.errors import (
+        HfHubHTTPError,
+        LocalTokenNotFoundError,
+        OfflineModeIsEnabled,
+        RemoteEntryNotFoundError,
+        RepositoryNotFoundError,
+    )
 except ModuleNotFoundError as error:
     raise MissingExtraError((error.name or "huggingface_hub").split(".")[0]) from None
+
+__all__ = [
+    "CommitOperationAdd",
+    "CommitOperationDelete",
+    "HfApi",
+    "HubError",
+    "RemoteEntryNotFoundError",
+    "RepositoryNotFoundError",
+    "hub_api",
+    "hub_errors",
+    "snapshot_download",
+]
+
+# The client tells of every request at the level that our commands show.
+logging.getLogger("httpx").setLevel(logging.WARNING)
 
 _MEANINGS = {
     401: "the Hub does not accept the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`",

@@ -3,11 +3,9 @@
 import shutil
 from pathlib import Path
 
-from huggingface_hub import snapshot_download
-
 from ..exceptions import RunError
 from ..versions.data_version import newest
-from .client import hub_api, hub_errors
+from .client import hub_api, hub_errors, snapshot_download
 from .repository import read_repository, require_repo_id
 
 
@@ -27,7 +25,9 @@ def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
     if revision is None:
         version = newest(list(repository.tags))
         if version is None:
-            raise RunError(f"{repo_id}: expected a tag data-x.y.z on the Hub, found {sorted(repository.tags) or 'none'}")
+            raise RunError(
+                f"{repo_id}: expected a tag data-x.y.z on the Hub, found {sorted(repository.tags) or 'none'}"
+            )
         revision = version.tag
     if revision in repository.tags:
         return revision, repository.tags[revision]
@@ -35,17 +35,15 @@ def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
         return revision, api.dataset_info(repo_id, revision=revision).sha or ""
 
 
-def download(repo_id: str, revision: str | None, folder: Path, patterns: list[str], commit: str | None = None) -> None:
-    """Downloads the files of a revision into `folder`, going on with what an earlier call left there.
+def download(repo_id: str, folder: Path, commit: str, skip: str | None = None) -> None:
+    """Downloads the files of a commit into `folder`, going on with what an earlier call left there.
 
     Args:
-        patterns: of the files wanted, as `fnmatch` has them.
-        commit: of the revision, where it is known.
+        skip: pattern of files that are not wanted.
 
     Raises:
-        HubError: the Hub does not answer, or has no such data set or revision; what arrived stays in `folder`.
+        HubError: the Hub does not answer; what arrived stays in `folder`.
     """
-    commit = commit or resolve(repo_id, revision)[1]
     folder.mkdir(parents=True, exist_ok=True)
     with hub_errors(repo_id, "downloading"):
         snapshot_download(
@@ -53,7 +51,7 @@ def download(repo_id: str, revision: str | None, folder: Path, patterns: list[st
             repo_type="dataset",
             revision=commit,
             local_dir=folder,
-            allow_patterns=patterns,
+            ignore_patterns=skip,
             max_workers=4,
             library_name="copolicy",
         )

@@ -10,15 +10,14 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from huggingface_hub import CommitOperationAdd, CommitOperationDelete
-
-from ..exceptions import FileFormatError, OutputExistsError, RunError
+from ..checks.checking import check_dataset
+from ..exceptions import FileFormatError, RunError
 from ..versions.content import read_content
 from ..versions.data_version import newest
 from ..versions.manifest import MANIFEST_FILE, Manifest
 from ..versions.release_record import RELEASE_FILE, ReleaseRecord, read_release
-from .client import HfApi, hub_api, hub_errors
-from .raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings
+from .client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
+from .raw_recordings import RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings, still_wanted
 from .repository import BRANCH, Repository, read_file, read_repository, require_repo_id
 
 _CHECKED = ("data/", "meta/", "videos/")
@@ -43,9 +42,7 @@ class Published:
 
 
 def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = None) -> Published:
-    """Uploads the folder's newest release and tags it.
-
-    The caller sees to it that the data set's checks pass.
+    """Checks the data set, uploads its newest release and tags it.
 
     Args:
         private: of a repository that does not exist yet; one that is there must be private already.
@@ -53,12 +50,14 @@ def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = 
 
     Raises:
         FileFormatError: no release, no card, or a folder that is no data set.
-        RunError: the folder is not what was released; this version, or a newer one, is on the Hub.
+        RunError: a check finds an error; the folder is not what was released; this version, or a newer one, is on
+            the Hub.
         HubError: the Hub did not do what was asked.
     """
     require_repo_id(repo_id)
     record, manifest = verify_release(root)
-    recordings = _recordings(root, raw)
+    _require_checked(root)
+    recordings = find_raw_recordings(root, raw) if raw is not None else None
     codebase_tag = json.loads((root / "meta" / "info.json").read_text())["codebase_version"]
     api = hub_api()
     repository = read_repository(api, repo_id)
@@ -81,6 +80,15 @@ def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = 
     files = len(manifest.files) + 1 + (len(recordings.files) + 1 if recordings else 0)
     left_out = recordings.left_out if recordings else []
     return Published(repo_id, record.data_version.tag, commit, record.content_hash, files, committed, left_out)
+
+
+def _require_checked(root: Path) -> None:
+    result = check_dataset(root)
+    if result.failed():
+        raise RunError(
+            f"{root}: expected a data set that passes copolicy-dataset check, found {result.count('error')} errors, "
+            f"first {result.findings[0]}"
+        )
 
 
 def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
@@ -110,14 +118,6 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     return record, found
 
 
-def _recordings(root: Path, raw: Path | None) -> RawRecordings | None:
-    if raw is None:
-        return None
-    if (root / RAW_FOLDER).exists():
-        raise OutputExistsError(root / RAW_FOLDER)
-    return find_raw_recordings(root, raw)
-
-
 def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:
     tag = record.data_version.tag
     if tag in repository.tags:
@@ -133,9 +133,7 @@ def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord)
         )
 
 
-def _committed(
-    api: HfApi, repository: Repository, manifest: Manifest, recordings: RawRecordings | None
-) -> str | None:
+def _committed(api: HfApi, repository: Repository, manifest: Manifest, recordings: RawRecordings | None) -> str | None:
     """The head, where it holds exactly what would be committed."""
     wanted = {MANIFEST_FILE: manifest}
     if recordings is not None:
@@ -156,19 +154,18 @@ def _commit(
 ) -> str:
     sources: dict[str, Path | bytes] = {name: root / name for name in manifest.files}
     sources[MANIFEST_FILE] = manifest.to_text().encode()
+    kept: set[str] = set()
     if recordings is not None:
         sources.update(recordings.files)
         sources[RAW_MANIFEST_FILE] = recordings.manifest.to_text().encode()
+    elif there := read_file(api, repository.repo_id, repository.head, RAW_MANIFEST_FILE):
+        wanted = still_wanted(root, Manifest.from_text(there.decode()))
+        kept = set(wanted.files)
+        if kept:
+            sources[RAW_MANIFEST_FILE] = wanted.to_text().encode()
     with hub_errors(repository.repo_id, "uploading"):
-        there = api.list_repo_files(repository.repo_id, repo_type="dataset", revision=repository.head)
-        # Recordings stay when a later release comes without them; only who has them can put them back.
-        stale = [
-            name
-            for name in there
-            if name not in sources
-            and not name.startswith(".")
-            and (recordings is not None or not name.startswith(RAW_FOLDER + "/"))
-        ]
+        files = api.list_repo_files(repository.repo_id, repo_type="dataset", revision=repository.head)
+        stale = [name for name in files if not (name in sources or name in kept or name.startswith("."))]
         commit = api.create_commit(
             repository.repo_id,
             [

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..exceptions import FileFormatError, OutputExistsError, RunError
 from ..versions.content import read_content
-from ..versions.manifest import MANIFEST_FILE, Manifest
+from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release
 from .download import download, forget_progress, resolve
 from .raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
@@ -43,14 +43,11 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
         raise OutputExistsError(root)
     revision, commit = resolve(repo_id, revision)
     partial = root.parent / f".{root.name}.{commit[:12]}.partial"
-    everything = [MANIFEST_FILE, "*"]
-    download(repo_id, revision, partial, everything if raw else _without_raw(repo_id, commit), commit)
+    download(repo_id, partial, commit, skip=None if raw else f"{RAW_FOLDER}/*")
     try:
         forget_progress(partial)
         (partial / ".gitattributes").unlink(missing_ok=True)
-        record, files = _verify(partial, f"{repo_id}@{revision}", raw)
-        if revision.startswith("data-") and revision != record.data_version.tag:
-            raise RunError(f"{repo_id}@{revision}: expected release {revision}, found {record.data_version.tag}")
+        record, files = _verify(partial, f"{repo_id}@{revision}")
         if root.exists():
             raise OutputExistsError(root)
         partial.rename(root)
@@ -58,3 +55,28 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
         shutil.rmtree(partial, ignore_errors=True)
         raise
     return Pulled(str(root), repo_id, revision, commit, record.version, record.content_hash, files)
+
+
+def _verify(folder: Path, name: str) -> tuple[ReleaseRecord, int]:
+    """The release in a folder and the number of its files, once every byte and the content hash are as they should."""
+    try:
+        record, manifest = read_release(folder), Manifest.read(folder / MANIFEST_FILE)
+        differences = manifest.differences(Manifest.of_folder(folder))
+        content_hash = read_content(folder).hash
+        files = len(manifest.files) + 1
+        if (folder / RAW_MANIFEST_FILE).exists():
+            recordings = Manifest.read(folder / RAW_MANIFEST_FILE)
+            found = {
+                file.relative_to(folder).as_posix(): file_entry(file) for file in (folder / RAW_FOLDER).rglob("*.mcap")
+            }
+            differences += recordings.differences(Manifest(found))
+            files += len(recordings.files) + 1
+    except FileFormatError as error:
+        raise RunError(
+            f"{name}: what arrived is no release: {str(error).replace(f'{folder}', '').lstrip('/: ')}"
+        ) from None
+    if differences:
+        raise RunError(f"{name}: expected the files in its manifest, found that {differences[0]}; nothing was kept")
+    if content_hash != record.content_hash:
+        raise RunError(f"{name}: expected content {record.content_hash}, found {content_hash}; nothing was kept")
+    return record, files

@@ -34,11 +34,7 @@ def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
     paths = sorted(folder.rglob("*.mcap"))
     if not paths:
         raise FileFormatError(folder, "recordings (*.mcap)", "none")
-    wanted = {
-        row["source_sha256"]: row["episode_uuid"]
-        for path in parquet.files_under(root, "meta/episodes")
-        for row in parquet.read_rows(path, ["episode_uuid", "source_sha256"])
-    }
+    wanted = _sources(root)
     files: dict[str, Path] = {}
     entries: dict[str, FileEntry] = {}
     left_out = []
@@ -58,3 +54,21 @@ def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
             f"found none of {len(missing)}, first of episode {missing[0]}"
         )
     return RawRecordings(files, Manifest(entries), left_out)
+
+
+def still_wanted(root: Path, published: Manifest) -> Manifest:
+    """The recordings on the Hub whose episodes are still in the data set at `root`.
+
+    A recording goes when its episode goes: that may be because a person withdrew.
+    """
+    wanted = _sources(root)
+    return Manifest({name: entry for name, entry in published.files.items() if entry.sha256 in wanted})
+
+
+def _sources(root: Path) -> dict[str, str]:
+    """`episode_uuid` by the sha256 of the recording that the episode was made from."""
+    return {
+        row["source_sha256"]: row["episode_uuid"]
+        for path in parquet.files_under(root, "meta/episodes")
+        for row in parquet.read_rows(path, ["episode_uuid", "source_sha256"])
+    }

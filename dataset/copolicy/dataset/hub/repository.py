@@ -5,10 +5,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from huggingface_hub.errors import RemoteEntryNotFoundError, RepositoryNotFoundError
-
 from ..exceptions import InvalidValueError
-from .client import HfApi, hub_errors
+from .client import HfApi, RemoteEntryNotFoundError, RepositoryNotFoundError, hub_errors
 
 BRANCH = "main"
 
@@ -54,7 +52,10 @@ def read_repository(api: HfApi, repo_id: str) -> Repository | None:
             raise
     heads = {ref.name: ref.target_commit for ref in refs.branches}
     return Repository(
-        repo_id, bool(info.private), heads.get(BRANCH, info.sha or ""), {ref.name: ref.target_commit for ref in refs.tags}
+        repo_id,
+        bool(info.private),
+        heads.get(BRANCH, info.sha or ""),
+        {ref.name: ref.target_commit for ref in refs.tags},
     )
 
 

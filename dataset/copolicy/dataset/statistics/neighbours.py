@@ -1,11 +1,11 @@
 """How far the action is settled by the state: its variance among the nearest states of other episodes."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ..features import BOUNDS, STATE
 from .estimate import Estimate
-from .resampling import Bootstrap
+from .resampling import Bootstrap, interval
 from .trajectories import Trajectories
 
 NEIGHBOURS = 64
@@ -49,7 +49,7 @@ def neighbour_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rando
 
 def _others(scaled: np.ndarray, episode: np.ndarray, frames: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """`(len(asked), k)` the nearest frames of other episodes, -1 where a group has too few of them."""
-    tree = cKDTree(scaled[frames])
+    tree = KDTree(scaled[frames])
     result = np.full((len(asked), NEIGHBOURS), -1)
     missing = np.arange(len(asked))
     reach = min(3 * NEIGHBOURS, len(frames))
@@ -72,7 +72,8 @@ def _ratio(data: Trajectories, bootstrap: Bootstrap, within, queries, columns: s
     definition = (
         f"Mean variance of {who} among the {NEIGHBOURS} nearest states of other episodes with the same goal and "
         "obstacles, over their variance in all: 0 where the state settles the action, 1 (the null, by construction) "
-        "where it tells nothing. States in the task's bounds scaled to [-1, 1]; frames of the same episode never count."
+        "where it tells nothing. States in the task's bounds scaled to [-1, 1]; frames of the same episode never "
+        "count. Neighbours lie beside the state, not on it: with few episodes the ratio leans upward."
     )
     episodes = int((queries > 0).sum())
     if not episodes:
@@ -93,8 +94,6 @@ def _ratio(data: Trajectories, bootstrap: Bootstrap, within, queries, columns: s
     frames = len(data.actions)
     if not squares.sum() / frames - ((sums.sum(axis=0) / frames) ** 2).sum() > 1e-12:
         return Estimate(None, "1", definition, episodes, note="the actions never change")
-    from .resampling import interval
-
     value = float(ratio(everything)[0])
     bounds = interval(value, ratio(drawn.astype(float)), 0.0)
     return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled)

@@ -4,10 +4,10 @@ import warnings
 from collections import Counter
 
 import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
 
 from ..exceptions import MissingExtraError
 from .estimate import Estimate
-from .resampling import Bootstrap
 from .route_entropy import routes_taken
 from .trajectories import Trajectories
 
@@ -31,6 +31,7 @@ RESOLUTION_PX = 10.0
 _COMPONENTS = 5
 _SUBSAMPLES = 10
 _SUBSAMPLE_SHARE = 0.8
+_REPLICATES = 1000
 
 
 def resample_path(path: np.ndarray, points: int = POINTS) -> np.ndarray:
@@ -52,11 +53,10 @@ def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
     centred = flat - flat.mean(axis=0)
     directions = np.linalg.svd(centred, full_matrices=False)[2][: min(_COMPONENTS, len(paths) - 1)]
     scores = centred @ directions.T
+    tree = linkage(scores, "ward")
     best = (np.inf, 1, np.zeros(len(paths), dtype=int))
     for modes in range(1, min(MOST_MODES, len(paths) // 3) + 1):
-        mixture = GaussianMixture(
-            modes, covariance_type="diag", reg_covar=RESOLUTION_PX**2, n_init=1, random_state=seed, tol=1e-2
-        )
+        mixture = _mixture_from(scores, fcluster(tree, modes, "maxclust") - 1, seed)
         with warnings.catch_warnings():
             # Fewer distinct paths than modes: that mixture loses on its BIC.
             warnings.simplefilter("ignore", ConvergenceWarning)
@@ -67,7 +67,23 @@ def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
     return best[1], best[2]
 
 
-def path_mode_statistics(data: Trajectories, bootstrap: Bootstrap, seed: int) -> dict[str, Estimate]:
+def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int) -> GaussianMixture:
+    """A mixture that starts from clusters: from random starts, few episodes often end in a poor one."""
+    clusters = [scores[label == number] for number in np.unique(label)]
+    variance = np.array([cluster.var(axis=0) for cluster in clusters]) + RESOLUTION_PX**2
+    return GaussianMixture(
+        len(clusters),
+        covariance_type="diag",
+        reg_covar=RESOLUTION_PX**2,
+        weights_init=np.array([len(cluster) for cluster in clusters]) / len(scores),
+        means_init=np.array([cluster.mean(axis=0) for cluster in clusters]),
+        precisions_init=1 / variance,
+        init_params="random_from_data",
+        random_state=seed,
+    )
+
+
+def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
     """Modes of the paths of each configuration, and their mean over configurations."""
     definition = (
         f"Path modes in a configuration, averaged over configurations by their episodes: paths of the episodes that "
@@ -80,18 +96,18 @@ def path_mode_statistics(data: Trajectories, bootstrap: Bootstrap, seed: int) ->
     success = np.array([row.success for row in data.rows])
     rng = np.random.default_rng(seed)
     per_configuration: dict[str, dict] = {}
-    modes = np.full(len(data.rows), np.nan)
+    weighted, episodes, total = np.zeros(_REPLICATES), 0, 0
     for name in np.unique(data.configurations):
         members = np.flatnonzero((data.configurations == name) & success)
         if len(members) < MIN_EPISODES:
             continue
         paths = np.array([resample_path(data.path(index)) for index in members])
         count, label = count_modes(paths, seed)
-        modes[members] = count
+        episodes += len(members)
+        total += count * len(members)
         keep = max(MIN_EPISODES - 1, round(_SUBSAMPLE_SHARE * len(members)))
-        again = [
-            count_modes(paths[rng.choice(len(paths), keep, replace=False)], seed)[0] for _ in range(_SUBSAMPLES)
-        ]
+        again = [count_modes(paths[rng.choice(len(paths), keep, replace=False)], seed)[0] for _ in range(_SUBSAMPLES)]
+        weighted += rng.choice(again, _REPLICATES) * len(members)
         entry = {"episodes": len(members), "modes": count, "range": [min(again), max(again)]}
         entry["subsamples"] = dict(sorted(Counter(again).items()))
         known = [words[index] or "" for index in members]
@@ -101,14 +117,14 @@ def path_mode_statistics(data: Trajectories, bootstrap: Bootstrap, seed: int) ->
     if not per_configuration:
         note = f"no configuration has {MIN_EPISODES} episodes that reached the goal"
         return {"path_modes": Estimate(None, "modes", definition, 0, note=note)}
-    value, bounds = bootstrap.mean(modes)
+    value = total / episodes
+    low, high = np.quantile(weighted / episodes, (0.025, 0.975))
+    bounds = (min(float(low), value), max(float(high), value))
     agreement = [entry["adjusted_rand"] for entry in per_configuration.values() if "adjusted_rand" in entry]
     details = {
         "adjusted_rand_with_routes": float(np.mean(agreement)) if agreement else None,
         "configurations_used": len(per_configuration),
         "configurations": per_configuration,
     }
-    episodes = int(np.isfinite(modes).sum())
-    return {
-        "path_modes": Estimate(value, "modes", definition, episodes, bounds, bootstrap.resampled, details=details)
-    }
+    how = "subsamples of each configuration"
+    return {"path_modes": Estimate(value, "modes", definition, episodes, bounds, how, details=details)}

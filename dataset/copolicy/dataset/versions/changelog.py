@@ -10,7 +10,7 @@ CHANGELOG_FILE = "CHANGELOG.md"
 _HEAD = """# Changelog
 What changed in this data set, in the form of [Keep a Changelog](https://keepachangelog.com/en/1.1.0/).
 A version is `major.minor.patch`: major when features, rate or existing frames changed or episodes went, minor when
-episodes were added or exclusions changed, patch when metadata or describing files were corrected.
+episodes were added or excluded, patch when metadata or describing files were corrected.
 """
 _SECTION = re.compile(r"^## \[(?P<version>[^\]]+)\]", re.MULTILINE)
 _HEADINGS = {"removed": "Removed", "added": "Added"}
@@ -24,8 +24,8 @@ def with_release(text: str, version: str, date: str, notes: str, changes: Iterab
     """
     sections = list(_SECTION.finditer(text))
     head = text[: sections[0].start()] if sections else (text or _HEAD)
-    ends = [match.start() for match in sections[1:]] + [len(text)]
-    bodies = [(match["version"], text[match.start() : end]) for match, end in zip(sections, ends)]
+    ends = [*(match.start() for match in sections[1:]), len(text)][: len(sections)]
+    bodies = [(match["version"], text[match.start() : end]) for match, end in zip(sections, ends, strict=True)]
     unreleased = [body for name, body in bodies if name.lower() == "unreleased"]
     earlier = [body for name, body in bodies if name.lower() != "unreleased" and name != version]
     parts = [head, *unreleased, _section(version, date, notes, changes, content_hash), *earlier]

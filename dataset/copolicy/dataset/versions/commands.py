@@ -24,7 +24,7 @@ def add_release_command(commands: argparse._SubParsersAction) -> None:
         required=True,
         choices=("major", "minor", "patch"),
         help="major: features, rate or existing frames changed, or episodes went; minor: episodes were added or "
-        "exclusions changed; patch: metadata, card or statistics were corrected",
+        "excluded; patch: metadata, card or statistics were corrected",
     )
     parser.add_argument("--notes", required=True, help="what a reader should know, for the change log")
 

@@ -4,9 +4,8 @@ The content hash `copolicy-content-1:sha256:HEX` is the sha256 of `canonical.enc
 
 * `format`: `copolicy-content-1`
 * `fps`, `robot_type`, `features` (the table of `meta/info.json`), `tasks` (the sentences, sorted)
-* `exclusions`: `meta/copolicy_exclusions.json`, null without
 * `episodes`: the digest of each episode in order, the sha256 of `canonical.encode` of its length, its episode columns
-  and the digests of its features (`frames.frame_digests`, `videos.video_digest`)
+  (exclusions are among them) and the digests of its features (`frames.frame_digests`, `videos.video_digest`)
 
 Left out on purpose: where things lie (chunk, file, row group, compression, order of columns and of rows, the running
 numbers of frames and episodes), what is computed from the frames (statistics), and what describes (the card, the
@@ -26,9 +25,6 @@ from .videos import video_digest
 
 FORMAT = "copolicy-content-1"
 """Version of the algorithm; another one gives another prefix."""
-
-EXCLUSIONS_FILE = Path("meta/copolicy_exclusions.json")
-"""The flags of `copolicy-dataset exclude`."""
 
 _LAYOUT = ("data/", "meta/episodes/", "videos/", "stats/")
 _POSITION = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}
@@ -61,7 +57,6 @@ class Content:
     robot_type: str | None
     features: dict[str, Any]
     tasks: list[str]
-    exclusions: Any
     episodes: tuple[EpisodeContent, ...]
 
     @property
@@ -73,7 +68,6 @@ class Content:
             "robot_type": self.robot_type,
             "features": self.features,
             "tasks": self.tasks,
-            "exclusions": self.exclusions,
             "episodes": [episode.digest for episode in self.episodes],
         }
         return f"{FORMAT}:sha256:{digest(fields)}"
@@ -104,14 +98,12 @@ def read_content(root: Path) -> Content:
     rows = _read_episodes(root)
     tasks = _read_tasks(root)
     frames = frame_digests(root, info, [row["length"] for row in rows], tasks)
-    episodes = tuple(_episode(root, info, row, features) for row, features in zip(rows, frames))
-    path = root / EXCLUSIONS_FILE
+    episodes = tuple(_episode(root, info, row, features) for row, features in zip(rows, frames, strict=True))
     return Content(
         float(info["fps"]),
         info.get("robot_type"),
         info["features"],
         sorted(tasks.values()),
-        _read_json(path) if path.exists() else None,
         episodes,
     )
 
@@ -124,9 +116,7 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
             start, end = (row[f"videos/{name}/{part}_timestamp"] for part in ("from", "to"))
             features[name] = video_digest(path, start, end, info["fps"])
     columns = {
-        name: digest(value)
-        for name, value in row.items()
-        if name not in _POSITION and not name.startswith(_LAYOUT)
+        name: digest(value) for name, value in row.items() if name not in _POSITION and not name.startswith(_LAYOUT)
     }
     return EpisodeContent(
         row["episode_uuid"],

@@ -2,8 +2,8 @@
 
 | step | what changed |
 |---|---|
-| major | rate, robot type, features; an episode column or a task went; an episode went, got other frames or another number |
-| minor | episodes, an episode column or a task were added; exclusions changed |
+| major | rate, robot type, features; a task, an episode column or an episode went; other frames or another number |
+| minor | episodes, an episode column or a task were added; episodes were excluded or included |
 | patch | values of episode columns were corrected; other files (card, statistics, figures, layout) |
 """
 
@@ -13,6 +13,9 @@ from typing import Any
 
 from .content import Content, EpisodeContent
 from .data_version import BUMPS, Bump
+
+EXCLUSION = "discarded"
+"""The episode column that tells training to leave an episode out."""
 
 _SHOWN = 5
 
@@ -35,7 +38,7 @@ class Difference:
         episodes_changed: for each `episode_uuid` in both, the features and episode columns whose values differ.
         renumbered: episodes in both whose number differs.
         frames_changed: those of `episodes_changed` with other frames, not only other episode columns.
-        exclusions_changed: whether `copolicy-dataset exclude` left other flags.
+        exclusions_changed: those of `episodes_changed` that `copolicy-dataset exclude` excluded or included.
     """
 
     schema: tuple[Change, ...]
@@ -44,7 +47,7 @@ class Difference:
     episodes_changed: dict[str, tuple[str, ...]]
     renumbered: tuple[str, ...]
     frames_changed: tuple[str, ...]
-    exclusions_changed: bool
+    exclusions_changed: tuple[str, ...]
 
     @property
     def same(self) -> bool:
@@ -54,7 +57,8 @@ class Difference:
     @property
     def changes(self) -> tuple[Change, ...]:
         """All changes, the largest step first."""
-        metadata = [uuid for uuid in self.episodes_changed if uuid not in self.frames_changed]
+        told = {*self.frames_changed, *self.exclusions_changed}
+        metadata = [uuid for uuid in self.episodes_changed if uuid not in told]
         columns = {name for uuid in metadata for name in self.episodes_changed[uuid]}
         found = [
             *self.schema,
@@ -62,10 +66,9 @@ class Difference:
             *_counted("major", "with other frames", self.frames_changed),
             *_counted("major", "with another number", self.renumbered),
             *_counted("minor", "added", self.episodes_added),
+            *_counted("minor", "excluded or included again", self.exclusions_changed),
             *_counted("patch", f"with other values of {', '.join(sorted(columns))}", metadata),
         ]
-        if self.exclusions_changed:
-            found.append(Change("minor", "exclusions changed"))
         return tuple(sorted(found, key=lambda change: -BUMPS.index(change.bump)))
 
     def to_json(self) -> dict[str, Any]:
@@ -98,7 +101,7 @@ def compare(before: Content, after: Content) -> Difference:
         episodes_changed=changed,
         renumbered=tuple(uuid for uuid in common if old[uuid][0] != new[uuid][0]),
         frames_changed=tuple(frames),
-        exclusions_changed=before.exclusions != after.exclusions,
+        exclusions_changed=tuple(uuid for uuid, names in changed.items() if EXCLUSION in names),
     )
 
 

@@ -45,11 +45,13 @@ def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[in
         rows = _encodable(files, name, features[name], tasks, root)
         if isinstance(rows, np.ndarray):
             rows = rows[order]
-            parts: Iterable[bytes] = (rows[end - length : end].tobytes() for end, length in zip(ends, lengths))
+            parts: Iterable[bytes] = (
+                rows[end - length : end].tobytes() for end, length in zip(ends, lengths, strict=True)
+            )
         else:
             rows = [rows[place] for place in order]
-            parts = (encode(rows[end - length : end]) for end, length in zip(ends, lengths))
-        for episode, part in zip(digests, parts):
+            parts = (encode(rows[end - length : end]) for end, length in zip(ends, lengths, strict=True))
+        for episode, part in zip(digests, parts, strict=True):
             episode[name] = hashlib.sha256(encode(name) + part).hexdigest()
     return digests
 

@@ -12,6 +12,7 @@ from .canonical import digest
 
 MANIFEST_FILE = "meta/manifest.json"
 _SCHEMA = "copolicy-manifest-1"
+_NO_DATA = ("images", "raw")
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,8 @@ class Manifest:
     def of_folder(cls, root: Path) -> "Manifest":
         """Hashes the files of a folder, without the manifest itself and without what belongs to no data set.
 
-        Those are hidden files and folders (`.cache`, `.gitattributes`), and `images/`, where LeRobot keeps pictures
-        until they are encoded.
+        Those are hidden files and folders (`.cache`, `.gitattributes`); `images/`, where LeRobot keeps pictures until
+        they are encoded; and `raw/`, the recordings behind a data set, which have a manifest of their own.
         """
         return cls({name: file_entry(root / name) for name in data_set_files(root)})
 
@@ -45,12 +46,21 @@ class Manifest:
             FileFormatError: none there, or something else.
         """
         try:
-            fields = json.loads(path.read_text())
-            if fields["schema"] != _SCHEMA:
-                raise ValueError(f"schema {fields['schema']!r}")
-            return cls({name: FileEntry(entry["size"], entry["sha256"]) for name, entry in fields["files"].items()})
+            return cls.from_text(path.read_text())
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise FileFormatError(path, f"a manifest ({_SCHEMA})", _reason(error)) from None
+
+    @classmethod
+    def from_text(cls, text: str) -> "Manifest":
+        """The inverse of `to_text`.
+
+        Raises:
+            ValueError, KeyError, TypeError, AttributeError: something else.
+        """
+        fields = json.loads(text)
+        if fields["schema"] != _SCHEMA:
+            raise ValueError(f"schema {fields['schema']!r}")
+        return cls({name: FileEntry(entry["size"], entry["sha256"]) for name, entry in fields["files"].items()})
 
     def to_text(self) -> str:
         """The text of the file."""
@@ -80,7 +90,9 @@ def data_set_files(root: Path) -> list[str]:
     names = []
     for folder, folders, files in os.walk(root):
         inside = Path(folder).relative_to(root)
-        folders[:] = [name for name in folders if not name.startswith(".") and (inside / name) != Path("images")]
+        folders[:] = [
+            name for name in folders if not name.startswith(".") and (inside / name).as_posix() not in _NO_DATA
+        ]
         names += [(inside / name).as_posix() for name in files if not name.startswith(".")]
     return sorted(name for name in names if name != MANIFEST_FILE)
 

@@ -43,10 +43,10 @@ def read_side(text: str) -> Side:
     if revision and Path(name).is_dir():
         return Side(text, read_release(Path(name), revision).content, None)
     if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
-        from ..hub.download import download
+        from ..hub.download import download, resolve
 
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder) / "data_set"
-            download(name, revision or None, root, patterns=["meta/*", "data/*", "videos/*"])
+            download(name, root, resolve(name, revision or None)[1], skip="raw/*")
             return Side(text, read_content(root), read_statistics(root))
     raise FileFormatError(text, f"a folder, FOLDER@{TAG_PREFIX}x.y.z, or U/N[@REVISION] on the Hub", "none of them")

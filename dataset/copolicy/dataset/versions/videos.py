@@ -29,17 +29,15 @@ def _packets(path: Path) -> tuple[tuple[float, bytes], ...]:
     """Time and sha256 of every packet of the first video stream, in the order they are shown."""
     try:
         import av
+        from av.error import FFmpegError
     except ModuleNotFoundError:
         raise MissingExtraError("av") from None
+    packets = []
     try:
         with av.open(str(path)) as container:
-            stream = container.streams.video[0]
-            return tuple(
-                sorted(
-                    (float(packet.pts * packet.time_base), hashlib.sha256(bytes(packet)).digest())
-                    for packet in container.demux(stream)
-                    if packet.pts is not None and packet.time_base is not None and packet.size
-                )
-            )
-    except (av.error.FFmpegError, IndexError, OSError) as error:
+            for packet in container.demux(container.streams.video[0]):
+                if packet.pts is not None and packet.time_base is not None and packet.size:
+                    packets.append((float(packet.pts * packet.time_base), hashlib.sha256(bytes(packet)).digest()))
+    except (FFmpegError, IndexError, OSError) as error:
         raise FileFormatError(path, "a video", str(error) or "no picture") from None
+    return tuple(sorted(packets))

@@ -1,0 +1,80 @@
+"""`copolicy-cards dataset` and `copolicy-cards model`."""
+
+import argparse
+from pathlib import Path
+
+from copolicy.dataset.commandline import add_command
+
+from .new_file import require_new, write_whole
+
+
+def add_dataset_command(commands: argparse._SubParsersAction) -> None:
+    """Adds the command `dataset`."""
+    dataset = add_command(
+        commands,
+        "dataset",
+        _dataset,
+        "write README.md with Hub metadata, a datasheet and figures into a data set folder",
+        "copolicy-cards dataset outputs/dataset --repo-id my-lab/table",
+    )
+    dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
+    dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
+    dataset.add_argument("--pretty-name", help="title of the card (default: the data set's name)")
+    dataset.add_argument("--no-figures", action="store_true", help="draw no pictures")
+    dataset.add_argument(
+        "--croissant", action="store_true", help="also write meta/croissant.json, Croissant 1.0 metadata as JSON-LD"
+    )
+    dataset.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
+
+
+def add_model_command(commands: argparse._SubParsersAction) -> None:
+    """Adds the command `model`."""
+    model = add_command(
+        commands,
+        "model",
+        _model,
+        "write README.md with Hub metadata and results into a checkpoint folder",
+        "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
+    )
+    model.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run (its last checkpoint)")
+    model.add_argument("--eval", action="append", type=Path, default=[], metavar="FILE", help="result of copolicy-eval")
+    model.add_argument("--dataset", type=Path, help="folder of its training data (default: where training found it)")
+    model.add_argument("--repo-id", default="local/copolicy", help="user/name on the Hub (default: local/copolicy)")
+    model.add_argument("--license", help="Hub identifier of the licence of the weights (default: none is stated)")
+    model.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
+
+
+def _dataset(arguments: argparse.Namespace) -> dict:
+    from .croissant import CROISSANT_FILE, croissant_text
+    from .dataset_card import render
+    from .facts import DatasetFacts
+
+    facts = DatasetFacts.read(arguments.root)
+    path = arguments.root / "README.md"
+    require_new(path, arguments.overwrite)
+    repo_id = arguments.repo_id or f"local/{arguments.root.resolve().name}"
+    render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
+    figures = []
+    if not arguments.no_figures:
+        from .figures import save_figures
+
+        figures = save_figures(facts)
+    summary = {"card": str(path), "figures": [figure for figure, _ in figures]}
+    if arguments.croissant:
+        write_whole(arguments.root / CROISSANT_FILE, croissant_text(facts, repo_id, arguments.pretty_name))
+        summary["croissant"] = str(arguments.root / CROISSANT_FILE)
+    write_whole(path, render(facts, repo_id, arguments.pretty_name, figures))
+    return {**summary, "episodes": len(facts.episodes), "sources": facts.counts("source")}
+
+
+def _model(arguments: argparse.Namespace) -> dict:
+    from .checkpoint import Checkpoint
+    from .model_card import render_model_card
+
+    checkpoint = Checkpoint.read(arguments.checkpoint, arguments.dataset)
+    path = checkpoint.folder / "README.md"
+    require_new(path, arguments.overwrite)
+    evaluations = checkpoint.evaluations(arguments.eval)
+    write_whole(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
+    sources = checkpoint.dataset.counts("source") if checkpoint.dataset else "not stated: the data set is not at hand"
+    return {"card": str(path), "evaluations": len(evaluations), "trained_on": sources}

@@ -1,0 +1,152 @@
+"""The datasheet of a data set after Gebru et al., "Datasheets for Datasets" (CACM 2021), from its metadata alone.
+
+What the metadata does not say is called not stated, so that a reader knows what to ask.
+"""
+
+from collections.abc import Iterator
+
+from copolicy.dataset.features import ACTION
+
+from .artefacts import CONVERSION_FILE, EXCLUSIONS_FILE, RELEASE_FILE, read_json
+from .facts import DatasetFacts
+from .markdown import listing, share
+
+
+def datasheet(facts: DatasetFacts) -> Iterator[str]:
+    """The sections, in the order of the paper."""
+    for heading, lines in (
+        ("Motivation", _motivation()),
+        ("Composition", _composition(facts)),
+        ("Collection: who played, and how it was recorded", _collection(facts)),
+        ("Preprocessing", _preprocessing(facts)),
+        ("Uses", _uses(facts)),
+        ("Distribution and licence", _distribution(facts)),
+        ("Maintenance", _maintenance(facts)),
+        ("Consent and withdrawal", _consent(facts)),
+    ):
+        yield f"## {heading}\n\n" + "\n".join(f"- {line}" for line in lines)
+
+
+def _motivation() -> list[str]:
+    return [
+        "Purpose: learning and judging policies that carry an object *with* a partner, where there are several good "
+        "ways and both have to settle on one.",
+        "Who made it and who paid for it: not stated in the metadata.",
+    ]
+
+
+def _composition(facts: DatasetFacts) -> list[str]:
+    discarded = sum(bool(episode["discarded"]) for episode in facts.episodes)
+    exclusions = read_json(facts.root / EXCLUSIONS_FILE)
+    lengths = sorted(episode["length"] for episode in facts.episodes)
+    lines = [
+        f"An instance is an episode: one carry from start to end, {lengths[0]} to {lengths[-1]} frames "
+        f"(median {lengths[len(lengths) // 2]}).",
+        "Each has states, the joint action of both players, the map, and who did it with whom.",
+        f"Splits: {', '.join(f'{name} {span}' for name, span in facts.info.get('splits', {}).items()) or 'none'}",
+        f"Marked as discarded (kept, left out of training): {share(discarded, len(facts.episodes))}",
+        f"Quality flags: {_flags(facts)}",
+        "People appear under pseudonyms only; there is no image, sound or name in the data.",
+    ]
+    if exclusions is not None:
+        lines.append(f"Exclusions with their reasons: `{EXCLUSIONS_FILE}`")
+    return lines
+
+
+def _flags(facts: DatasetFacts) -> str:
+    flagged = {flag: count for flag, count in facts.counts("quality_flags").items() if flag}
+    return ", ".join(f"`{flag}` ({count})" for flag, count in flagged.items()) or "none set"
+
+
+def _collection(facts: DatasetFacts) -> list[str]:
+    lines = [
+        f"{label}: {listing(facts.counts(column))}"
+        for label, column in (
+            ("Source", "source"),
+            ("Sessions", "session_id"),
+            ("Pairs (pseudonyms)", "pair_id"),
+            ("Controller of the robot seat", "controller_0"),
+            ("Controller of the human seat", "controller_1"),
+            ("Software", "software_version"),
+        )
+    ]
+    rates = _known(facts, "achieved_hz")
+    if rates:
+        lines.append(f"Achieved rate of recording: {min(rates):.4g} to {max(rates):.4g} Hz")
+    lines.append(f"Late ticks: {sum(episode['late_ticks'] for episode in facts.episodes)}")
+    drift = _known(facts, "replay_drift_px")
+    if drift:
+        lines.append(f"Recorded against re-simulated position: at most {max(drift):.3g} px apart")
+    return lines
+
+
+def _known(facts: DatasetFacts, column: str) -> list[float]:
+    values = [episode[column] for episode in facts.episodes]
+    return [value for value in values if value is not None and value == value]
+
+
+def _preprocessing(facts: DatasetFacts) -> list[str]:
+    action = facts.info["features"].get(ACTION, {})
+    lines = [
+        f"Frames at {facts.info['fps']:g} Hz, taken from a recording at {action.get('record_hz', 'not stated')} Hz"
+    ]
+    if "hold" in action:
+        lines.append(f"The action of a frame is the {action['hold']} of the recorded actions until the next frame")
+    record = read_json(facts.root / CONVERSION_FILE)
+    if record is None:
+        return [*lines, f"Conversion: not stated (no `{CONVERSION_FILE}`)"]
+    lines.append(f"Converted by `{record.get('converter', 'not stated')}` {record.get('version', '')}".rstrip())
+    left_out = record.get("left_out")
+    if isinstance(left_out, dict):
+        counts = ", ".join(f"{len(names)} {why}" for why, names in left_out.items() if isinstance(names, list))
+        lines.append(f"Left out at conversion: {counts or 'none'}")
+    notes = record.get("notes") or {}
+    lines.append(f"Episodes with a note on what was mended or doubtful: {len(notes)} (`{CONVERSION_FILE}`)")
+    sources = sum(bool(episode["source_sha256"]) for episode in facts.episodes)
+    lines.append(f"Episodes that name the hash of the file they were made from: {share(sources, len(facts.episodes))}")
+    return lines
+
+
+def _uses(facts: DatasetFacts) -> list[str]:
+    sources = facts.values("source")
+    lines = [
+        "For: imitation learning of co-policies, prediction of a partner's action, statistics of shared decisions.",
+        "Not for: identifying people, or judging a single player.",
+    ]
+    if "simulated" in sources:
+        lines.append("Not for: claims about people, as far as simulated episodes are involved.")
+    if "upstream" in sources:
+        lines.append("With care: the imported files do not say who or what held the sticks.")
+    lines.append(
+        "The table moves in a plane under known dynamics; nothing here says how a policy behaves on a real robot."
+    )
+    return lines
+
+
+def _distribution(facts: DatasetFacts) -> list[str]:
+    licences = facts.counts("license")
+    text = ", ".join(f"{name or 'not stated'} ({count} episodes)" for name, count in licences.items())
+    return [f"Licence: {text}", f"Format: LeRobot {facts.info['codebase_version']}, parquet"]
+
+
+def _maintenance(facts: DatasetFacts) -> list[str]:
+    release = read_json(facts.root / RELEASE_FILE)
+    if release is None:
+        return ["Not released yet: no version, no change log.", "Contact: not stated in the metadata."]
+    lines = [f"Version {release.get('version')} of {release.get('date')}; changes are in `CHANGELOG.md`."]
+    if "content_hash" in release:
+        lines.append(f"Content hash, independent of how files are laid out: `{release['content_hash']}`")
+    return [*lines, "Contact: not stated in the metadata."]
+
+
+def _consent(facts: DatasetFacts) -> list[str]:
+    people = [episode for episode in facts.episodes if episode["source"] == "human"]
+    if not people:
+        return ["No episode is marked as played by people, so there is no consent to state."]
+    named = sum(bool(episode["consent_id"]) for episode in people)
+    return [
+        f"Consent: {share(named, len(people))} episodes played by people name a consent record (by its identifier; the "
+        "record itself is kept by whoever recorded)",
+        "Withdrawal: a person's episodes are found by their pseudonym and left out of the next version; copies that "
+        "were downloaded before cannot be called back.",
+    ]

@@ -1,0 +1,91 @@
+/** The sortable table of the chosen episodes. */
+
+const TABLE_COLUMNS = [
+  ["episode_index", "#"],
+  ["pair_id", "Pair"],
+  ["source", "Source"],
+  ["map_id", "Map"],
+  ["route_class", "Route"],
+  ["termination_reason", "Ended by"],
+  ["duration_s", "Duration, s"],
+  ["force_mean", "Force, mean"],
+  ["force_p95", "Force, 95 %"],
+  ["replay_drift_px", "Drift, px"],
+  ["quality_flags", "Flags"],
+];
+const NUMBERS = new Set(["duration_s", "force_mean", "force_p95", "replay_drift_px"]);
+const PAGE = 25;
+const order = { name: "episode_index", falling: false };
+let page = 0;
+
+function showEpisodes(chosen, keepPage = false) {
+  if (!keepPage) page = 0;
+  const rows = sorted(chosen);
+  const pages = Math.max(1, Math.ceil(rows.length / PAGE));
+  page = Math.min(page, pages - 1);
+  const first = page * PAGE;
+  byId("episode-count").textContent = rows.length
+    ? `Episodes ${first + 1} to ${Math.min(rows.length, first + PAGE)} of ${rows.length}. Choose a heading to sort, a number to open.`
+    : "No episode fits what is chosen above.";
+  byId("episode-table").replaceChildren(
+    make("thead", {}, make("tr", {}, ...TABLE_COLUMNS.map(([name, label]) => heading(name, label)))),
+    make("tbody", {}, ...rows.slice(first, first + PAGE).map(episodeRow)),
+  );
+  const turn = (by) => { page += by; showEpisodes(selection, true); };
+  byId("pages").replaceChildren(
+    make("button", { type: "button", disabled: page === 0, onclick: () => turn(-1) }, "Previous page"),
+    make("span", {}, `Page ${page + 1} of ${pages}`),
+    make("button", { type: "button", disabled: page >= pages - 1, onclick: () => turn(1) }, "Next page"),
+  );
+}
+
+/** The chosen episodes in the order of the table; what is missing comes last. */
+function sorted(chosen) {
+  const sign = order.falling ? -1 : 1;
+  return [...chosen].sort((a, b) => {
+    const [u, v] = [a[order.name], b[order.name]];
+    if (u === null || v === null) return (u === null) - (v === null);
+    const difference = typeof u === "number" ? u - v : String(u).localeCompare(String(v), "en", { numeric: true });
+    return sign * difference || a.episode_index - b.episode_index;
+  });
+}
+
+function heading(name, label) {
+  const active = order.name === name;
+  const sort = () => {
+    order.falling = active && !order.falling;
+    order.name = name;
+    showEpisodes(selection);
+    byId("episode-table").querySelector(`button[data-column="${name}"]`).focus();
+  };
+  const arrow = active ? (order.falling ? " ▼" : " ▲") : "";
+  return make(
+    "th", { scope: "col", class: NUMBERS.has(name) ? "number" : "", "aria-sort": active ? (order.falling ? "descending" : "ascending") : "none" },
+    make("button", { type: "button", "data-column": name, onclick: sort }, label + arrow),
+  );
+}
+
+function episodeRow(episode) {
+  const open = make("button", { type: "button", class: "link", "aria-label": `Open ${episodeName(episode)}` }, String(episode.episode_index));
+  const cells = TABLE_COLUMNS.slice(1).map(([name]) => {
+    if (name === "quality_flags") return make("td", {}, flags(episode));
+    if (name === "route_class") return make("td", {}, routeKey(episode.route_class));
+    if (name === "termination_reason") {
+      const reason = String(episode[name]).replaceAll("_", " ");
+      return make("td", { class: episode.success ? "" : "failed" }, `${episode.success ? "✓" : "✗"} ${reason}`);
+    }
+    const value = episode[name];
+    return make("td", { class: typeof value === "number" ? "number" : "" }, value === "" ? "–" : formatNumber(value));
+  });
+  return make("tr", { onclick: () => openPlayer(episode), "data-episode": episode.episode_index }, make("th", { scope: "row" }, open), ...cells);
+}
+
+function flags(episode) {
+  return [episode.discarded ? "discarded" : "", episode.quality_flags ?? ""].filter(Boolean).join(", ") || "–";
+}
+
+function routeKey(word) {
+  const key = make("span", { class: "key" }, word || "–");
+  key.style.setProperty("--key", routeColour(word));
+  return key;
+}

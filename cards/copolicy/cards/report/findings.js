@@ -1,0 +1,44 @@
+/** What `copolicy-dataset check` found. */
+
+const SEVERITIES = ["error", "warning", "info"];
+
+function showFindings(chosen) {
+  const place = byId("finding-list");
+  if (!data.check) {
+    place.replaceChildren(
+      make("p", { class: "absent" }, "copolicy-dataset check was not run on this data set, or its result was not kept: " +
+        "nothing is known here about its quality. To keep it: copolicy-dataset check FOLDER --json > " +
+        "FOLDER/meta/copolicy_check.json"),
+    );
+    return;
+  }
+  const all = data.check.findings ?? [];
+  const numbers = new Map(chosen.map((episode) => [String(episode.episode_index), episode]));
+  const found = all.filter((finding) => finding.episode === "" || finding.episode === null || numbers.has(String(finding.episode)));
+  const count = (severity) => found.filter((finding) => finding.severity === severity).length;
+  const summary = SEVERITIES.map((severity) => `${count(severity)} ${severity}${severity === "info" || count(severity) === 1 ? "" : "s"}`);
+  const rules = data.check.rules ? `${formatNumber(data.check.rules)} rules were applied: ` : "";
+  const nodes = [make("p", {}, `${rules}${summary.join(", ")}.${found.length < all.length ? ` ${all.length - found.length} more concern other episodes.` : ""}`)];
+  const groups = [...groupBy(found, (finding) => `${finding.severity}|${finding.rule}`).values()].sort(
+    (a, b) => SEVERITIES.indexOf(a[0].severity) - SEVERITIES.indexOf(b[0].severity) || b.length - a.length,
+  );
+  for (const members of groups) {
+    const { severity, rule } = members[0];
+    nodes.push(
+      make("details", { open: severity === "error" },
+        make("summary", {}, make("span", { class: `badge ${severity}` }, severity), ` ${String(rule).replaceAll("_", " ")} · ${members.length}`),
+        make("ul", {}, ...members.slice(0, 200).map((finding) => findingItem(finding, numbers))),
+        members.length > 200 ? make("p", {}, `and ${members.length - 200} more in meta/copolicy_check.json`) : null),
+    );
+  }
+  place.replaceChildren(...nodes);
+}
+
+function findingItem(finding, numbers) {
+  const episode = numbers.get(String(finding.episode));
+  const figure = finding.figure === null || finding.figure === undefined ? "" : ` (${formatNumber(finding.figure)}; limit ${formatNumber(finding.limit)})`;
+  const link = episode
+    ? make("button", { type: "button", class: "link", onclick: () => openPlayer(episode) }, `Episode ${episode.episode_index}`)
+    : "Whole data set";
+  return make("li", {}, link, `: ${finding.message ?? ""}${figure}`);
+}

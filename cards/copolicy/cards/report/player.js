@@ -1,0 +1,201 @@
+/** One episode as a film: the table, both players' forces, and what they did to each other over time. */
+
+const film = { episode: null, columns: {}, time: 0, playing: false, clock: 0, others: [] };
+
+function setUpPlayer() {
+  const dialog = byId("player");
+  byId("player-close").addEventListener("click", () => dialog.close());
+  dialog.addEventListener("close", () => {
+    pause();
+    history.replaceState(null, "", location.pathname + location.search);
+  });
+  byId("play").addEventListener("click", () => (film.playing ? pause() : play()));
+  byId("previous").addEventListener("click", () => stepEpisode(-1));
+  byId("next").addEventListener("click", () => stepEpisode(1));
+  byId("scrub").addEventListener("input", (event) => { pause(); seek(Number(event.target.value)); });
+  byId("ghosts").addEventListener("input", drawFilm);
+  byId("graph").addEventListener("pointerdown", (event) => { pause(); seekGraph(event); });
+  byId("graph").addEventListener("pointermove", (event) => { if (event.buttons) seekGraph(event); });
+  dialog.addEventListener("keydown", onKey);
+  const wanted = /^#episode=(\d+)$/.exec(location.hash);
+  const episode = wanted && episodes.find((one) => one.episode_index === Number(wanted[1]));
+  if (episode) openPlayer(episode);
+}
+
+/** Shows an episode from its start, in a dialog over the page. */
+function openPlayer(episode) {
+  pause();
+  film.episode = episode;
+  film.time = 0;
+  for (const name of COLUMNS) film.columns[name] = column(episode, name);
+  film.others = episodes
+    .filter((one) => one !== episode && one.map_id === episode.map_id)
+    .map((one) => ({ episode: one, xs: column(one, "x"), ys: column(one, "y") }));
+  byId("player-title").textContent = `Episode ${episode.episode_index}`;
+  const controllers = [episode.controller_0, episode.controller_1].filter(Boolean).join(" and ");
+  const facts = [
+    episode.source === "simulated" ? "simulated pair" : episode.source,
+    episode.pair_id && `pair ${episode.pair_id}`, episode.map_id, `route ${episode.route_class || "none"}`,
+    String(episode.termination_reason).replaceAll("_", " "), `${formatNumber(episode.duration_s)} s`, controllers, flags(episode) !== "–" && flags(episode),
+  ];
+  byId("player-facts").textContent = facts.filter(Boolean).join(" · ");
+  byId("scrub").max = episode.frames - 1;
+  const dialog = byId("player");
+  if (!dialog.open) dialog.showModal();
+  history.replaceState(null, "", `#episode=${episode.episode_index}`);
+  byId("play").focus();
+  drawFilm();
+}
+
+function stepEpisode(by) {
+  const rows = sorted(selection.includes(film.episode) ? selection : episodes);
+  openPlayer(rows[(rows.indexOf(film.episode) + by + rows.length) % rows.length]);
+}
+
+function play() {
+  if (film.time >= film.episode.frames - 1) film.time = 0;
+  film.playing = true;
+  film.clock = performance.now();
+  showPlayButton();
+  requestAnimationFrame(tick);
+}
+
+function pause() {
+  film.playing = false;
+  showPlayButton();
+}
+
+function showPlayButton() {
+  byId("play").textContent = film.playing ? "⏸" : "▶";
+  byId("play").setAttribute("aria-label", film.playing ? "Pause" : "Play");
+}
+
+function tick(now) {
+  if (!film.playing) return;
+  const speed = Number(byId("speed").value);
+  film.time = Math.min(film.episode.frames - 1, film.time + (Math.max(0, now - film.clock) / 1000) * speed / FRAME_SECONDS);
+  film.clock = now;
+  drawFilm();
+  if (film.time >= film.episode.frames - 1) pause();
+  else requestAnimationFrame(tick);
+}
+
+function seek(frame) {
+  film.time = Math.min(Math.max(0, frame), film.episode.frames - 1);
+  drawFilm();
+}
+
+function seekGraph(event) {
+  const box = byId("graph").getBoundingClientRect();
+  seek(Math.round(((event.clientX - box.left) / box.width) * (film.episode.frames - 1)));
+}
+
+function onKey(event) {
+  const inField = event.target.matches("select, input[type=checkbox]");
+  const step = event.shiftKey ? Math.round(1 / FRAME_SECONDS) : 1;
+  const actions = {
+    ArrowRight: () => seek(Math.round(film.time) + step),
+    ArrowLeft: () => seek(Math.round(film.time) - step),
+    Home: () => seek(0),
+    End: () => seek(film.episode.frames - 1),
+    " ": () => (film.playing ? pause() : play()),
+    n: () => stepEpisode(1),
+    p: () => stepEpisode(-1),
+  };
+  const action = actions[event.key];
+  // A focused button keeps its own meaning of the space bar, but for the one that does the same.
+  if (!action || inField || (event.key === " " && event.target.matches("button:not(#play)"))) return;
+  event.preventDefault();
+  if (event.key !== " ") pause();
+  action();
+}
+
+/** A column between frames; angles the shorter way round. */
+function at(name, time) {
+  const values = film.columns[name];
+  const low = Math.floor(time);
+  const high = Math.min(low + 1, values.length - 1);
+  let difference = values[high] - values[low];
+  if (name === "theta") difference = ((difference + 3 * Math.PI) % (2 * Math.PI)) - Math.PI;
+  return values[low] + (time - low) * difference;
+}
+
+function drawFilm() {
+  const { episode, time } = film;
+  if (!episode) return;
+  const canvas = byId("stage");
+  const width = canvas.clientWidth;
+  const context = sharpContext(canvas, width, (width * HEIGHT) / WIDTH);
+  context.scale(width / WIDTH, width / WIDTH);
+  context.fillStyle = colour("--floor");
+  context.fillRect(0, 0, WIDTH, HEIGHT);
+  drawMap(context, episode.map);
+  context.lineJoin = "round";
+  if (byId("ghosts").checked) for (const path of film.others) drawPath(context, path, 0.3, 2.5);
+  const { x: xs, y: ys, theta } = film.columns;
+  const end = Math.floor(time) + 1;
+  GRIPS.forEach((grip, seat) => {
+    const points = Array.from({ length: end }, (_, k) => onScreen([xs[k], ys[k], theta[k]], grip));
+    context.strokeStyle = `${SEAT_COLOURS[seat]}88`;
+    context.lineWidth = 4;
+    strokePath(context, points.map(([u]) => u), points.map(([, v]) => v));
+  });
+  const pose = ["x", "y", "theta"].map((name) => at(name, time));
+  const held = Math.floor(time); // an action holds until the next frame
+  const force = (seat) => ["fx", "fy"].map((axis) => film.columns[`${seat}_${axis}`][held]);
+  drawTable(context, pose);
+  drawForce(context, pose, 0, force("robot"));
+  drawForce(context, pose, 1, force("human"));
+  drawGraph();
+  const size = (seat) => Math.hypot(...force(seat)).toFixed(2);
+  const interaction = film.columns.interaction[held];
+  const sense = interaction > 0.02 ? "pulling apart" : interaction < -0.02 ? "pressing together" : "in agreement";
+  const seconds = (time * FRAME_SECONDS).toFixed(1);
+  const total = ((episode.frames - 1) * FRAME_SECONDS).toFixed(1);
+  byId("player-readout").textContent =
+    `${seconds} of ${total} s · robot seat ▲ ${size("robot")} · human seat ● ${size("human")} · interaction ${interaction.toFixed(2)} (${sense})`;
+  byId("scrub").value = Math.round(time);
+  byId("scrub").setAttribute("aria-valuetext", `${seconds} of ${total} seconds`);
+}
+
+/** Interaction force (signed, upper half) and both players' sizes of force (lower half) over time. */
+function drawGraph() {
+  const canvas = byId("graph");
+  const [width, height] = [canvas.clientWidth, 150];
+  const context = sharpContext(canvas, width, height);
+  const { interaction } = film.columns;
+  const place = (k) => (k / Math.max(1, film.episode.frames - 1)) * width;
+  context.fillStyle = colour("--floor");
+  context.fillRect(0, 0, width, height);
+  const strongest = Math.max(0.25, ...interaction.map(Math.abs));
+  const centre = 45;
+  const xs = Array.from(interaction, (_, k) => place(k));
+  context.strokeStyle = colour("--line");
+  context.lineWidth = 1;
+  strokePath(context, [0, width], [centre, centre]);
+  strokePath(context, [0, width], [height - 1, height - 1]);
+  context.fillStyle = `${colour("--accent")}55`;
+  context.beginPath();
+  context.moveTo(0, centre);
+  interaction.forEach((value, k) => context.lineTo(xs[k], centre - (value / strongest) * 38));
+  context.lineTo(width, centre);
+  context.fill();
+  context.strokeStyle = colour("--accent");
+  context.lineWidth = 1.5;
+  strokePath(context, xs, Array.from(interaction, (value) => centre - (value / strongest) * 38));
+  ["robot", "human"].forEach((seat, k) => {
+    const [fx, fy] = [film.columns[`${seat}_fx`], film.columns[`${seat}_fy`]];
+    context.strokeStyle = SEAT_COLOURS[k];
+    context.lineWidth = 2;
+    context.setLineDash(k ? [6, 3] : []);
+    strokePath(context, xs, Array.from(fx, (value, i) => height - 3 - (Math.hypot(value, fy[i]) / Math.SQRT2) * 52));
+  });
+  context.setLineDash([]);
+  context.font = "12px system-ui, sans-serif";
+  context.fillStyle = colour("--muted");
+  context.fillText(`interaction force, ±${strongest.toFixed(2)}: above pulls apart`, 6, 13);
+  context.fillText("size of force: robot seat (line), human seat (dashes)", 6, 103);
+  context.strokeStyle = colour("--ink");
+  context.lineWidth = 1.5;
+  strokePath(context, [place(film.time), place(film.time)], [0, height]);
+}

@@ -1,0 +1,33 @@
+/** What `copolicy-dataset stats` computed, each statistic with its interval and what chance alone would give. */
+
+function showStatistics() {
+  const place = byId("statistic-list");
+  if (!data.statistics) {
+    place.replaceChildren(
+      make("p", { class: "absent" }, "copolicy-dataset stats was not run on this data set: no multimodality statistics."),
+    );
+    return;
+  }
+  const entries = data.statistics;
+  const rows = entries.map((entry) =>
+    make(
+      "tr", {},
+      make("th", { scope: "row" }, entry.name, entry.definition
+        ? make("details", { class: "definition" }, make("summary", {}, "definition"), entry.definition)
+        : null),
+      make("td", { class: "number" }, formatNumber(entry.value)),
+      make("td", {}, entry.unit ?? ""),
+      make("td", {}, entry.interval ? `${formatNumber(entry.interval[0])} to ${formatNumber(entry.interval[1])}` : "–"),
+      make("td", {}, entry.null ? `${formatNumber(entry.null.mean)} (${formatNumber(entry.null.low)} to ${formatNumber(entry.null.high)}), p = ${formatNumber(entry.null.p)}` : "–"),
+      make("td", { class: "number" }, formatNumber(entry.episodes)),
+      make("td", {}, entry.note ?? ""),
+    ),
+  );
+  const heads = ["Statistic", "Value", "Unit", "95 % interval", "By chance", "Episodes", "Note"];
+  place.replaceChildren(
+    make("p", {}, `All episodes of the data set, whatever is chosen above. ${entries.length} statistics.`),
+    make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Statistics" },
+      make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
+        make("tbody", {}, ...rows))),
+  );
+}

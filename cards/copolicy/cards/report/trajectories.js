@@ -1,0 +1,113 @@
+/** Ways of the table's centre, one panel for each set of obstacles or map. */
+
+const FIRST_PANELS = 12;
+let panelLimit = FIRST_PANELS;
+
+function setUpTrajectories() {
+  byId("grouping").addEventListener("input", () => {
+    panelLimit = FIRST_PANELS;
+    showTrajectories(selection);
+  });
+}
+
+function showTrajectories(chosen) {
+  const key = byId("grouping").value === "map" ? (episode) => episode.map_id : (episode) => episode.layout;
+  const groups = [...groupBy(chosen, key)].sort(
+    (a, b) => a[1][0].map.obstacles.length - b[1][0].map.obstacles.length || a[0].localeCompare(b[0], "en", { numeric: true }),
+  );
+  const panels = byId("panels");
+  panels.replaceChildren();
+  const shown = groups.slice(0, panelLimit).map(([name, members]) => {
+    const panel = trajectoryPanel(name, members);
+    panels.append(panel.figure);
+    return panel;
+  });
+  shown.forEach((panel) => panel.draw(null));
+  const more = groups.length - shown.length;
+  byId("more-panels").replaceChildren(
+    ...(more > 0
+      ? [make("button", { type: "button", onclick: () => { panelLimit = Infinity; showTrajectories(selection); } }, `Show ${more} more`)]
+      : []),
+  );
+}
+
+function trajectoryPanel(name, members) {
+  const counts = [...groupBy(members, (episode) => episode.route_class ?? "")].sort((a, b) => b[1].length - a[1].length);
+  const words = counts.map(([word, some]) => `${word || "no route"} ${some.length}`).join(", ");
+  const canvas = make("canvas", { role: "img", "aria-label": `${name}: ${members.length} episodes; routes ${words}` });
+  const legend = make("p", { class: "legend" });
+  for (const [word, some] of counts) {
+    const key = make("span", { class: "key" }, `${word || "no route"} ${some.length}`);
+    key.style.setProperty("--key", routeColour(word));
+    legend.append(key);
+  }
+  const figure = make("figure", {}, make("figcaption", {}, make("strong", {}, name), ` · ${members.length} episodes`), canvas, legend);
+  const paths = members.map((episode) => ({ episode, xs: column(episode, "x"), ys: column(episode, "y") }));
+
+  const draw = (near) => {
+    const width = canvas.clientWidth || 360;
+    const context = sharpContext(canvas, width, width * HEIGHT / WIDTH);
+    context.scale(width / WIDTH, width / WIDTH);
+    context.fillStyle = colour("--floor");
+    context.fillRect(0, 0, WIDTH, HEIGHT);
+    for (const [, some] of groupBy(members, (episode) => String(episode.map.goal))) drawGoal(context, some[0].map);
+    for (const [, some] of groupBy(members, (episode) => String(episode.map.start))) drawStart(context, some[0].map);
+    for (const [, some] of groupBy(members, (episode) => episode.layout)) drawObstacles(context, some[0].map);
+    context.lineJoin = "round";
+    for (const path of paths) {
+      if (path !== near) drawPath(context, path, Math.max(0.25, Math.min(0.8, 12 / paths.length)), 2.5);
+    }
+    if (near) drawPath(context, near, 1, 7);
+  };
+  const nearest = (event) => {
+    const box = canvas.getBoundingClientRect();
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((value) => (value * WIDTH) / box.width);
+    let [best, found] = [30 * 30, null];
+    for (const path of paths) {
+      for (let k = 0; k < path.xs.length; k++) {
+        const distance = (path.xs[k] - x) ** 2 + (path.ys[k] - y) ** 2;
+        if (distance < best) [best, found] = [distance, path];
+      }
+    }
+    return found;
+  };
+  let near = null;
+  canvas.addEventListener("pointermove", (event) => {
+    const found = nearest(event);
+    if (found === near) return;
+    near = found;
+    canvas.style.cursor = near ? "pointer" : "";
+    canvas.title = near ? episodeName(near.episode) : "";
+    draw(near);
+  });
+  canvas.addEventListener("pointerleave", () => draw((near = null)));
+  canvas.addEventListener("click", (event) => {
+    const found = nearest(event);
+    if (found) openPlayer(found.episode);
+  });
+  return { figure, draw };
+}
+
+function drawPath(context, { episode, xs, ys }, opacity, width) {
+  context.globalAlpha = opacity;
+  context.strokeStyle = routeColour(episode.route_class);
+  context.lineWidth = width;
+  strokePath(context, xs, ys);
+  context.globalAlpha = 1;
+  if (episode.success) return;
+  const [x, y] = [xs[xs.length - 1], ys[ys.length - 1]];
+  context.strokeStyle = FAILURE_COLOUR;
+  context.lineWidth = 4;
+  context.beginPath();
+  for (const side of [-1, 1]) {
+    context.moveTo(x - 10, y - 10 * side);
+    context.lineTo(x + 10, y + 10 * side);
+  }
+  context.stroke();
+}
+
+/** What an episode is called where a line must do. */
+function episodeName(episode) {
+  const pair = episode.pair_id ? `, pair ${episode.pair_id}` : "";
+  return `Episode ${episode.episode_index}${pair}, ${episode.map_id}, route ${episode.route_class || "none"}, ${episode.outcome}`;
+}

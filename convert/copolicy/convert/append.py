@@ -1,0 +1,190 @@
+"""Adds recordings to a data set without rewriting what is there: new files beside the old ones."""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.clock import Hold
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.log import read_metadata
+
+from .lerobot_writer import RECORD_FILE
+from .prepare import Conversion
+from .recordings import convert_recordings, find_recordings
+from .shifted_tables import Place, Shift, numbered_files, read_table, write_like
+
+try:
+    from lerobot.datasets.compute_stats import aggregate_stats
+    from lerobot.datasets.io_utils import load_stats, write_stats
+    from lerobot.datasets.utils import update_chunk_file_indices
+except ImportError as error:
+    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
+
+_INFO, _STATS, _TASKS = Path("meta/info.json"), Path("meta/stats.json"), Path("meta/tasks.parquet")
+
+
+def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, Hold]:
+    """Rate and hold of a data set, which what is added must share.
+
+    Raises:
+        FileFormatError: no data set of `copolicy-convert`.
+        InvalidValueError: another rate or hold is asked for.
+    """
+    finish_interrupted(root)
+    info = _info(root)
+    try:
+        stored = int(info["fps"]), info["features"]["action"]["hold"]
+    except (KeyError, TypeError, ValueError):
+        raise FileFormatError(root / _INFO, "a data set of copolicy-convert", "another") from None
+    for name, asked, found in (("--fps", fps, stored[0]), ("--hold", hold, stored[1])):
+        if asked is not None and asked != found:
+            raise InvalidValueError(name, f"{found!r}, as {root} has it", asked)
+    return stored
+
+
+def append_recordings(
+    folders: Sequence[Path],
+    root: Path,
+    repo_id: str,
+    conversion: Conversion,
+    skip_damaged: bool = False,
+    workers: int = 1,
+) -> dict:
+    """Adds those recordings in `folders` whose episodes are not in the data set at `root` yet.
+
+    A folder beside `root` takes hard links to the files that are there and the new ones, and then its place. An
+    interruption leaves the data set as it was or complete; between the two renamings it lies under a hidden name,
+    from where the next call brings it back.
+
+    Returns:
+        Summary of what was added.
+
+    Raises:
+        FileFormatError: no data set at `root`, or one with other columns.
+        RunError: nothing usable among what is new; nothing was changed.
+    """
+    finish_interrupted(root)
+    files, unfinished = find_recordings(folders)
+    known = {name for path in numbered_files(root / "meta" / "episodes").values() for name in _uuids(path)}
+    new = [path for path in files if _uuid(path) not in known]
+    summary: dict[str, Any] = {"root": str(root), "already_there": len(files) - len(new), "episodes_added": 0}
+    if not new:
+        return {**summary, "unfinished_recordings": unfinished}
+    place = root.resolve()
+    with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
+        added, whole = Path(scratch) / "added", Path(scratch) / "whole"
+        try:
+            written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
+            shutil.copytree(place, whole, copy_function=_link)
+            info = _join(whole, added)
+        except CopolicyError as error:
+            # The folders in the making are gone when somebody reads this.
+            error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
+            raise
+        _take_place(whole, place)
+    return {
+        **summary,
+        "episodes_added": written["episodes"],
+        "frames_added": written["frames"],
+        "episodes": info["total_episodes"],
+        "frames": info["total_frames"],
+        "damaged_left_out": written["damaged_left_out"],
+        "discarded_left_out": written["discarded_left_out"],
+        "unfinished_recordings": unfinished,
+    }
+
+
+def finish_interrupted(root: Path) -> None:
+    """Undoes or completes what an interrupted call left of a data set."""
+    root = root.resolve()
+    before = _before(root)
+    if before.is_dir():
+        if root.exists():
+            shutil.rmtree(before)
+        else:
+            before.rename(root)
+
+
+def _join(whole: Path, added: Path) -> dict[str, Any]:
+    """Puts the files of `added` behind those of `whole`, which is not in use yet; returns the new info."""
+    info, new = _info(whole), _info(added)
+    if info["features"] != new["features"]:
+        names = {*info["features"], *new["features"]}
+        differ = sorted(name for name in names if info["features"].get(name) != new["features"].get(name))
+        raise FileFormatError(whole / _INFO, "the features of these recordings", f"others: {', '.join(differ)}")
+    if read_table(whole / _TASKS).to_pylist() != read_table(added / _TASKS).to_pylist():
+        raise FileFormatError(whole / _TASKS, "the one task of copolicy-convert", "others")
+    shift = Shift(info["total_episodes"], info["total_frames"])
+    places: dict[Place, Place] = {}
+    last, example = list(numbered_files(whole / "data").items())[-1]
+    for old, path in numbered_files(added / "data").items():
+        places[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
+        write_like(shift.frame_table(read_table(path)), example, _numbered(whole / "data", last))
+    last, example = list(numbered_files(whole / "meta" / "episodes").items())[-1]
+    for path in numbered_files(added / "meta" / "episodes").values():
+        last = update_chunk_file_indices(*last, info["chunks_size"])
+        table = shift.episode_table(read_table(path), places, last)
+        write_like(table, example, _numbered(whole / "meta" / "episodes", last))
+    statistics = [load_stats(whole), shift.statistics(load_stats(added) or {})]
+    total = info["total_episodes"] + new["total_episodes"]
+    if info.get("splits") == {"train": f"0:{info['total_episodes']}"}:
+        info["splits"] = {"train": f"0:{total}"}
+    info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
+    record = json.loads((whole / RECORD_FILE).read_text()) if (whole / RECORD_FILE).is_file() else {}
+    part = json.loads((added / RECORD_FILE).read_text())
+    notes = {**record.get("notes", {}), **part.pop("notes")}
+    part["version"] = version("lerobot_policy_copolicy")
+    record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
+    for name in (_INFO, _STATS, RECORD_FILE):
+        (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
+    write_stats(aggregate_stats(statistics), whole)
+    (whole / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False))
+    (whole / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n")
+    return info
+
+
+def _take_place(whole: Path, root: Path) -> None:
+    root.rename(_before(root))
+    whole.rename(root)
+    shutil.rmtree(_before(root))
+
+
+def _before(root: Path) -> Path:
+    return root.parent / f".{root.name}.before-append"
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # a file system without hard links
+        shutil.copy2(source, target)
+
+
+def _numbered(folder: Path, place: Place) -> Path:
+    return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.parquet"
+
+
+def _info(root: Path) -> dict[str, Any]:
+    try:
+        return json.loads((root / _INFO).read_text())
+    except (OSError, ValueError) as error:
+        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", str(error)) from None
+
+
+def _uuids(path: Path) -> list[str]:
+    table = read_table(path)
+    if "episode_uuid" not in table.column_names:
+        raise FileFormatError(path, "the episode columns of copolicy", "no episode_uuid")
+    return table.column("episode_uuid").to_pylist()
+
+
+def _uuid(path: Path) -> str | None:
+    try:
+        return read_metadata(path).get("episode", {}).get("episode_uuid")
+    except CopolicyError:
+        return None  # damaged: the conversion says so

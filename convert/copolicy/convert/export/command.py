@@ -1,0 +1,65 @@
+"""The command `copolicy-convert export`."""
+
+import argparse
+from pathlib import Path
+
+from copolicy.dataset.commandline import add_command
+from copolicy.dataset.exceptions import InvalidValueError
+
+from ..staging import require_new
+
+FORMATS = {
+    "zarr": "diffusion_policy's ReplayBuffer, with the arrays of the original program",
+    "robomimic": "one HDF5 file",
+    "minari": "a folder NAME-vN",
+}
+
+
+def add_export_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `export`."""
+    parser = add_command(
+        commands, "export", _export, "write a LeRobot data set of this project in another project's format",
+        "copolicy-convert export datasets/table --format zarr --out exports/table.zarr",
+    )  # fmt: skip
+    parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
+    formats = "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+    parser.add_argument("--format", choices=tuple(FORMATS), required=True, help=formats)
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="what to write; must not exist")
+    parser.add_argument(
+        "--alignment", choices=("ours", "upstream"), default=None,
+        help="zarr only: a row's action was taken in its state (ours, the default), or produced it (upstream, as in "
+        "the original's store)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--keep-discarded", action="store_true", help="export discarded and excluded episodes, too; they stay flagged"
+    )
+
+
+def _export(arguments: argparse.Namespace) -> dict:
+    if arguments.alignment and arguments.format != "zarr":
+        raise InvalidValueError("--alignment", "--format zarr beside it", arguments.format)
+    require_new(arguments.out)
+
+    from .source import ExportSource
+
+    source = ExportSource.open(arguments.root, arguments.keep_discarded)
+    if arguments.format == "zarr":
+        from .replay_buffer import export_replay_buffer
+
+        written = export_replay_buffer(source, arguments.out, arguments.alignment or "ours")
+    elif arguments.format == "robomimic":
+        from .robomimic import export_robomimic
+
+        written = export_robomimic(source, arguments.out)
+    else:
+        from .minari import export_minari
+
+        written = export_minari(source, arguments.out)
+    return {
+        "out": str(arguments.out),
+        "format": arguments.format,
+        "episodes": len(source.rows),
+        "discarded_left_out": source.left_out,
+        "sources": source.facts()["sources"],
+        **written,
+    }

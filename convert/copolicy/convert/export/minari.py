@@ -1,0 +1,103 @@
+"""Exports to a Minari data set: a folder NAME-vN with `data/metadata.json` and `data/main_data.hdf5`.
+
+It is read with `minari.load_dataset("NAME-vN")` where MINARI_DATASETS_PATH is the folder that holds it, or with
+`minari.MinariDataset(".../NAME-vN/data")`. An episode has T actions and T + 1 observations; its metadata are the
+episode columns. Format: https://minari.farama.org/content/dataset_standards/
+"""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, TASK
+
+from ..staging import new_folder
+from .source import ExportEpisode, ExportSource
+
+try:
+    import h5py
+except ModuleNotFoundError:
+    raise MissingExtraError("h5py") from None
+
+_FORMAT_VERSION = "0.5.0"
+"""Version of Minari whose layout this is; a later one reads it, an earlier one says that it cannot."""
+
+_OBSERVATIONS = {"state": STATE, "environment_state": ENVIRONMENT_STATE, "human_action": HUMAN_ACTION}
+_TERMINATIONS = ("goal", "collision_obstacle", "collision_wall")  # any other end cuts the episode off
+
+
+def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
+    """Writes the folder at `out`; returns facts for the summary.
+
+    Raises:
+        InvalidValueError: the name of `out` is no id of a Minari data set.
+        OutputExistsError: there is something at `out`.
+    """
+    if not re.fullmatch(r"[\w-]+-v\d+", out.name):
+        raise InvalidValueError("--out", "a folder named as Minari names data sets, NAME-vN", out.name)
+    with new_folder(out) as partial:
+        folder = partial / "data"
+        folder.mkdir(parents=True)
+        path = folder / "main_data.hdf5"
+        with h5py.File(path, "w", track_order=True) as file:
+            bounds = {feature: BOUNDS[feature].astype(np.float32) for feature in (*_OBSERVATIONS.values(), ACTION)}
+            for number, episode in enumerate(source.episodes()):
+                group = file.create_group(f"episode_{number}")
+                _write_episode(group, number, episode)
+                _widen(bounds, group)
+        subspaces = {name: _box(bounds[feature]) for name, feature in _OBSERVATIONS.items()}
+        metadata = {
+            "total_episodes": len(source.rows),
+            "total_steps": source.frames,
+            "data_format": "hdf5",
+            # Minari keeps spaces as JSON texts inside the JSON file.
+            "observation_space": json.dumps({"type": "Dict", "subspaces": subspaces}),
+            "action_space": json.dumps(_box(bounds[ACTION])),
+            "dataset_id": out.name,
+            "minari_version": _FORMAT_VERSION,
+            "dataset_size": round(path.stat().st_size / 1e6, 1),
+            "description": f"{TASK} Two players, one table; sources: {', '.join(source.facts()['sources'])}.",
+            "copolicy": source.facts(),
+        }
+        (folder / "metadata.json").write_text(json.dumps(metadata, indent=1))
+    return {"frames": source.frames, "dataset_id": out.name}
+
+
+def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
+    # The task's bounds scale the values for training, a table can turn a little faster; a space must hold all.
+    paths = {feature: f"observations/{name}" for name, feature in _OBSERVATIONS.items()} | {ACTION: "actions"}
+    for feature, path in paths.items():
+        values = np.asarray(group[path])
+        low, high = bounds[feature]
+        bounds[feature] = np.stack((np.minimum(low, values.min(axis=0)), np.maximum(high, values.max(axis=0))))
+
+
+def _box(bounds: np.ndarray) -> dict[str, Any]:
+    low, high = bounds
+    return {
+        "type": "Box", "dtype": "float32", "shape": list(low.shape), "low": low.tolist(), "high": high.tolist(),
+    }  # fmt: skip
+
+
+def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> None:
+    last = np.arange(len(episode)) == len(episode) - 1
+    terminated = episode.meta["termination_reason"] in _TERMINATIONS
+    arrays = {
+        "observations/state": np.vstack((episode.states, episode.final_state())),
+        "observations/environment_state": np.tile(episode.environment, (len(episode) + 1, 1)),
+        "observations/human_action": np.vstack((episode.human_actions, episode.actions[-1:, 2:])),
+        "actions": episode.actions,
+        "rewards": episode.rewards,
+        "terminations": last & terminated,
+        "truncations": last & (not terminated),
+        "infos/success": np.append(np.zeros(len(episode), bool), episode.meta["success"]),
+    }
+    for name, values in arrays.items():
+        group.create_dataset(name, data=values, chunks=True, maxshape=(None, *values.shape[1:]))
+    # Minari's own key: a seed that is not known is none.
+    columns = {name: value for name, value in episode.meta.items() if name != "seed" or value >= 0}
+    group.attrs.update({"id": number, "total_steps": len(episode), "episode_index": episode.index, **columns})

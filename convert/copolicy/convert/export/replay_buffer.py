@@ -1,0 +1,135 @@
+"""Exports to a Zarr v2 store as diffusion_policy's ReplayBuffer reads it, with the arrays of the original program.
+
+`data/obs (N, 18)`, `data/action (N, 4)`, `data/past_action (N, 4)`, `meta/episode_ends (E,)`; obs is the table's
+state (7) followed by the map (11). What a row means is the alignment:
+
+    ours      obs[i] is the state in which action[i] was taken, past_action[i] the action of the row before. A policy
+              that the original's training makes of it acts on what it sees; this is what to train on.
+    upstream  obs[i] is the state one step of 1/30 s after action[i] began, past_action[i] the action of the step
+              before it, as in the released store: to mix with that store, or to repeat published results, where
+              each observation is paired with the action that produced it.
+
+For `upstream` a data set at 30 Hz gives all of that exactly (every third step is kept, the store has 10 Hz). One at
+10 Hz holds neither the state one step on, which is integrated under the default physics, nor the step before, for
+which the action of the frame before stands in.
+"""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from copolicy.dataset.clock import previous_actions
+from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.features import ENVIRONMENT_NAMES, theta_of
+from copolicy.dataset.task import ACTION_NAMES, RECORD_HZ, STATE_NAMES, Physics
+
+from ..dynamics import step_angular, step_linear
+from ..staging import new_folder
+from ..upstream_episode import states_7
+from ..upstream_zarr import ZARR_HZ
+from .source import ExportEpisode, ExportSource
+
+Alignment = Literal["ours", "upstream"]
+"""Which state a row pairs with its action."""
+
+_COMPRESSOR = {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 0, "blocksize": 0}
+_CHUNK_ROWS = 16384
+
+
+def export_replay_buffer(source: ExportSource, out: Path, alignment: Alignment = "ours") -> dict[str, Any]:
+    """Writes the store at `out`; returns facts for the summary.
+
+    Raises:
+        InvalidValueError: `upstream` of a data set at another rate than 10 or 30 Hz.
+        MissingExtraError: numcodecs is not installed.
+        OutputExistsError: there is something at `out`.
+    """
+    if alignment == "upstream" and source.fps not in (ZARR_HZ, RECORD_HZ):
+        raise InvalidValueError("--alignment", f"a data set at {ZARR_HZ} or {RECORD_HZ} Hz for upstream", source.fps)
+    with new_folder(out) as partial:
+        rows = [_rows(episode, alignment) for episode in source.episodes()]
+        ends = np.cumsum([len(actions) for _, actions, _ in rows])
+        _write_group(partial)
+        for group in ("data", "meta"):
+            _write_group(partial / group)
+        for name, arrays in zip(("obs", "action", "past_action"), zip(*rows, strict=True), strict=True):
+            _write_array(partial / "data" / name, np.concatenate(arrays).astype("<f8"))
+        _write_array(partial / "meta" / "episode_ends", ends.astype("<i8"))
+        fps = ZARR_HZ if alignment == "upstream" else source.fps
+        attributes = {
+            **source.facts(),
+            "fps": fps,
+            "alignment": alignment,
+            "obs": [*STATE_NAMES, *ENVIRONMENT_NAMES],
+            "action": list(ACTION_NAMES),
+            "past_action": "action of the row before" if not _exact(source.fps, alignment) else "of the step before",
+            "episodes": [
+                {key: _jsonable(value) for key, value in row.items() if key != "length"} for row in source.rows
+            ],
+        }
+        (partial / ".zattrs").write_text(json.dumps(attributes, indent=1, allow_nan=False))
+    return {"alignment": alignment, "fps": fps, "rows": int(ends[-1])}
+
+
+def _exact(fps: int, alignment: Alignment) -> bool:
+    return alignment == "upstream" and fps == RECORD_HZ
+
+
+def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """obs `(T, 18)`, action and past_action `(T, 4)`."""
+    states, actions = episode.states.astype(float), episode.actions.astype(float)
+    past = previous_actions(actions)
+    if _exact(episode.fps, alignment):
+        kept = slice(None, None, RECORD_HZ // ZARR_HZ)
+        states, actions, past = episode.next_states().astype(float)[kept], actions[kept], past[kept]
+    elif alignment == "upstream":
+        states = _one_step_on(states, actions)
+    environment = np.tile(episode.environment.astype(float), (len(states), 1))
+    return np.hstack((states, environment)), actions, past
+
+
+def _one_step_on(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    """States `(T, 7)` one step of 1/30 s after `actions` began in `states`."""
+    physics = Physics()
+    position, velocity = step_linear(states[:, :2], states[:, 4:6], actions, physics)
+    theta, omega = step_angular(theta_of(states), states[:, 6], actions, physics)
+    return states_7(np.column_stack((position, theta, velocity, omega)))
+
+
+def _jsonable(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write_group(folder: Path) -> None:
+    folder.mkdir()
+    (folder / ".zgroup").write_text(json.dumps({"zarr_format": 2}))
+
+
+def _write_array(folder: Path, array: np.ndarray) -> None:
+    try:
+        from numcodecs.blosc import Blosc
+    except ImportError:
+        raise MissingExtraError("numcodecs") from None
+    codec = Blosc(**{key: value for key, value in _COMPRESSOR.items() if key != "id"})
+    length = min(len(array), _CHUNK_ROWS)
+    folder.mkdir()
+    metadata = {
+        "zarr_format": 2,
+        "shape": list(array.shape),
+        "chunks": [length, *array.shape[1:]],
+        "dtype": array.dtype.str,
+        "compressor": _COMPRESSOR,
+        "fill_value": 0,
+        "order": "C",
+        "filters": None,
+    }
+    (folder / ".zarray").write_text(json.dumps(metadata, indent=1))
+    for number, start in enumerate(range(0, len(array), length)):
+        # Every chunk has the full length; what lies beyond the array's end is not looked at.
+        chunk = np.zeros((length, *array.shape[1:]), array.dtype)
+        chunk[: len(array) - start] = array[start : start + length]
+        name = ".".join([str(number), *"0" * (array.ndim - 1)])
+        (folder / name).write_bytes(codec.encode(chunk))

@@ -1,0 +1,119 @@
+"""The tables of one LeRobot v3 data set as they are when its episodes follow those of another."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+except ModuleNotFoundError:
+    raise MissingExtraError("pyarrow") from None
+
+Place = tuple[int, int]
+"""Numbers of a chunk and of a file in it."""
+
+_COUNTED = ("count", "std")  # statistics that do not move with the values
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far episodes and frames move."""
+
+    episodes: int
+    frames: int
+
+    @property
+    def columns(self) -> dict[str, int]:
+        """The columns of the frames that move."""
+        return {"episode_index": self.episodes, "index": self.frames}
+
+    def statistics(self, statistics: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Statistics of a data set, by feature and kind."""
+        return {
+            name: {
+                kind: value if kind in _COUNTED else value + self.columns.get(name, 0) for kind, value in kinds.items()
+            }
+            for name, kinds in statistics.items()
+        }
+
+    def frame_table(self, table: "pa.Table") -> "pa.Table":
+        """A table of frames."""
+        for name, by in self.columns.items():
+            table = _added(table, name, by)
+        return table
+
+    def episode_table(self, table: "pa.Table", data: Mapping[Place, Place], own: Place) -> "pa.Table":
+        """A table of meta/episodes.
+
+        Args:
+            data: where each file of frames went.
+            own: where the table itself goes.
+        """
+        moved = {
+            "episode_index": self.episodes,
+            "dataset_from_index": self.frames,
+            "dataset_to_index": self.frames,
+        }
+        for name, by in moved.items():
+            table = _added(table, name, by)
+        places = zip(
+            table.column("data/chunk_index").to_pylist(), table.column("data/file_index").to_pylist(), strict=True
+        )
+        files = [data[place] for place in places]
+        for folder, where in (("data", files), ("meta/episodes", [own] * table.num_rows)):
+            for part, name in enumerate(("chunk_index", "file_index")):
+                table = _replaced(table, f"{folder}/{name}", [place[part] for place in where])
+        for name in table.column_names:
+            feature, _, kind = name.removeprefix("stats/").rpartition("/")
+            if name.startswith("stats/") and feature in self.columns and kind not in _COUNTED:
+                by = self.columns[feature]
+                rows = [[value + by for value in row] for row in table.column(name).to_pylist()]
+                table = _replaced(table, name, rows)
+        return table
+
+
+def numbered_files(folder: Path) -> dict[Place, Path]:
+    """The Parquet files `chunk-000/file-000.parquet` of a folder by their numbers, in order."""
+    files = sorted(folder.glob("chunk-*/file-*.parquet"))
+    return dict(sorted(((int(path.parent.name[6:]), int(path.stem[5:])), path) for path in files))
+
+
+def read_table(path: Path) -> "pa.Table":
+    """One Parquet file.
+
+    Raises:
+        FileFormatError: it is not complete.
+    """
+    try:
+        with pq.ParquetFile(path) as file:
+            return file.read()
+    except (pa.ArrowException, OSError) as error:
+        raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+
+
+def write_like(table: "pa.Table", example: Path, path: Path) -> None:
+    """Writes a table with the columns, their order and their types, of another file.
+
+    Raises:
+        FileFormatError: the other file has other columns.
+    """
+    schema = pq.read_schema(example)
+    if sorted(schema.names) != sorted(table.column_names):
+        differ = sorted(set(schema.names) ^ set(table.column_names))
+        raise FileFormatError(example, f"columns {', '.join(sorted(table.column_names)[:4])}, ...", f"not {differ[:4]}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(table.select(schema.names).cast(schema), path, compression="snappy", use_dictionary=True)
+
+
+def _added(table: "pa.Table", name: str, by: int) -> "pa.Table":
+    return _replaced(table, name, [value + by for value in table.column(name).to_pylist()])
+
+
+def _replaced(table: "pa.Table", name: str, values: list) -> "pa.Table":
+    place = table.column_names.index(name)
+    field = table.schema.field(place)
+    return table.set_column(place, field, pa.array(values, field.type))

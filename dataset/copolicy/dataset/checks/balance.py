@@ -1,0 +1,89 @@
+"""Whether the maps, and the pairs over the maps, are there equally often."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.stats import chi2_contingency, chisquare
+
+from ..task import MAP_SETS, identify
+from .episode_table import EpisodeTable
+from .finding import Finding
+from .limits import limit
+from .rule import Rule
+
+_VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
+
+
+def _maps(table: EpisodeTable) -> Iterator[Finding]:
+    for name, counts in _by_set(table).items():
+        weights = _weights(name, counts)
+        maps, episodes = sorted(weights), sum(counts.values())
+        share = np.array([weights[one] for one in maps]) / sum(weights.values())
+        found = np.array([counts[one] for one in maps])
+        missing = int((found == 0).sum())
+        if missing and episodes >= len(maps):
+            message = f"of the {len(maps)} maps of {name} have no episode"
+            yield Finding("", "balance", missing, 0, "warning", message)
+        expected = share * episodes
+        if expected.min() < limit("balance.expected"):
+            message = f"episodes for each map of {name}: too few to tell whether they are balanced"
+            yield Finding("", "balance", float(expected.min()), limit("balance.expected"), "info", message)
+            continue
+        p = float(chisquare(found, expected).pvalue)
+        if p < limit("balance.p"):
+            message = f"the maps of {name} have {found.min()} to {found.max()} episodes; p of a chi-square test"
+            yield Finding("", "balance", p, limit("balance.p"), "warning", message)
+
+
+def _pairs(table: EpisodeTable) -> Iterator[Finding]:
+    pairs, maps = table.columns["pair_id"], _base_maps(table)
+    known = pairs != ""
+    if not known.any():
+        return
+    counts = Counter(pairs[known].tolist())
+    most, least = max(counts.values()), min(counts.values())
+    if most / least > limit("balance.pairs"):
+        message = f"the largest of {len(counts)} pairs has {most} episodes, the smallest {least}"
+        yield Finding("", "balance_pairs", most / least, limit("balance.pairs"), "warning", message)
+    if len(counts) < 2 or len(set(maps[known])) < 2:
+        return
+    rows, columns = np.unique(pairs[known], return_inverse=True)[1], np.unique(maps[known], return_inverse=True)[1]
+    cells = np.zeros((rows.max() + 1, columns.max() + 1), np.int64)
+    np.add.at(cells, (rows, columns), 1)
+    result = chi2_contingency(cells)
+    smallest = float(np.asarray(result[3]).min())
+    if smallest < limit("balance.expected"):
+        message = "episodes for each pair on each map: too few to tell whether pairs and maps are mixed"
+        yield Finding("", "balance_pairs", smallest, limit("balance.expected"), "info", message)
+    elif float(result[1]) < limit("balance.p"):  # pyright: ignore[reportArgumentType]
+        message = "pairs did not carry on the same maps; p of a chi-square test of pair against map"
+        yield Finding("", "balance_pairs", float(result[1]), limit("balance.p"), "warning", message)  # pyright: ignore[reportArgumentType]
+
+
+def _by_set(table: EpisodeTable) -> dict[str, Counter[str]]:
+    counts: dict[str, Counter[str]] = {}
+    for name, map_id in zip(table.columns["map_set"].tolist(), _base_maps(table).tolist(), strict=True):
+        counts.setdefault(name or "unnamed maps", Counter())[map_id] += 1
+    return counts
+
+
+def _base_maps(table: EpisodeTable) -> np.ndarray:
+    return np.array([_VARIANT.sub("", name) for name in table.columns["map_id"].tolist()], str)
+
+
+def _weights(name: str, counts: Counter[str]) -> dict[str, int]:
+    """How often each map should be there: as often as its set repeats it; of the sets that hold all the maps that
+    are there, the smallest, because the paper's 36 carry the names of the training maps."""
+    if name not in MAP_SETS:
+        return dict.fromkeys(counts, 1)
+    sets = [Counter(identify(config)[0] for config in maps) for maps in MAP_SETS.values()]
+    fitting = [weights for weights in sets if set(counts) <= set(weights)]
+    return min(fitting, key=len) if fitting else dict.fromkeys(counts, 1)
+
+
+RULES = (
+    Rule("balance", "the maps of a set are equally frequent", _maps, (), ("map_set", "map_id")),
+    Rule("balance_pairs", "pairs are equally frequent, on the same maps", _pairs, (), ("pair_id", "map_id")),
+)

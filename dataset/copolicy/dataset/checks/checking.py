@@ -1,0 +1,132 @@
+"""Runs every rule over a data set."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..exceptions import FileFormatError
+from . import (
+    balance,
+    check_sums,
+    consent,
+    contacts,
+    drift,
+    duplicates,
+    inputs,
+    leakage,
+    maps,
+    motion,
+    schema,
+    timing,
+)
+from .episode_table import EpisodeTable
+from .finding import SEVERITIES, Finding
+from .read_recordings import read_recordings
+from .rule import Rule
+
+RULES: tuple[Rule, ...] = (
+    *schema.RULES,
+    *check_sums.RULES,
+    *timing.RULES,
+    *drift.RULES,
+    *inputs.RULES,
+    *motion.RULES,
+    *duplicates.RULES,
+    *maps.RULES,
+    *contacts.RULES,
+    *balance.RULES,
+    *consent.RULES,
+    *leakage.RULES,
+)
+"""Every rule, in the order of the report."""
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What was found.
+
+    Attributes:
+        findings: worst first, then in the order of the rules.
+        applied: names of the rules that were applied.
+        not_applied: the others, each with the reason.
+    """
+
+    table: EpisodeTable
+    findings: tuple[Finding, ...]
+    applied: tuple[str, ...]
+    not_applied: dict[str, str]
+
+    def count(self, severity: str) -> int:
+        """Findings of a severity."""
+        return sum(finding.severity == severity for finding in self.findings)
+
+    def failed(self, strict: bool = False) -> bool:
+        """Whether the data should not be used: an error, with `strict` also a warning."""
+        return bool(self.count("error") or (strict and self.count("warning")))
+
+
+def read_table(root: Path) -> EpisodeTable:
+    """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
+
+    Raises:
+        FileFormatError: neither.
+        MissingExtraError: a LeRobot data set without pyarrow.
+    """
+    if (root / "meta" / "info.json").is_file():
+        from .read_lerobot import read_lerobot
+
+        return read_lerobot(root)
+    if not root.is_dir() or next(root.rglob("*.mcap*"), None) is None:
+        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", "neither")
+    return read_recordings(root)
+
+
+def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
+    """Applies every rule that the data have the columns for. Nothing is changed.
+
+    Args:
+        root: a LeRobot data set or a folder of recordings.
+        against: another one that must share no episode with it, for example the test data.
+    """
+    result = check_table(read_table(root))
+    if against is None:
+        return result
+    other = read_table(against)
+    shared = leakage.leaks(
+        leakage.Part(root.name, result.table, range(len(result.table.labels))),
+        leakage.Part(against.name, other, range(len(other.labels))),
+    )
+    findings = _worst_first([*result.findings, *shared])
+    return CheckResult(result.table, findings, (*result.applied, "against"), result.not_applied)
+
+
+def check_table(table: EpisodeTable) -> CheckResult:
+    """Applies every rule that a table has the columns for."""
+    findings: list[Finding] = []
+    applied: list[str] = []
+    not_applied: dict[str, str] = {}
+    for rule in RULES:
+        reason = _why_not(rule, table)
+        if reason:
+            not_applied[rule.name] = reason
+            continue
+        applied.append(rule.name)
+        findings += rule.find(table)
+    return CheckResult(table, _worst_first(findings), tuple(applied), not_applied)
+
+
+def _worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
+
+
+def _why_not(rule: Rule, table: EpisodeTable) -> str:
+    if table.kind not in rule.kinds:
+        return f"says nothing about {table.kind}"
+    missing = [name for name in rule.columns if name not in table.columns]
+    missing += [name for name in rule.frames if name not in table.frames]
+    if missing:
+        return f"needs {', '.join(missing)}"
+    if rule.frames and not len(table.starts):
+        return "needs the frames of at least one episode"
+    if table.fps <= 0 and rule.name not in ("format", "features", "columns", "reading"):
+        return "needs a rate"
+    return ""

@@ -1,0 +1,97 @@
+"""Whether success and termination fit what the table can have touched: the surest sign of a wrong map."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..features import ENVIRONMENT_STATE, STATE
+from ..task import GOAL_SIZE, MAX_OBSTACLES, RECORD_HZ, WINDOW
+from .episode_table import EpisodeTable
+from .finding import Finding
+from .geometry import INNER, OUTER, final_poses, separation
+from .limits import limit
+from .rule import Rule, each
+
+_SIZES = (45, 50)  # of obstacles, where the data do not say which
+
+
+def _goal(table: EpisodeTable) -> Iterator[Finding]:
+    margin = limit("contact_margin")
+    maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
+    success = table.of_framed("success")
+    gap, error = _final_gap(table, maps[:, 3:5], GOAL_SIZE / 2)
+    bound = margin + error
+    message = "a success, but the table ended this many px from the goal of its map"
+    yield from each(table, success & ~(gap <= bound), "goal_contact", gap, bound, "error", message, table.framed)
+    depth = _deepest(table, np.repeat(maps[:, 3:5], table.counts, axis=0), GOAL_SIZE / 2)
+    message = "no success, but the table was this many px inside the goal of its map"
+    yield from each(table, ~success & (depth > margin), "goal_contact", depth, margin, "error", message, table.framed)
+
+
+def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
+    margin = limit("contact_margin")
+    maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
+    smallest = largest = np.broadcast_to(np.array(_SIZES, float), (len(table.starts), 2))
+    smallest, largest = smallest[:, 0], largest[:, 1]
+    if table.obstacle_sizes is not None:
+        smallest = largest = table.obstacle_sizes.astype(float)
+    deepest = np.full(len(table.starts), -np.inf)
+    nearest = np.full(len(table.starts), np.inf)
+    error = 0.0
+    for slot in range(MAX_OBSTACLES):
+        centres = maps[:, 5 + 2 * slot : 7 + 2 * slot]
+        there = (centres != 0).any(axis=1)
+        halves = np.repeat(smallest / 2, table.counts)
+        depth = _deepest(table, np.repeat(centres, table.counts, axis=0), halves)
+        gap, error = _final_gap(table, centres, largest / 2)
+        deepest = np.where(there, np.maximum(deepest, depth), deepest)
+        nearest = np.where(there, np.minimum(nearest, gap), nearest)
+    message = "the table went this many px into an obstacle of its map before the episode ended"
+    yield from each(table, deepest > margin, "obstacle_contact", deepest, margin, "error", message, table.framed)
+    collided = table.of_framed("termination_reason") == "collision_obstacle"
+    bound = margin + error
+    message = "ended by a collision, but this many px from every obstacle of its map"
+    yield from each(
+        table, collided & ~(nearest <= bound), "obstacle_contact", nearest, bound, "error", message, table.framed
+    )
+
+
+def _wall(table: EpisodeTable) -> Iterator[Finding]:
+    positions, thetas, error = _final(table)
+    cos, sin = np.abs(np.cos(thetas)), np.abs(np.sin(thetas))
+    half = np.stack((OUTER[1] * cos + OUTER[2] * sin, OUTER[1] * sin + OUTER[2] * cos), axis=-1)
+    room = np.minimum(positions - half, np.array(WINDOW, float) - positions - half).min(axis=(0, 2))
+    bound = limit("contact_margin") + error
+    ended = table.of_framed("termination_reason") == "collision_wall"
+    message = "ended at the wall, but this many px from it"
+    yield from each(table, ended & ~(room <= bound), "wall_contact", room, bound, "error", message, table.framed)
+
+
+def _deepest(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
+    """`(F,)` how deep the inner rectangle was in a square in any frame, px."""
+    states = table.frames[STATE].astype(float)
+    thetas = np.arctan2(states[:, 3], states[:, 2])
+    return np.maximum.reduceat(-separation(states[:, :2], thetas, INNER, centres, half), table.starts)
+
+
+def _final(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray, float]:
+    if table.final_states is not None:
+        final = table.final_states
+        return final[None, :, :2], np.arctan2(final[:, 3], final[:, 2])[None], 0.0
+    return final_poses(table.frames[STATE][table.ends].astype(float), table.fps, RECORD_HZ)
+
+
+def _final_gap(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:
+    """`(F,)` how far the outer rectangle ended from a square at least, px, and the error of that."""
+    positions, thetas, error = _final(table)
+    gaps = [separation(at, theta, OUTER, centres, half) for at, theta in zip(positions, thetas, strict=True)]
+    return np.minimum.reduce(gaps), error
+
+
+RULES = (
+    Rule("goal_contact", "successes end at their map's goal, and nothing else does", _goal,
+         (STATE, ENVIRONMENT_STATE), ("success",)),
+    Rule("obstacle_contact", "the table goes through no obstacle; collisions are near one", _obstacles,
+         (STATE, ENVIRONMENT_STATE), ("termination_reason",)),
+    Rule("wall_contact", "episodes that ended at the wall are near it", _wall, (STATE,), ("termination_reason",)),
+)  # fmt: skip

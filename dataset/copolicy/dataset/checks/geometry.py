@@ -1,0 +1,62 @@
+"""What the table certainly touches, and what it certainly does not, without the world's contact queries.
+
+The world decides contacts to the pixel and belongs to another room. Two rectangles bracket its table: one that holds
+all its parts, one that lies inside its board. What the outer one does not reach was not touched, what the inner one
+reaches was.
+"""
+
+import numpy as np
+
+Rectangle = tuple[float, float, float]
+"""Offset of the middle along the table, half length and half width, px."""
+
+OUTER: Rectangle = (0.0, 95.8, 29.5)
+"""Circle, board and triangle of 191 x 59 px, with the fringe of the circle's pixels."""
+
+INNER: Rectangle = (-2.5, 54.0, 16.5)
+"""The board without its rounded corners."""
+
+
+def separation(
+    positions: np.ndarray, thetas: np.ndarray, rectangle: Rectangle, centres: np.ndarray, half: np.ndarray | float
+) -> np.ndarray:
+    """Largest gap along the four axes of a turned rectangle and an upright square; negative where they overlap.
+
+    By the separating axis theorem two convex shapes are apart exactly where one of these gaps is positive.
+
+    Args:
+        positions: `(M, 2)` the table's centre, px.
+        thetas: `(M,)` orientation, rad, counter-clockwise on screen.
+        centres: `(M, 2)` of the squares, px.
+        half: half a side of the squares, px.
+    """
+    offset, length, width = rectangle
+    cos, sin = np.cos(thetas), np.sin(thetas)
+    along, across = np.column_stack((cos, -sin)), np.column_stack((sin, cos))
+    between = centres - (positions + offset * along)
+    turned = np.abs(cos) + np.abs(sin)
+    gaps = (
+        np.abs(between[:, 0]) - (length * np.abs(cos) + width * np.abs(sin) + half),
+        np.abs(between[:, 1]) - (length * np.abs(sin) + width * np.abs(cos) + half),
+        np.abs((between * along).sum(axis=1)) - (length + half * turned),
+        np.abs((between * across).sum(axis=1)) - (width + half * turned),
+    )
+    return np.maximum.reduce(gaps)
+
+
+def final_poses(states: np.ndarray, fps: float, record_hz: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Where the table can have been when the last frame's action ended, which took one to `record_hz / fps` steps.
+
+    Args:
+        states: `(F, 7)` state of the last frame.
+
+    Returns:
+        Positions `(J, F, 2)` and orientations `(J, F)` after each number of steps, and the error in px that a
+        constant velocity makes at most.
+    """
+    steps = max(round(record_hz / fps), 1)
+    seconds = np.arange(1, steps + 1)[:, None] / record_hz
+    positions = states[None, :, :2] + states[None, :, 4:6] * seconds[..., None]
+    thetas = np.arctan2(states[:, 3], states[:, 2]) + states[:, 6] * seconds
+    # Half of the largest acceleration, 50 px/s^2, and of the largest of the table's end, 96 px x pi/2 rad/s^2.
+    return positions, thetas, 100.0 / fps**2

@@ -1,0 +1,101 @@
+"""Whether what a policy is tested on was part of what it was trained on."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from ..features import ACTION, STATE
+from .duplicates import motion_digests
+from .episode_table import EpisodeTable
+from .finding import Finding, Severity
+from .rule import Rule
+
+PEOPLE = ("pair_id", "player_0_id", "player_1_id")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One side of a comparison: some episodes of a table, by their places."""
+
+    name: str
+    table: EpisodeTable
+    places: Sequence[int]
+
+
+def splits(table: EpisodeTable) -> tuple[list[Part], list[Finding]]:
+    """The splits of `meta/info.json` (`"train": "0:40"`), and what is wrong with their ranges."""
+    parts: list[Part] = []
+    findings: list[Finding] = []
+    entries = table.info.get("splits")
+    indices = {label: place for place, label in enumerate(table.labels)}
+    for name, text in (entries if isinstance(entries, dict) else {}).items():
+        begin, colon, end = str(text).partition(":")
+        if not (colon and begin.isdecimal() and end.isdecimal()):
+            findings.append(Finding("", "splits", str(text), "FIRST:END", "error", f"split {name} is no range"))
+            continue
+        if int(end) > len(table.labels) or int(begin) > int(end):
+            message = f"split {name} is not a range of the {len(table.labels)} episodes"
+            findings.append(Finding("", "splits", str(text), f"0:{len(table.labels)}", "error", message))
+        places = [indices[str(index)] for index in range(int(begin), int(end)) if str(index) in indices]
+        parts.append(Part(str(name), table, places))
+    for one, other in combinations(parts, 2):
+        shared = len(set(one.places) & set(other.places))
+        if shared:
+            message = f"episodes are in both splits, {one.name} and {other.name}"
+            findings.append(Finding("", "splits", shared, 0, "error", message))
+    return parts, findings
+
+
+def leaks(one: Part, other: Part) -> Iterator[Finding]:
+    """What two parts share: episodes, by name or bit for bit, and people."""
+    for what, ours, theirs in (
+        ("episode_uuid", _texts(one, "episode_uuid"), _texts(other, "episode_uuid")),
+        ("source_sha256", _texts(one, "source_sha256"), _texts(other, "source_sha256")),
+        ("states and actions", _motions(one), _motions(other)),
+    ):
+        shared = sorted(set(ours) & set(theirs))
+        for value in shared:
+            message = f"same {what} as episode {theirs[value]} of {other.name}"
+            label = ours[value] if one.table is other.table else f"{ours[value]} of {one.name}"
+            yield Finding(label, "leakage", 1, 0, "error", message)
+    for column in PEOPLE:
+        shared = sorted(set(_texts(one, column)) & set(_texts(other, column)))
+        if shared:
+            # Scripted pilots are meant to be met again; a person in both says nothing about new people.
+            severity: Severity = "warning" if _people(one) or _people(other) else "info"
+            names = ", ".join(shared[:5]) + (", ..." if len(shared) > 5 else "")
+            message = f"the same {column} in {one.name} and {other.name}: {names}"
+            yield Finding("", "leakage_people", len(shared), 0, severity, message)
+
+
+def _between_splits(table: EpisodeTable) -> Iterator[Finding]:
+    parts, findings = splits(table)
+    yield from findings
+    for one, other in combinations(parts, 2):
+        yield from leaks(one, other)
+
+
+def _texts(part: Part, column: str) -> dict[str, str]:
+    if column not in part.table.columns:
+        return {}
+    values = part.table.columns[column]
+    return {str(values[place]): part.table.labels[place] for place in part.places if values[place]}
+
+
+def _motions(part: Part) -> dict[str, str]:
+    table = part.table
+    if STATE not in table.frames or ACTION not in table.frames or not len(table.starts):
+        return {}
+    wanted = set(part.places)
+    digests = zip(table.framed.tolist(), motion_digests(table), strict=True)
+    return {digest: table.labels[place] for place, digest in digests if place in wanted}
+
+
+def _people(part: Part) -> bool:
+    sources = part.table.columns.get("source")
+    return sources is None or bool(np.isin(sources[list(part.places)], ("human", "upstream")).any())
+
+
+RULES = (Rule("leakage", "the splits of meta/info.json share nothing", _between_splits, kinds=("lerobot",)),)

@@ -1,0 +1,112 @@
+"""Whether the maps that the episodes name are the ones in their rows."""
+
+import functools
+import math
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..exceptions import CopolicyError
+from ..features import ENVIRONMENT_STATE, STATE, map_of
+from ..task import MAP_SETS, MapConfig, map_set
+from .episode_table import EpisodeTable
+from .finding import Finding
+from .limits import limit
+from .rule import Rule, each
+
+DISPLACED = "-displaced"
+"""Ends the name of a map whose start alone was changed."""
+
+_UNLIKE = float("inf")
+
+
+def _constant(table: EpisodeTable) -> Iterator[Finding]:
+    moved, later = table.changes(table.frames[ENVIRONMENT_STATE])
+    changed = np.zeros(table.frame_count, int)
+    changed[later] = (moved != 0).any(axis=1)
+    changes = np.add.reduceat(changed, table.starts)
+    message = f"{ENVIRONMENT_STATE} changes within the episode"
+    yield from each(table, changes > 0, "map_constant", changes, 0, "error", message, table.framed)
+
+
+def _named(table: EpisodeTable) -> Iterator[Finding]:
+    for label, name, group in zip(
+        table.labels, table.columns["map_id"].tolist(), table.columns["map_set"].tolist(), strict=True
+    ):
+        family = name.split("-")[0]
+        if not name:
+            yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
+        elif family != "custom" and named_map(name) is None:
+            yield Finding(label, "map_name", name, "a map of a set", "error", "map_id is not the name of a known map")
+        elif group != family and not (group == "paper36" and family == "training"):
+            yield Finding(label, "map_name", group, family, "error", "map_set is not the set of map_id")
+    flagged = (
+        np.char.find(table.columns["quality_flags"], "map_mismatch") >= 0 if "quality_flags" in table.columns else ()
+    )
+    for place in np.flatnonzero(flagged):
+        message = "the importer found another map in the file than was played (map_mismatch)"
+        yield Finding(table.labels[place], "map_name", None, None, "warning", message)
+
+
+def _rows(table: EpisodeTable) -> Iterator[Finding]:
+    rows = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
+    bound = limit("map_position")
+    for place, row in zip(table.framed, rows, strict=True):
+        name = str(table.columns["map_id"][place])
+        expected = named_map(name)
+        if expected is None:
+            continue
+        try:
+            found = map_of(row, expected.obstacle_size)
+        except CopolicyError as error:
+            yield Finding(table.labels[place], "map_rows", None, None, "error", str(error))
+            continue
+        distance = map_distance(found, expected, start=not name.endswith(DISPLACED))
+        if not distance <= bound:
+            figure = "other obstacles" if distance == _UNLIKE else distance
+            message = f"start, goal or obstacles in the rows are not those of {name}"
+            yield Finding(table.labels[place], "map_rows", figure, bound, "error", message)
+
+
+def _start(table: EpisodeTable) -> Iterator[Finding]:
+    first = table.frames[STATE][table.starts].astype(float)
+    start = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
+    away = np.linalg.norm(first[:, :2] - start[:, :2], axis=1)
+    bound = limit("map_start")
+    message = "the episode begins this many px from its map's start"
+    yield from each(table, ~(away <= bound), "map_start", away, bound, "error", message, table.framed)
+
+
+def map_distance(found: MapConfig, expected: MapConfig, start: bool = True) -> float:
+    """Largest distance in px between the parts of two maps, whatever the order of their obstacles; a turned start
+    counts with the way of the table's end. Infinite where the number of obstacles differs."""
+    if len(found.obstacles) != len(expected.obstacles):
+        return _UNLIKE
+    ends = [(found.goal, expected.goal), *zip(sorted(found.obstacles), sorted(expected.obstacles), strict=True)]
+    distances = [math.dist(one, other) for one, other in ends]
+    if start:
+        turn = math.remainder(found.start[2] - expected.start[2], 2 * math.pi)
+        distances += [math.dist(found.start[:2], expected.start[:2]), 96 * abs(turn)]
+    return max(distances)
+
+
+@functools.cache
+def named_map(name: str) -> MapConfig | None:
+    """The map behind a `map_id`, by the names that `task.identify` gives; None if it is of no set."""
+    match = re.fullmatch(r"([a-z0-9]+)-(\d+)(?:-(\d+)deg)?", name.removesuffix(DISPLACED))
+    if match is None or match[1] not in MAP_SETS or int(match[2]) >= len(MAP_SETS[match[1]]):
+        return None
+    if match[3] is None:
+        return MAP_SETS[match[1]][int(match[2])]
+    turned = map_set(match[1], orientations=True)[4 * int(match[2]) : 4 * int(match[2]) + 4]
+    return next((config for config in turned if round(math.degrees(config.start[2])) == int(match[3])), None)
+
+
+RULES = (
+    Rule("map_constant", "one map an episode", _constant, (ENVIRONMENT_STATE,)),
+    Rule("map_names", "map_id and map_set name a known map", _named, (), ("map_id", "map_set")),
+    Rule("map_rows", "start, goal and obstacles of the rows are the named map's", _rows, (ENVIRONMENT_STATE,),
+         ("map_id",)),
+    Rule("map_start", "episodes begin at their map's start", _start, (STATE, ENVIRONMENT_STATE)),
+)  # fmt: skip

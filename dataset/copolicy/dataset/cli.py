@@ -1,0 +1,23 @@
+"""`copolicy-dataset`: check, measure, version and publish a data set."""
+
+from collections.abc import Sequence
+
+from .checks.command import add_check_command
+from .commandline import command_parser, run
+from .exclusions import add_exclude_command
+from .hub.commands import add_publish_command, add_pull_command
+from .statistics import add_stats_command
+from .versions.commands import add_diff_command, add_release_command
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of `copolicy-dataset`."""
+    parser, commands = command_parser("copolicy-dataset", "Check, measure, version and publish a data set.")
+    add_check_command(commands)
+    add_exclude_command(commands)
+    add_stats_command(commands)
+    add_release_command(commands)
+    add_diff_command(commands)
+    add_publish_command(commands)
+    add_pull_command(commands)
+    return run(parser, argv)

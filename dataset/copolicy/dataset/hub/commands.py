@@ -1,0 +1,50 @@
+"""`copolicy-dataset publish` and `copolicy-dataset pull`."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from ..commandline import add_command
+
+
+def add_publish_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `publish`."""
+    parser = add_command(
+        commands,
+        "publish",
+        _publish,
+        "upload a checked and released data set in one commit and tag it; the token is that of `hf auth login` or "
+        "HF_TOKEN",
+        "copolicy-dataset publish outputs/dataset --repo-id my-lab/table --private",
+    )
+    parser.add_argument("root", type=Path, metavar="PATH", help="folder of a released LeRobot v3 data set with a card")
+    parser.add_argument("--repo-id", required=True, metavar="U/N", help="user/name on the Hub")
+    parser.add_argument("--private", action="store_true", help="create it private; refuse one that is public")
+    parser.add_argument("--raw", type=Path, metavar="DIR", help="folder of recordings; those of the episodes go up too")
+
+
+def add_pull_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `pull`."""
+    parser = add_command(
+        commands,
+        "pull",
+        _pull,
+        "download a data version and verify every file and the content hash",
+        "copolicy-dataset pull my-lab/table@data-1.0.0 --root outputs/table",
+    )
+    parser.add_argument("name", metavar="U/N[@REVISION]", help="data set on the Hub (default: its newest data version)")
+    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="folder to make")
+    parser.add_argument("--raw", action="store_true", help="with the recordings, where they were published")
+
+
+def _publish(arguments: argparse.Namespace) -> dict:
+    from .publish import publish
+
+    return asdict(publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw))
+
+
+def _pull(arguments: argparse.Namespace) -> dict:
+    from .pull import pull
+
+    name, _, revision = arguments.name.partition("@")
+    return asdict(pull(name, revision or None, arguments.root, arguments.raw))

@@ -1,0 +1,117 @@
+"""`copolicy-dataset stats`: how multimodal a data set is, and how sure that is."""
+
+import argparse
+import json
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+from ..commandline import add_command
+from ..episode import Source
+from ..exceptions import FileFormatError, InvalidValueError
+
+STATISTICS_FILE = Path("meta/copolicy_stats.json")
+"""Where the statistics lie in a data set."""
+
+
+def add_stats_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `stats`."""
+    parser = add_command(
+        commands,
+        "stats",
+        _stats,
+        "compute the statistics of a data set, with intervals and nulls, into meta/copolicy_stats.json",
+        "copolicy-dataset stats datasets/table",
+    )
+    parser.add_argument("path", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write here instead of into the data set")
+    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument(
+        "--source", choices=Source.__args__, default=None, help="describe only episodes of this source (needs --out)"
+    )
+
+
+def _stats(arguments: argparse.Namespace) -> dict:
+    from .compute import compute_statistics
+    from .reading import read_trajectories
+
+    if arguments.seed < 0:
+        raise InvalidValueError("--seed", "at least 0", arguments.seed)
+    if arguments.source and arguments.out is None:
+        raise InvalidValueError("--out", "a file, since statistics of one source are not those of the data set", None)
+    target = arguments.out or arguments.path / STATISTICS_FILE
+    if target.is_dir():
+        raise FileFormatError(target, "a file to write", "a folder")
+    data, left_out = read_trajectories(arguments.path, arguments.source)
+    document = compute_statistics(data, arguments.seed, left_out)
+    write_document(document, target)
+    return {"written": str(target), **(document if arguments.json else summary(document))}
+
+
+def write_document(document: dict[str, Any], path: Path) -> None:
+    """Writes JSON so that a reader sees the old file or the whole new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        with partial.open("w") as file:
+            json.dump(document, file, indent=2, allow_nan=False)
+            file.write("\n")
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def summary(document: dict[str, Any]) -> dict[str, Any]:
+    """The statistics as one readable line each: value, interval, unit, and what chance gives."""
+    lines: dict[str, Any] = {"definition_version": document["definition_version"]}
+    lines["dataset"] = {
+        **{name: value for name, value in document["dataset"].items() if isinstance(value, int)},
+        "sources": "; ".join(
+            f"{name} ({count}): {document['dataset']['source_labels'][name]}"
+            for name, count in document["dataset"]["sources"].items()
+        ),
+    }
+    if document["dataset"]["left_out"]:
+        lines["dataset"]["left_out"] = ", ".join(f"{n} {name}" for name, n in document["dataset"]["left_out"].items())
+    for family, estimates in document["statistics"].items():
+        lines[family] = {name: _line(estimate) for name, estimate in estimates.items()}
+        for name, entry in estimates.items():
+            if name == "route_entropy_pooled" and "details" in entry:
+                lines[family].pop(name)
+                lines[family] |= {f"{name}_{size}": _entropy_line(part) for size, part in entry["details"].items()}
+    lines["people, for comparison"] = {
+        f"route_entropy_pooled_{size}": _entropy_line(part)
+        for size, part in document["human_reference"]["routes"].items()
+    }
+    return lines
+
+
+def _line(estimate: dict[str, Any]) -> str:
+    if estimate["value"] is None:
+        return f"- ({estimate.get('note', 'not computed')})"
+    text = f"{estimate['value']:.4g}"
+    if estimate["interval"] is not None and None not in estimate["interval"]:
+        text += " [{:.3g}, {:.3g}]".format(*estimate["interval"])
+    if estimate["unit"] != "1":
+        text += f" {estimate['unit']}"
+    if "null" in estimate:
+        null = estimate["null"]
+        text += f"; by chance {null['mean']:.3g} [{null['low']:.3g}, {null['high']:.3g}], p = {null['p']:.2g}"
+    details = estimate.get("details", {})
+    if "reading" in details:
+        other = details["mirrored_bits" if details["reading"] == "as labelled" else "as_labelled_bits"]
+        text += f"; labels {details['reading']}, the other reading {other:.3g}"
+    return text
+
+
+def _entropy_line(entry: dict[str, Any]) -> str:
+    if entry["entropy_bits"] is None:
+        return f"- ({entry['note']})"
+    low, high = entry["interval"]
+    return (
+        f"{entry['entropy_bits']:.3g} [{low:.3g}, {high:.3g}] of {entry['obstacles']} bits, plug-in "
+        f"{entry['plug_in_bits']:.3g}, n = {entry['episodes']}"
+    )

@@ -1,0 +1,105 @@
+"""How fast the input moves and how smooth the motion is: f95, SPARC and log dimensionless jerk."""
+
+import numpy as np
+from scipy.signal import welch
+
+from .estimate import Estimate
+from .resampling import Bootstrap
+from .trajectories import Trajectories
+
+WELCH_S = 3.2
+"""Length of a Welch segment; its inverse is the resolution, Hz."""
+
+MIN_S = 1.0
+"""Episodes shorter than this have no spectrum and no smoothness."""
+
+_POWER_SHARE = 0.95
+_SPARC_CUTOFF_HZ = 10.0
+_SPARC_THRESHOLD = 0.05
+_SPARC_PADDING = 4
+
+
+def f95(action: np.ndarray, fps: float) -> float:
+    """Frequency below which 95 percent of the power of an action `(T, 2)` lies, Hz; nan where it never changes.
+
+    Welch's density (Hann, mean removed, half overlapping), both axes added, between bins interpolated.
+    """
+    segment = min(len(action), max(4, round(WELCH_S * fps)))
+    frequency, power = welch(action, fs=fps, nperseg=segment, axis=0, detrend="constant")
+    cumulative = np.cumsum(power.sum(axis=1))
+    if not cumulative[-1] > 1e-12:
+        return float("nan")
+    # A bin's power is spread from half a bin below its frequency to half a bin above.
+    edges = np.minimum(frequency + (frequency[1] - frequency[0]) / 2, fps / 2)
+    return float(np.interp(_POWER_SHARE * cumulative[-1], cumulative, edges))
+
+
+def sparc(speed: np.ndarray, fps: float) -> float:
+    """Spectral arc length of a speed profile `(T,)`: 0 is smoothest; nan without motion.
+
+    Length of the normalised magnitude spectrum up to 10 Hz (or half the rate), cut where it stays below 0.05
+    (Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet 2015).
+    """
+    points = 2 ** (int(np.ceil(np.log2(len(speed)))) + _SPARC_PADDING)
+    magnitude = np.abs(np.fft.rfft(speed, points))
+    if not magnitude.max() > 1e-9:
+        return float("nan")
+    frequency = np.fft.rfftfreq(points, 1 / fps)
+    magnitude = magnitude / magnitude.max()
+    inside = frequency <= min(_SPARC_CUTOFF_HZ, fps / 2)
+    above = np.flatnonzero(inside & (magnitude >= _SPARC_THRESHOLD))
+    chosen = slice(above[0], above[-1] + 1)
+    frequency, magnitude = frequency[chosen], magnitude[chosen]
+    if len(frequency) < 2:
+        return float("nan")
+    steps = np.diff(frequency) / (frequency[-1] - frequency[0])
+    return -float(np.hypot(steps, np.diff(magnitude)).sum())
+
+
+def log_dimensionless_jerk(speed: np.ndarray, fps: float) -> float:
+    """-ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2) of a speed profile `(T,)`; larger is smoother; nan without motion.
+
+    Same source as `sparc`. A minimum-jerk movement has -ln(204.8) = -5.32.
+    """
+    peak = float(np.abs(speed).max())
+    jerk = np.diff(speed, 2) * fps**2
+    duration = (len(speed) - 1) / fps
+    integral = float((jerk**2).sum()) / fps
+    if not peak > 1e-9 or not integral > 0:
+        return float("nan")
+    return -float(np.log(duration**3 / peak**2 * integral))
+
+
+def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
+    """Means over episodes; f95 for each player, smoothness of the table's speed."""
+    names = ("action_f95_player_0", "action_f95_player_1", "sparc", "log_dimensionless_jerk")
+    values = np.full((len(data.rows), len(names)), np.nan)
+    for index, (start, end) in enumerate(zip(data.starts.tolist(), data.ends.tolist(), strict=True)):
+        if end - start < MIN_S * data.fps or end - start < 4:
+            continue
+        actions = data.actions[start:end]
+        speed = np.linalg.norm(data.states[start:end, 4:6], axis=1)
+        values[index] = (
+            f95(actions[:, :2], data.fps),
+            f95(actions[:, 2:], data.fps),
+            sparc(speed, data.fps),
+            log_dimensionless_jerk(speed, data.fps),
+        )
+    spectrum = (
+        "Frequency below which 95 % of the power of player {}'s action lies (Welch, segments of "
+        f"{WELCH_S:g} s, both axes), mean over episodes; at most half the frame rate of {data.fps} Hz."
+    )
+    rate = f"of the table's speed, mean over episodes. It depends on the frame rate ({data.fps} Hz): compare alike."
+    definitions = (
+        ("Hz", spectrum.format(0)),
+        ("Hz", spectrum.format(1)),
+        ("1", f"Spectral arc length {rate} 0 is smoothest."),
+        ("1", f"Log dimensionless jerk {rate} Larger is smoother; -5.32 is a minimum-jerk movement."),
+    )
+    estimates = {}
+    for column, (name, (unit, definition)) in enumerate(zip(names, definitions, strict=True)):
+        value, bounds = bootstrap.mean(values[:, column])
+        note = "" if value is not None else f"no episode of {MIN_S:g} s in which it moves"
+        episodes = int(np.isfinite(values[:, column]).sum())
+        estimates[name] = Estimate(value, unit, definition, episodes, bounds, bootstrap.resampled, note=note)
+    return estimates

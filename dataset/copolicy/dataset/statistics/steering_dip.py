@@ -1,0 +1,166 @@
+"""Whether pairs split where they have to decide: Hartigan's dip test of the steering before the first obstacle."""
+
+from typing import cast
+
+import numpy as np
+from scipy.stats import false_discovery_control
+
+from ..exceptions import MissingExtraError
+from .estimate import Estimate, Null
+from .resampling import Bootstrap
+from .trajectories import Trajectories
+
+try:
+    from diptest import diptest
+except ModuleNotFoundError:
+    raise MissingExtraError("diptest") from None
+
+MIN_EPISODES = 8
+"""Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""
+
+MAX_QUERIES = 2_000
+RADIUS_PX = 50.0
+AHEAD_S = 0.5
+FALSE_DISCOVERY_RATE = 0.05
+_NULL_DRAWS = 39
+
+_STEERING = (
+    "Steering: the component across start-goal of both players' forces together. Decision zone: from the start until "
+    "the table's centre is as far along start-goal as the near side of the first obstacle."
+)
+
+
+def decision_zone(data: Trajectories) -> np.ndarray:
+    """`(N,)` whether a frame lies in the decision zone, that is, before the first obstacle's station.
+
+    The station is the projection on the line from start to goal; once the table has entered the obstacle's side the
+    episode has left the zone for good. Maps without obstacles have none.
+    """
+    zone = np.zeros(len(data.states), dtype=bool)
+    for index, row in enumerate(data.rows):
+        if not row.map_config.obstacles:
+            continue
+        origin, along = _axis(row.map_config)
+        first = min(float((np.array(centre) - origin) @ along) for centre in row.map_config.obstacles)
+        station = (data.path(index) - origin) @ along
+        zone[data.starts[index] : data.ends[index]] = (
+            np.maximum.accumulate(station) < first - row.map_config.obstacle_size / 2
+        )
+    return zone
+
+
+def steering(data: Trajectories) -> np.ndarray:
+    """`(N,)` joint force across the line from start to goal, positive to its right on screen, in full forces."""
+    total = data.actions[:, :2] + data.actions[:, 2:]
+    across = np.array([(-along[1], along[0]) for along in (_axis(row.map_config)[1] for row in data.rows)])
+    return (total * across[data.episode]).sum(axis=1)
+
+
+def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
+    """The dip test at the places of the decision zone, and once a configuration."""
+    zone, sideways = decision_zone(data), steering(data)
+    return {
+        "steering_dip": _local(data, zone, _ahead(data, sideways), bootstrap, rng),
+        "steering_dip_by_configuration": _by_configuration(data, zone, sideways, rng),
+    }
+
+
+def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estimate:
+    definition = (
+        f"{_STEERING} Share of its states at which the steering over the next {AHEAD_S} s of other episodes with the "
+        f"same goal and obstacles, at their place nearest to it within {RADIUS_PX:g} px, one value an episode, is not "
+        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+    )
+    per_query: list[tuple[int, np.ndarray]] = []
+    inside = np.flatnonzero(zone)
+    share = min(1.0, MAX_QUERIES / max(len(inside), 1))
+    for group in data.groups(with_goal=True):
+        if len(group) <= MIN_EPISODES:
+            continue
+        frames = inside[np.isin(data.episode[inside], group)]
+        for query in rng.permutation(frames)[: max(1, round(share * len(frames)))] if len(frames) else ():
+            sample = _sample(data, frames, query, ahead)
+            if len(sample) >= MIN_EPISODES:
+                per_query.append((int(data.episode[query]), sample))
+    if not per_query:
+        note = f"no place of a decision zone with {MIN_EPISODES} other episodes within {RADIUS_PX:g} px"
+        return Estimate(None, "1", definition, 0, note=note)
+    rejected = _rejected([sample for _, sample in per_query])
+    hits, asked = np.zeros(len(data.rows)), np.zeros(len(data.rows))
+    np.add.at(asked, [episode for episode, _ in per_query], 1)
+    np.add.at(hits, [episode for episode, _ in per_query], rejected)
+    value, bounds = bootstrap.ratio(hits, asked)
+    null_shares = [
+        _rejected([rng.standard_normal(len(sample)) for _, sample in per_query]).mean() for _ in range(_NULL_DRAWS)
+    ]
+    null = Null.of("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
+    sizes = [len(sample) for _, sample in per_query]
+    details = {"places": len(per_query), "median_episodes_at_a_place": float(np.median(sizes))}
+    return Estimate(value, "1", definition, int((asked > 0).sum()), bounds, bootstrap.resampled, null, details=details)
+
+
+def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
+    definition = (
+        f"{_STEERING} Share of configurations in which its mean over the zone, one value an episode, is not unimodal "
+        f"(dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+    )
+    frames = data.per_episode(zone)
+    mean = np.divide(data.per_episode(zone * sideways), frames, out=np.full(len(frames), np.nan), where=frames > 0)
+    tests: dict[str, dict] = {}
+    for name in np.unique(data.configurations):
+        sample = mean[(data.configurations == name) & np.isfinite(mean)]
+        if len(sample) >= MIN_EPISODES:
+            dip, p = _dip_test(sample)
+            tests[str(name)] = {"episodes": len(sample), "dip": dip, "p": p}
+    if not tests:
+        return Estimate(None, "1", definition, 0, note=f"no configuration has {MIN_EPISODES} episodes and obstacles")
+    adjusted = false_discovery_control([test["p"] for test in tests.values()])
+    for test, p in zip(tests.values(), adjusted, strict=True):
+        test["p_adjusted"] = float(p)
+    rejected = adjusted < FALSE_DISCOVERY_RATE
+    draws = [
+        _rejected([rng.standard_normal(test["episodes"]) for test in tests.values()]).mean() for _ in range(_NULL_DRAWS)
+    ]
+    value = float(rejected.mean())
+    resampled = rng.binomial(len(rejected), value, size=1000) / len(rejected)
+    bounds = (float(np.quantile(resampled, 0.025)), float(np.quantile(resampled, 0.975)))
+    null = Null.of("one Gaussian of as many episodes in each configuration", value, np.array(draws))
+    episodes = sum(test["episodes"] for test in tests.values())
+    details = {"configurations": tests}
+    return Estimate(value, "1", definition, episodes, bounds, "configurations", null, details=details)
+
+
+def _dip_test(sample: np.ndarray) -> tuple[float, float]:
+    """The dip and its p, interpolated in Hartigan's table."""
+    dip, p, *_ = cast(tuple[float, float], diptest(sample))  # without full_output it returns no dict
+    return float(dip), float(np.clip(p, 0.0, 1.0))
+
+
+def _rejected(samples: list[np.ndarray]) -> np.ndarray:
+    return false_discovery_control([_dip_test(sample)[1] for sample in samples]) < FALSE_DISCOVERY_RATE
+
+
+def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarray) -> np.ndarray:
+    """Steering of each other episode at its frame nearest to a query's place, where that is near enough."""
+    distance = np.linalg.norm(data.states[frames, :2] - data.states[query, :2], axis=1)
+    near = (distance <= RADIUS_PX) & (data.episode[frames] != data.episode[query])
+    frames, distance = frames[near], distance[near]
+    order = np.lexsort((distance, data.episode[frames]))
+    frames = frames[order]
+    first = np.flatnonzero(np.diff(data.episode[frames], prepend=-1))
+    return ahead[frames[first]]
+
+
+def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
+    """Mean of a value over the next half second of each frame, within its episode."""
+    window = max(1, round(AHEAD_S * data.fps))
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    begin = np.arange(len(values))
+    end = np.minimum(begin + window, data.ends[data.episode])
+    return (total[end] - total[begin]) / (end - begin)
+
+
+def _axis(config) -> tuple[np.ndarray, np.ndarray]:
+    origin = np.array(config.start[:2])
+    line = np.array(config.goal) - origin
+    return origin, line / max(float(np.linalg.norm(line)), 1e-9)

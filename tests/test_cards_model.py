@@ -1,0 +1,159 @@
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from huggingface_hub import ModelCard
+
+from copolicy.cards.cli import main
+from copolicy.collect.simulate import simulate
+from copolicy.convert.cli import main as convert
+
+WEIGHTS = b"the weights"
+
+
+def _evaluation(maps: str = "holdout", mean: float = 0.75, complete: bool = True) -> dict:
+    """What `copolicy-eval coplan` writes, without its episodes."""
+    return {
+        "study": "coplan",
+        "label": "co-planning in simulation: no person took part",
+        "policy": {"weights_sha256": hashlib.sha256(WEIGHTS).hexdigest(), "parameters": 1_132_464},
+        "settings": {
+            "maps": maps, "map_count": 84 if complete else 5, "complete_set": complete, "orientations": False,
+            "repeats": 1, "seed": 11, "device": "cpu",
+        },
+        "summary": {
+            "success": {"mean": mean, "standard_error": 0.0472, "wilson_95": [0.648, 0.83], "episodes": 84},
+            "time_to_completion_s": {"mean": 15.617},
+            "interaction_force": {"mean": 0.05004},
+            "planning_ms_per_call": {"p50": 22.408},
+        },
+    }  # fmt: skip
+
+
+@pytest.fixture
+def run(tmp_path) -> Path:
+    """A training run with one checkpoint, as LeRobot leaves it."""
+    folder = tmp_path / "training" / "checkpoints" / "last" / "pretrained_model"
+    folder.mkdir(parents=True)
+    (folder / "model.safetensors").write_bytes(WEIGHTS)
+    (folder / "config.json").write_text(json.dumps({"type": "copolicy", "preset": "small", "horizon": 12}))
+    training = {
+        "dataset": {"repo_id": "lab/table", "root": str(tmp_path / "gone"), "episodes": [0, 2]},
+        "steps": 2500, "batch_size": 512, "seed": 7, "optimizer": {"type": "adamw", "lr": 0.001},
+    }  # fmt: skip
+    (folder / "train_config.json").write_text(json.dumps(training))
+    return tmp_path / "training"
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Path:
+    """Four episodes of simulated pairs."""
+    folder = tmp_path_factory.mktemp("model_card")
+    simulate(folder / "raw", 4, 3, workers=1)
+    root = folder / "table"
+    flags = ["--root", str(root), "--repo-id", "lab/table", "--license", "cc0-1.0"]
+    assert convert(["mcap", str(folder / "raw"), *flags]) == 0
+    return root
+
+
+def _write(path: Path, value: dict) -> str:
+    path.write_text(json.dumps(value))
+    return str(path)
+
+
+def _card(run: Path) -> Path:
+    return run / "checkpoints" / "last" / "pretrained_model" / "README.md"
+
+
+def test_a_card_states_what_training_and_evaluation_wrote(run, dataset, tmp_path, capsys):
+    holdout = _write(tmp_path / "holdout.json", _evaluation())
+    unseen = _write(tmp_path / "unseen.json", _evaluation("unseen", 0.5, complete=False))
+    flags = ["--dataset", str(dataset), "--repo-id", "lab/carrier", "--license", "apache-2.0", "--json"]
+    assert main(["model", str(run), "--eval", holdout, "--eval", unseen, *flags]) == 0
+    assert json.loads(capsys.readouterr().out)["trained_on"] == {"simulated": 4}
+    card = ModelCard.load(_card(run))
+    text = card.text
+    assert "| coplan | holdout | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 11 | 15.62 | 0.05004 | 22.41 on cpu |" in text
+    assert "| coplan | unseen, first 5 | 50.0 ± 4.7 |" in text
+    assert "Only a part of the maps of unseen was tried." in text
+    assert "**Co-planning in simulation: no person took part.**" in text
+    assert "**No person took part.** Two scripted pilots" in text
+    assert "- Data set: `lab/table`\n- Source: simulated (4)\n- Episodes used: 2 of 4 (50.0 %)" in text
+    assert "| training `seed` | 7 |" in text
+    assert "| parameters | 1,132,464 |" in text
+    assert f"`{hashlib.sha256(WEIGHTS).hexdigest()}`" in text
+    assert str(tmp_path) not in text
+
+
+def test_the_hub_reads_results_from_the_model_index(run, dataset, tmp_path):
+    holdout = _write(tmp_path / "holdout.json", _evaluation())
+    flags = ["--dataset", str(dataset), "--repo-id", "lab/carrier"]
+    assert main(["model", str(run), "--eval", holdout, *flags]) == 0
+    card = ModelCard.load(_card(run))
+    (result,) = card.data.to_dict()["model-index"][0]["results"]
+    (metric,) = result["metrics"]
+    assert (metric["type"], metric["value"], metric["args"]["episodes"]) == ("success_rate", 0.75, 84)
+    assert result["task"]["name"] == "table carrying, coplan (simulation)"
+    assert result["dataset"]["type"] == "copolicy-maps-holdout"
+    metadata = yaml.safe_load(card.content.split("---")[1])
+    assert metadata["model-index"][0]["name"] == "carrier"
+    assert metadata["datasets"] == ["lab/table"]
+    assert metadata["library_name"] == "lerobot"
+    assert "trained-on-simulated" in metadata["tags"]
+    assert "license" not in metadata
+
+
+def test_what_is_not_at_hand_is_not_stated(run):
+    assert main(["model", str(run)]) == 0
+    text = _card(run).read_text()
+    assert "**Source of the training data: not stated.**" in text
+    assert "- Source: not stated\n- Episodes used: 2\n" in text
+    assert "Not evaluated: no `eval.json` was given." in text
+    assert "model-index" not in text
+
+
+def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
+    other = _evaluation()
+    other["policy"]["weights_sha256"] = "0" * 64
+    path = _write(tmp_path / "eval.json", other)
+    assert main(["model", str(run), "--eval", path]) == 2
+    digest = hashlib.sha256(WEIGHTS).hexdigest()[:12]
+    assert capsys.readouterr().err == (
+        f"copolicy-cards: {path}: expected an evaluation of pretrained_model (weights {digest}), "
+        "found one of weights 000000000000\n"
+    )
+    assert not _card(run).exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        ({"study": "coplan"}, "expected a result of copolicy-eval, found none: 'label' is missing"),
+        ([1], "expected a JSON object, found list"),
+        (None, "expected a result of copolicy-eval, found no such file"),
+    ],
+)
+def test_what_is_no_evaluation_is_named(run, tmp_path, capsys, content, found):
+    path = tmp_path / "eval.json"
+    if content is not None:
+        path.write_text(json.dumps(content))
+    assert main(["model", str(run), "--eval", str(path)]) == 2
+    assert capsys.readouterr().err == f"copolicy-cards: {path}: {found}\n"
+
+
+def test_a_folder_that_is_no_checkpoint_is_named(tmp_path, capsys):
+    assert main(["model", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        f"copolicy-cards: {tmp_path}: expected a checkpoint folder with config.json and model.safetensors, found none\n"
+    )
+
+
+def test_a_card_is_not_overwritten_unless_asked(run, capsys):
+    _card(run).write_text("written by hand")
+    assert main(["model", str(run)]) == 2
+    assert "nothing was overwritten" in capsys.readouterr().err
+    assert _card(run).read_text() == "written by hand"
+    assert main(["model", str(run), "--overwrite"]) == 0
+    assert _card(run).read_text().startswith("---\n")

@@ -1,0 +1,220 @@
+"""Pulling through the real client over HTTP, with faults.
+
+| fault | what the user sees | what a rerun does |
+|---|---|---|
+| a dropped connection in the middle of a file, once | nothing: the client asks for it again | |
+| 500, or a connection that drops, for good | one line; nothing at OUT | fetches only what did not arrive |
+| a file that is not what was released | one line naming it; nothing is kept | the same, until the Hub is right |
+| no such data set, revision or version; no token for a private one | one line | |
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hub_user import HubUser
+from local_hub import LocalHub
+from versioned_data_set import EPISODES, FRAMES, set_value, simulated_data_set
+
+from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.manifest import MANIFEST_FILE, Manifest
+from copolicy.dataset.versions.release import release
+
+
+@pytest.fixture(scope="module")
+def released(tmp_path_factory) -> Path:
+    root = simulated_data_set(tmp_path_factory.mktemp("pull") / "table")
+    release(root, "major", "The first.")
+    return root
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory, released):
+    """Has published 1.0.0 with recordings as lab/table."""
+    with LocalHub() as hub, HubUser(hub, tmp_path_factory.mktemp("home")) as user:
+        done = user.run("publish", released, "--repo-id", "lab/table", "--raw", released.parent / "recordings")
+        assert done.status == 0, done.err
+        yield user
+
+
+@pytest.fixture
+def hub(user):
+    """The hub with that data set, restored afterwards."""
+    repository = user.hub.data_set("lab/table")
+    before = dict(repository.commits), dict(repository.branches), dict(repository.tags), repository.private
+    user.hub.requests.clear()
+    yield user.hub
+    user.hub.faults.clear()
+    repository.commits, repository.branches, repository.tags, repository.private = before
+
+
+def files_of(root: Path) -> dict[str, bytes]:
+    return {path.relative_to(root).as_posix(): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+def test_what_comes_back_is_what_went_up(user, hub, released, tmp_path):
+    done = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out", "--json")
+    assert done.status == 0, done.err
+    assert files_of(tmp_path / "out") == files_of(released)
+    assert json.loads(done.out) == {
+        "root": str(tmp_path / "out"),
+        "repo_id": "lab/table",
+        "revision": "data-1.0.0",
+        "commit": hub.data_set("lab/table").tags["data-1.0.0"],
+        "version": "1.0.0",
+        "content_hash": read_content(released).hash,
+        "files": len(files_of(released)),
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert user.run("diff", tmp_path / "out", "lab/table@data-1.0.0").status == 0
+
+
+def test_recordings_come_when_asked_for(user, hub, released, tmp_path):
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out", "--raw").status == 0
+    recordings = files_of(released.parent / "recordings")
+    assert {name: (tmp_path / "out" / "raw" / name).read_bytes() for name in recordings} == recordings
+    # What was pulled can be published as it is.
+    done = user.run("publish", tmp_path / "out", "--repo-id", "lab/copy", "--raw", tmp_path / "out" / "raw")
+    assert done.status == 0, done.err
+    assert hub.data_set("lab/copy").head == hub.data_set("lab/table").head
+    del hub.repositories["dataset", "lab/copy"]
+
+
+def test_the_newest_version_is_pulled_by_default_and_an_older_one_by_name(user, hub, released, tmp_path):
+    other = Path(shutil.copytree(released, tmp_path / "other"))
+    set_value(other, EPISODES, "pair_id", 0, "pair-9")
+    release(other, "patch", "Corrected.")
+    assert user.run("publish", other, "--repo-id", "lab/table").status == 0
+    assert user.run("pull", "lab/table", "--root", tmp_path / "new").status == 0
+    assert user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "old").status == 0
+    assert read_content(tmp_path / "new").hash == read_content(other).hash
+    assert read_content(tmp_path / "old").hash == read_content(released).hash
+    assert user.run("diff", "lab/table@data-1.0.0", "lab/table@data-1.0.1").status == 1
+
+
+def test_lerobot_loads_the_same_content_by_the_tag(user, hub, released, tmp_path):
+    program = """
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+from copolicy.dataset.versions.content import read_content
+for revision in ("data-1.0.0", None):
+    dataset = LeRobotDataset("lab/table", revision=revision)
+    print(read_content(dataset.root).hash, dataset.num_frames, dataset[0]["action"].shape)
+"""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("HF_")}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**environment, **hub.environment(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if line.startswith("copolicy-content-1")]
+    assert len(lines) == 2
+    assert all(line.startswith(read_content(released).hash + " ") for line in lines)
+    assert all(line.endswith("torch.Size([4])") for line in lines)
+
+
+def test_a_file_that_breaks_off_in_the_middle_is_asked_for_again(user, hub, released, tmp_path):
+    hub.drop("GET", rf"/resolve/.*/{FRAMES}$", "middle")
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert files_of(tmp_path / "out") == files_of(released)
+    assert sum(method == "GET" and path.endswith(FRAMES) for method, path, _ in hub.requests) == 2
+
+
+@pytest.mark.parametrize("fault", ["500", "drop"])
+def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, released, tmp_path, fault):
+    path = rf"/resolve/.*/{FRAMES}$"
+    if fault == "500":
+        hub.fail("GET", path, 500, times=100)
+    else:
+        hub.drop("GET", path, "before", times=100)
+    message = user.run("pull", "lab/table", "--root", tmp_path / "out").error
+    assert message.startswith("lab/table: downloading: ")
+    assert message.endswith("; run the command again, it goes on where it stopped")
+    assert not (tmp_path / "out").exists()
+    hub.faults.clear()
+    hub.requests.clear()
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert files_of(tmp_path / "out") == files_of(released)
+    fetched = [path for method, path, _ in hub.requests if method == "GET" and "/resolve/" in path]
+    assert any(path.endswith(FRAMES) for path in fetched)
+    assert len(fetched) < len(files_of(released))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def tamper(hub: LocalHub, name: str, data: bytes | None) -> None:
+    """Somebody moves the tag to a commit with another file."""
+    repository = hub.data_set("lab/table")
+    files = {**repository.head, name: data}
+    repository.tags["data-1.0.0"] = repository.commit(
+        {name: data for name, data in files.items() if data is not None}, "tampered"
+    )
+
+
+_UNEXPECTED = "expected the files in its manifest, found that"
+TAMPERED = {
+    "other card": ("README.md", b"theirs", f"{_UNEXPECTED} README.md has other content; nothing was kept"),
+    "a file more": ("notes.txt", b"x", f"{_UNEXPECTED} notes.txt is not in the manifest; nothing was kept"),
+    "a file less": ("meta/stats.json", None, f"{_UNEXPECTED} meta/stats.json is missing; nothing was kept"),
+    "no manifest": ("meta/manifest.json", None, "what arrived is no release: meta/manifest.json: expected a manifest"),
+    "no release": ("meta/copolicy_release.json", None, "what arrived is no release: expected a release"),
+}
+
+
+@pytest.mark.parametrize("what", TAMPERED)
+def test_what_is_not_as_released_is_not_kept(user, hub, tmp_path, what):
+    name, data, message = TAMPERED[what]
+    tamper(hub, name, data)
+    found = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out").error
+    assert found.startswith(f"lab/table@data-1.0.0: {message}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, hub, released, tmp_path):
+    other = Path(shutil.copytree(released, tmp_path / "other"))
+    set_value(other, FRAMES, "action[0]", 0, 0.5)
+    (other / MANIFEST_FILE).write_text(Manifest.of_folder(other).to_text())
+    for name in (FRAMES, MANIFEST_FILE):
+        tamper(hub, name, (other / name).read_bytes())
+    found = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out").error
+    expected = f"expected content {read_content(released).hash}, found {read_content(other).hash}; nothing was kept"
+    assert found == f"lab/table@data-1.0.0: {expected}"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("lab/nothing", "lab/nothing: no such data set on the Hub, or a private one that the token may not see"),
+        ("lab/table@data-9.0.0", "lab/table@data-9.0.0: asking the Hub: no such revision"),
+    ],
+)
+def test_what_is_not_there_is_named(user, hub, tmp_path, name, message):
+    assert user.run("pull", name, "--root", tmp_path / "out").error == message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_private_data_set_asks_for_a_token(user, hub, tmp_path):
+    hub.data_set("lab/table").private = True
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out", token=None).error == (
+        "lab/table: asking the Hub: the Hub does not accept the token, or a private data set needs one; "
+        "set HF_TOKEN or run `hf auth login`"
+    )
+
+
+def test_a_data_set_without_versions_is_no_release(user, hub, tmp_path):
+    hub.data_set("lab/table").tags = {"v3.0": hub.data_set("lab/table").branches["main"]}
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out").error == (
+        "lab/table: expected a tag data-x.y.z on the Hub, found ['v3.0']"
+    )
+
+
+def test_nothing_is_overwritten(user, hub, tmp_path):
+    (tmp_path / "out").mkdir()
+    done = user.run("pull", "lab/table", "--root", tmp_path / "out")
+    assert (done.status, hub.requests) == (2, [])
+    assert "found one; nothing was overwritten" in done.err
