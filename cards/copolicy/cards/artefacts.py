@@ -33,9 +33,6 @@ def read_json(path: Path) -> dict[str, Any] | None:
 RELEASE_FILE = Path("meta/copolicy_release.json")
 """The newest release, made by `copolicy-dataset release`."""
 
-EXCLUSIONS_FILE = Path("meta/copolicy_exclusions.json")
-"""Episodes that people took out, made by `copolicy-dataset exclude`."""
-
 CONVERSION_FILE = Path("meta/copolicy.json")
 """How the data set was converted, made by `copolicy-convert`."""
 

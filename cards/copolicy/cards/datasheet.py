@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from copolicy.dataset.features import ACTION
 
-from .artefacts import CONVERSION_FILE, EXCLUSIONS_FILE, RELEASE_FILE, read_json
+from .artefacts import CONVERSION_FILE, RELEASE_FILE, read_json
 from .facts import DatasetFacts
 from .markdown import listing, share
 
@@ -37,20 +37,16 @@ def _motivation() -> list[str]:
 
 def _composition(facts: DatasetFacts) -> list[str]:
     discarded = sum(bool(episode["discarded"]) for episode in facts.episodes)
-    exclusions = read_json(facts.root / EXCLUSIONS_FILE)
     lengths = sorted(episode["length"] for episode in facts.episodes)
-    lines = [
+    return [
         f"An instance is an episode: one carry from start to end, {lengths[0]} to {lengths[-1]} frames "
         f"(median {lengths[len(lengths) // 2]}).",
         "Each has states, the joint action of both players, the map, and who did it with whom.",
         f"Splits: {', '.join(f'{name} {span}' for name, span in facts.info.get('splits', {}).items()) or 'none'}",
         f"Marked as discarded (kept, left out of training): {share(discarded, len(facts.episodes))}",
-        f"Quality flags: {_flags(facts)}",
+        f"Quality flags, exclusions with their reasons among them: {_flags(facts)}",
         "People appear under pseudonyms only; there is no image, sound or name in the data.",
     ]
-    if exclusions is not None:
-        lines.append(f"Exclusions with their reasons: `{EXCLUSIONS_FILE}`")
-    return lines
 
 
 def _flags(facts: DatasetFacts) -> str:
