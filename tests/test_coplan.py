@@ -6,23 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from lerobot.configs import FeatureType, PolicyFeature
-from lerobot.policies.factory import make_pre_post_processors
+from untrained_policy import save_untrained_policy
 
 from copolicy.collect.pilots import simulated_pair
 from copolicy.collect.world import TableWorld
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
 from copolicy.dataset.task import MAP_SETS, Physics
 from copolicy.train.coplan import coplan
 from copolicy.train.eval_cli import main
 from copolicy.train.planner import Planner
 from copolicy.train.study import success_rate
-from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-
-KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_ACTION: FeatureType.STATE}
 
 
 def _demonstration(config, seed):
@@ -98,17 +93,7 @@ def test_the_history_is_on_the_grid_of_frames_and_never_stale():
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory) -> Path:
     """An untrained co-policy as a checkpoint folder."""
-    folder = tmp_path_factory.mktemp("checkpoint")
-    config = CopolicyConfig(
-        preset="small",
-        device="cpu",
-        input_features={key: PolicyFeature(kind, FEATURES[key]["shape"]) for key, kind in KINDS.items()},
-        output_features={ACTION: PolicyFeature(FeatureType.ACTION, FEATURES[ACTION]["shape"])},
-    )
-    CopolicyPolicy(config).save_pretrained(folder)
-    for processor in make_pre_post_processors(config):
-        processor.save_pretrained(folder)
-    return folder
+    return save_untrained_policy(tmp_path_factory.mktemp("checkpoint"))
 
 
 def _command(checkpoint, out, *flags):

@@ -6,24 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lerobot.configs import FeatureType, PolicyFeature
-from lerobot.policies.factory import make_pre_post_processors
 from mcap.reader import make_reader
+from untrained_policy import save_untrained_policy
 
 from copolicy.collect.cli import main
 from copolicy.collect.controllers.checkpoint import Checkpoint
 from copolicy.collect.controllers.policy import PolicyController
 from copolicy.collect.world import TableWorld
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
 from copolicy.dataset.task import MAP_SETS, MapConfig
-from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
 MAP = MAP_SETS["training"][0]
-KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_ACTION: FeatureType.STATE}
 
 
 class Counter:
@@ -142,17 +138,7 @@ def test_the_age_of_a_plan_is_recorded(controller):
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory) -> Path:
     """An untrained co-policy as a checkpoint folder."""
-    folder = tmp_path_factory.mktemp("checkpoint")
-    config = CopolicyConfig(
-        preset="small",
-        device="cpu",
-        input_features={key: PolicyFeature(kind, FEATURES[key]["shape"]) for key, kind in KINDS.items()},
-        output_features={ACTION: PolicyFeature(FeatureType.ACTION, FEATURES[ACTION]["shape"])},
-    )
-    CopolicyPolicy(config).save_pretrained(folder)
-    for processor in make_pre_post_processors(config):
-        processor.save_pretrained(folder)
-    return folder
+    return save_untrained_policy(tmp_path_factory.mktemp("checkpoint"))
 
 
 def test_one_table_is_planned_for_as_a_batch_of_one(checkpoint):

@@ -1,0 +1,26 @@
+"""An untrained co-policy as a checkpoint folder, as LeRobot's trainer would leave it."""
+
+from pathlib import Path
+
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.policies.factory import make_pre_post_processors
+
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
+from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
+
+_KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_ACTION: FeatureType.STATE}
+
+
+def save_untrained_policy(folder: Path) -> Path:
+    """Writes the small preset with its processors; its head is zero, so that it plans rest."""
+    config = CopolicyConfig(
+        preset="small",
+        device="cpu",
+        input_features={key: PolicyFeature(kind, FEATURES[key]["shape"]) for key, kind in _KINDS.items()},
+        output_features={ACTION: PolicyFeature(FeatureType.ACTION, FEATURES[ACTION]["shape"])},
+    )
+    CopolicyPolicy(config).save_pretrained(folder)
+    for processor in make_pre_post_processors(config):
+        processor.save_pretrained(folder)
+    return folder
