@@ -3,12 +3,15 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.task import MAP_SETS
 
+from .demonstration.command import add_demo_command
 from .play.command import add_play_command
+from .recipes import RECIPES
 from .recover import recover, summary
 from .replay.command import add_replay_command
 from .simulate import simulate
@@ -23,9 +26,14 @@ def parser() -> argparse.ArgumentParser:
         "simulate",
         _simulate,
         help="record episodes of scripted pairs, as fast as the machine goes",
-        example="copolicy-collect simulate --episodes 200 --seed 0 --maps training --out recordings/simulated",
+        example="copolicy-collect simulate --recipe pairs-sim-376 --out recordings/pairs-sim-376\n  "
+        "copolicy-collect simulate --episodes 200 --seed 0 --maps training --out recordings/simulated",
     )
-    command.add_argument("--episodes", type=int, required=True, help="how many episodes")
+    amount = command.add_mutually_exclusive_group(required=True)
+    amount.add_argument("--episodes", type=int, help="how many episodes")
+    amount.add_argument(
+        "--recipe", choices=sorted(RECIPES), help="a named set of episodes; decides all but --out and --workers"
+    )
     command.add_argument("--seed", type=int, default=0, help="of the schedule and of the pilots (default 0)")
     command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")
     command.add_argument("--out", type=Path, required=True, help="folder for the recordings, without any yet")
@@ -36,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
         help="begin beside the start: up to SCALE times 90 px, 60 px and 0.6 rad away (default 0)",
     )  # fmt: skip
     command.add_argument(
-        "--clearance", type=float, help="how wide they keep from obstacles (default: each pair's own, 2; people: 1.7)"
+        "--clearance", type=float, help="how wide they keep from obstacles (default: each pair's own, 1.7, as people)"
     )
     command = add_command(
         commands,
@@ -50,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
         "--damaged", action="store_true", help="also recover the intact beginning of damaged finished recordings"
     )
     add_replay_command(commands)
+    add_demo_command(commands)
     command = add_command(
         commands,
         "devices",
@@ -72,6 +81,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> dict:
+    if arguments.recipe is not None:
+        return simulate(arguments.out, workers=arguments.workers, **asdict(RECIPES[arguments.recipe]))
     return simulate(
         arguments.out,
         arguments.episodes,

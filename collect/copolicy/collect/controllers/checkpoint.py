@@ -16,6 +16,8 @@ import numpy as np
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError
 
+from .checkpoint_folder import checkpoint_folder
+
 
 class Checkpoint:
     """A policy that plans for both players, with its processors.
@@ -30,10 +32,11 @@ class Checkpoint:
         actions_per_plan: frames of a plan that are executed before the next one (LeRobot's `n_action_steps`).
     """
 
-    def __init__(self, path: Path, seed: int = 0, device: str = "cpu", settings: Mapping[str, Any] | None = None):
+    def __init__(self, path: Path | str, seed: int = 0, device: str = "cpu", settings: Mapping[str, Any] | None = None):
         """
         Args:
-            path: the folder of the policy, one that holds `pretrained_model`, or that of a training run.
+            path: the folder of the policy, one that holds `pretrained_model`, that of a training run, or `pretrained`
+                for the model that comes with the package.
             seed: of the plans' noise.
             device: where it plans.
             settings: fields of the policy's configuration to change, such as `num_inference_steps`.
@@ -42,7 +45,7 @@ class Checkpoint:
             FileFormatError: the folder holds no policy that plans for both players, or one without such a setting.
             MissingExtraError: torch or LeRobot is not installed.
         """
-        folder = _pretrained_model(path)
+        folder = checkpoint_folder(path)
         try:
             self._torch = import_module("torch")
             config_class = import_module("lerobot.configs.policies").PreTrainedConfig
@@ -96,21 +99,14 @@ class Checkpoint:
         """
         return self.plan_batch({key: value[None] for key, value in history.items()})[0]
 
-    def plan_batch(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        """Plans for several tables at once: histories `(B, frames, n)` to plans `(B, planned_frames, 4)`."""
+    def plan_batch(self, history: dict[str, np.ndarray], actions: int | None = None) -> np.ndarray:
+        """Plans for several tables at once: histories `(B, frames, n)` to plans `(B, planned_frames, 4)`.
+
+        Args:
+            actions: how many are wanted, the fewer the faster; all that are planned if None.
+        """
         torch = self._torch
         batch = {key: torch.from_numpy(value.astype(np.float32)) for key, value in history.items()}
         with torch.inference_mode():
-            plan = self.policy.plan(self._preprocess(batch), generator=self._generator)
+            plan = self.policy.plan(self._preprocess(batch), generator=self._generator, actions=actions)
         return self._postprocess(plan[:, self.frames - 1 :]).cpu().numpy().astype(float)
-
-
-def _pretrained_model(path: Path) -> Path:
-    """The folder with `config.json`: the given one, its `pretrained_model`, or the last checkpoint of a run."""
-    for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
-        if (folder / "config.json").is_file() and (folder / "model.safetensors").is_file():
-            return folder
-    found = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) if path.is_dir() else "no such folder"
-    raise FileFormatError(
-        path, "a checkpoint folder with config.json and model.safetensors", found or "an empty folder"
-    )

@@ -2,6 +2,7 @@
 
 from .habits import Habits
 from .pairs import PAIRS, simulated_pair
+from .partners import PARTNERS, simulated_partner
 from .scripted import ScriptedPilot
 
-__all__ = ["PAIRS", "Habits", "ScriptedPilot", "simulated_pair"]
+__all__ = ["PAIRS", "PARTNERS", "Habits", "ScriptedPilot", "simulated_pair", "simulated_partner"]

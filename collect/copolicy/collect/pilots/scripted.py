@@ -45,7 +45,7 @@ class ScriptedPilot:
         self.player = player
         self.habits = habits
         self.intention = Intention(map_config, habits, rng)
-        self._hand = UnsteadyHand(habits.noise, habits.impulsiveness, rng)
+        self._hand = UnsteadyHand(habits, rng)
         self._partner = PartnerForce()
         self._seen: deque[list[float]] = deque(maxlen=habits.delay_steps + 1)
         self._pushed: deque[tuple[float, float]] = deque(maxlen=habits.delay_steps + 1)

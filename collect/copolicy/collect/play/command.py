@@ -20,15 +20,24 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "play",
         _play,
         help="two players carry the table together: a lobby, a session of episodes, one recording each",
-        example="copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
+        example="copolicy-collect play --pilots keyboard policy:pretrained\n"
+        "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
     )
-    command.add_argument("--pair", required=True, help="pseudonym of the pair; its players are PAIR-a and PAIR-b")
-    command.add_argument("--out", type=Path, required=True, help="folder of all sessions; a session continues there")
+    command.add_argument(
+        "--pair", default="guest", help="pseudonym of the pair; its players are PAIR-a and PAIR-b (default: guest)"
+    )
+    command.add_argument(
+        "--out",
+        type=Path,
+        default=Path("outputs/sessions"),
+        help="folder of all sessions; a session continues there (default: outputs/sessions)",
+    )
     command.add_argument(
         "--pilots",
         nargs=2,
         metavar=("A", "B"),
-        help="who plays: joystick, keyboard, scripted[:S01], replay:FILE or policy:CKPT; A begins on the robot's seat "
+        help="who plays: joystick, keyboard, scripted[:S01], replay:FILE, policy:CKPT or policy:pretrained, the model "
+        "that comes with the package; A begins on the robot's seat, unless B alone is a policy "
         "(default: the joysticks that are plugged in, the keyboard beside them)",
     )
     command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")

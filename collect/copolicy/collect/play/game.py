@@ -59,7 +59,9 @@ class Game:
         swap = people if settings.swap_seats is None else settings.swap_seats
         replayed = replayed_map(players)
         self.maps = settings.map_configs() if replayed is None else (replayed,)
-        self.balance = Balance(self.maps, settings.episodes, settings.seed, settings.pair, swap)
+        # A policy learned the robot's half of the plans, and to listen to the human's.
+        robot = int([player.spec.kind == "policy" for player in players] == [False, True])
+        self.balance = Balance(self.maps, settings.episodes, settings.seed, settings.pair, swap, robot)
         self.practice_left = 0 if folder.continued else settings.practice
         self.swapped = False
         self.trial: Trial | None = None

@@ -124,6 +124,6 @@ def _controller(spec: PilotSpec) -> Controller:
         case "replay":
             return ReplayController(Path(spec.detail))
         case "policy":
-            return PolicyController(Checkpoint(Path(spec.detail)))
+            return PolicyController(Checkpoint(spec.detail))
         case kind:
             return PersonController(kind)

@@ -35,7 +35,7 @@ def play(settings: PlaySettings) -> dict:
             disk that cannot be written to where nobody can be asked.
     """
     with prepared(settings) as application:
-        with _stopped_by_signals(application.game):
+        with stopped_by_signals(application.game):
             application.run()
         return application.summary()
 
@@ -101,7 +101,7 @@ def _join_by_order(game: Game) -> None:
 
 
 @contextmanager
-def _stopped_by_signals(game: Game) -> Iterator[None]:
+def stopped_by_signals(game: Game) -> Iterator[None]:
     """SIGTERM and Ctrl-C end the session in order: the running episode is completed up to its last step."""
     if threading.current_thread() is not threading.main_thread():
         yield

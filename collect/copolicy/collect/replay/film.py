@@ -65,24 +65,41 @@ def write_gif(
     """
     width, fps = width or GIF_WIDTH, fps or GIF_FPS
     _check(path, (".gif",), speed, fps)
+    size = picture_size(width)
+    save_gif(_shown_progress(track, size, fps, speed), path, size, fps)
+    return _summary(path, track, size, fps, speed)
+
+
+def save_gif(frames: Iterable[pygame.Surface], path: Path, size: tuple[int, int], fps: int, colours: int = 256) -> None:
+    """Writes pictures as an endless GIF.
+
+    Args:
+        frames: the pictures; the palette is that of the first one.
+        path: of the file, which must not exist.
+        size: of a picture, px.
+        fps: pictures a second.
+        colours: in the palette, at most 256; fewer make a smaller file.
+
+    Raises:
+        OutputExistsError: the file exists.
+        MissingExtraError: Pillow is not there.
+    """
     try:
         from PIL import Image
     except ImportError:
         raise MissingExtraError("Pillow") from None
-    size = picture_size(width)
     # One palette for all pictures, without dithering: what stands still then compresses to nothing.
     palette = None
     images = []
-    for surface in _shown_progress(track, size, fps, speed):
+    for surface in frames:
         image = Image.frombytes("RGB", size, pygame.image.tobytes(surface, "RGB"))
         if palette is None:
-            palette = image.quantize(256)
+            palette = image.quantize(colours)
         images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
     with _published(path) as unfinished:
         images[0].save(
             unfinished, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
         )
-    return _summary(path, track, size, fps, speed)
 
 
 def _check(path: Path, endings: tuple[str, ...], speed: float, fps: int) -> None:

@@ -38,7 +38,7 @@ class Balance:
     Seats change once, in the middle of a session, and the session begins with the seats that were kept less.
     """
 
-    def __init__(self, maps: Sequence[MapConfig], episodes: int, seed: int, pair: str, swap: bool):
+    def __init__(self, maps: Sequence[MapConfig], episodes: int, seed: int, pair: str, swap: bool, seating: int = 0):
         """
         Args:
             maps: to choose from; repeated ones count once.
@@ -46,12 +46,14 @@ class Balance:
             seed: of the choice among equals.
             pair: its name, so that pairs begin differently.
             swap: seats change in the middle; otherwise they stay as they are.
+            seating: who sits where if they stay, see `Configuration`.
         """
         self._maps = {identify(config)[0]: config for config in maps}
         self._places = {name: (config.start, config.goal) for name, config in self._maps.items()}
         self._episodes = episodes
         self._entropy = [seed, *pair.encode()]
         self._swap = swap
+        self._seating = seating
 
     def next(self, counts: Counts) -> tuple[MapConfig, int]:
         """Map and seats of the next episode."""
@@ -82,7 +84,7 @@ class Balance:
     def seating(self, counts: Counts) -> int:
         """Who sits where in the next episode."""
         if not self._swap:
-            return 0
+            return self._seating
         before = Counter()
         for (_, seating), count in (counts.kept - counts.kept_here).items():
             before[seating] += count

@@ -1,0 +1,55 @@
+"""Where a policy lies on the disk: in a checkpoint, in a training run, or beside LeRobot's plugin of this package."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from copolicy.dataset.exceptions import FileFormatError
+
+PRETRAINED = "pretrained"
+"""In the place of a path: the model that comes with the package."""
+
+_PLUGIN = "lerobot_policy_copolicy"
+_FILES = ("config.json", "model.safetensors")
+
+
+def checkpoint_folder(path: Path | str) -> Path:
+    """The folder with `config.json` and `model.safetensors`.
+
+    Args:
+        path: that folder, one that holds `pretrained_model`, that of a training run (its last checkpoint), or
+            `pretrained`.
+
+    Raises:
+        FileFormatError: there is none.
+    """
+    if str(path) == PRETRAINED:
+        return pretrained_folder()
+    path = Path(path)
+    for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
+        if all((folder / name).is_file() for name in _FILES):
+            return folder
+    raise FileFormatError(path, f"a checkpoint folder with {' and '.join(_FILES)}", _found(path) or "an empty folder")
+
+
+def pretrained_folder() -> Path:
+    """The folder of the model that comes with the package.
+
+    The plugin is found by its name, as LeRobot finds it, and not imported: that takes LeRobot, a path does not.
+
+    Raises:
+        FileFormatError: this installation lacks the plugin or its model.
+    """
+    spec = find_spec(_PLUGIN)
+    places = list((spec and spec.submodule_search_locations) or ())
+    if not places:
+        raise FileFormatError(PRETRAINED, f"the package {_PLUGIN} with its model", "no such package")
+    folder = Path(places[0]) / PRETRAINED
+    missing = [name for name in _FILES if not (folder / name).is_file()]
+    if missing:
+        found = f"none named {' and '.join(missing)}; reinstall {_PLUGIN}, or name a checkpoint of your own"
+        raise FileFormatError(folder, "the model that comes with the package", found)
+    return folder
+
+
+def _found(path: Path) -> str:
+    return ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) if path.is_dir() else "no such folder"

@@ -1,0 +1,81 @@
+"""The flags of `copolicy-collect demo`."""
+
+import argparse
+import itertools
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.commandline import add_command, progress
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
+from copolicy.dataset.task import MAP_SETS, RECORD_HZ
+
+from ..controllers.checkpoint_folder import PRETRAINED
+from ..pilots import PAIRS
+
+
+def add_demo_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `demo` to the commands of `copolicy-collect`."""
+    command = add_command(
+        commands,
+        "demo",
+        _demo,
+        help="film a policy that carries the table with a simulated partner, as a GIF",
+        example="copolicy-collect demo --gif outputs/demo.gif --map 40 52",
+    )
+    command.add_argument("--gif", type=Path, required=True, metavar="OUT.gif", help="the film to write")
+    command.add_argument(
+        "--policy", default=PRETRAINED, help="checkpoint folder (default: pretrained, the model of the package)"
+    )
+    command.add_argument("--maps", choices=sorted(MAP_SETS), default="unseen", help="set of maps (default unseen)")
+    command.add_argument(
+        "--map", type=int, nargs="+", default=[0], metavar="N", help="numbers of maps, one episode each (default 0)"
+    )
+    command.add_argument("--partner", choices=sorted(PAIRS), default="S01", help="simulated pair (default S01)")
+    command.add_argument("--seed", type=int, default=0, help="of plans and partner (default 0)")
+    command.add_argument("--speed", type=float, default=2.0, help="times real time (default 2)")
+    command.add_argument("--fps", type=int, default=12, help="pictures a second (default 12)")
+    command.add_argument("--width", type=int, default=600, help="px (default 600)")
+    command.add_argument("--overwrite", action="store_true", help="replace the film")
+
+
+def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
+    maps, path = MAP_SETS[arguments.maps], arguments.gif
+    for name, value, least, most in (
+        ("seed", arguments.seed, 0, 2**32 - 1),
+        ("fps", arguments.fps, 1, 50),
+        ("width", arguments.width, 200, 2000),
+        ("speed", arguments.speed, 0.1, 20),
+        *(("map", number, 0, len(maps) - 1) for number in arguments.map),
+    ):
+        if not least <= value <= most:
+            raise InvalidValueError(f"--{name}", f"{least} to {most}", value)
+    if path.suffix.lower() != ".gif":
+        raise InvalidValueError("--gif", "a name that ends with .gif", str(path))
+    if path.exists() and not arguments.overwrite:
+        raise OutputExistsError(path)
+    # Loading torch and pygame takes a moment that `--help` should not.
+    from ..controllers.checkpoint import Checkpoint
+    from ..replay.film import save_gif
+    from .episode import demonstrate
+    from .pictures import SIZE, picture_count, pictures
+
+    planner = Checkpoint(arguments.policy)
+    tracks = [demonstrate(planner, maps[number], arguments.partner, arguments.seed) for number in arguments.map]
+    size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
+    film = (size, arguments.fps, arguments.speed)
+    frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
+    count = sum(picture_count(track, arguments.fps, arguments.speed) for track in tracks)
+    if arguments.overwrite:
+        path.unlink(missing_ok=True)
+    save_gif(progress(frames, count, "pictures"), path, size, arguments.fps, colours=64)
+    return {
+        "out": str(path),
+        "bytes": path.stat().st_size,
+        "pictures": count,
+        "policy": planner.name,
+        "partner": f"simulated, human of {arguments.partner}",
+        "episodes": [
+            f"{arguments.maps} {number}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
+            for number, track in zip(arguments.map, tracks, strict=True)
+        ],
+    }

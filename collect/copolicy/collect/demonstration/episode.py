@@ -1,0 +1,60 @@
+"""An episode of a policy with a simulated partner, played without a clock: the same every time."""
+
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
+from copolicy.dataset.task import MapConfig, identify
+
+from ..controllers import PolicyController, ScriptedController
+from ..controllers.policy import JointPlanner
+from ..replay.track import Track, track_of
+from ..world import RUNNING, TableWorld
+
+
+def demonstrate(planner: JointPlanner, map_config: MapConfig, partner: str = "S01", seed: int = 0) -> Track:
+    """Lets a policy on the robot's seat and a simulated partner carry the table to the end of the episode.
+
+    The world waits for each plan, so that the speed of the machine changes nothing.
+
+    Args:
+        planner: the policy.
+        map_config: the map.
+        partner: name of a simulated pair, whose human is the partner.
+        seed: of the plans' noise and of the partner.
+    """
+    robot, human = PolicyController(planner), ScriptedController(partner)
+    world = TableWorld(map_config)
+    states, actions = [], []
+    try:
+        for seat, controller in enumerate((robot, human)):
+            controller.begin(seat, map_config, seed)
+        outcome = RUNNING
+        while not outcome.done:
+            robot.wait()
+            state = world.observation
+            forces = [controller.read(state).force for controller in (robot, human)]
+            action = np.clip(np.concatenate(forces), -1.0, 1.0)
+            states.append(state)
+            actions.append(action)
+            outcome = world.step(action)
+            for controller in (robot, human):
+                controller.executed(action)
+    finally:
+        robot.close()
+    map_id, map_set = identify(map_config)
+    meta = EpisodeMeta(
+        "",
+        controller_0=robot.name,
+        controller_1=human.name,
+        map_id=map_id,
+        map_set=map_set,
+        seed=seed,
+        source="simulated",
+        success=outcome.success,
+        termination_reason=cast(TerminationReason, outcome.reason),
+    )
+    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config)
+    return track_of(Path(map_id), episode)
