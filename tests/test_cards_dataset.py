@@ -1,4 +1,3 @@
-import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -7,11 +6,13 @@ import pyarrow.parquet as parquet
 import pytest
 import yaml
 from huggingface_hub import DatasetCard
+from report_page import route_document
 
 from copolicy.cards.cli import main
 from copolicy.cards.dataset_card import render
 from copolicy.cards.facts import DatasetFacts
 from copolicy.convert.cli import main as convert
+from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 
 
@@ -62,7 +63,7 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
     assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
     text = (dataset / "README.md").read_text()
     headings = [line[3:] for line in text.splitlines() if line.startswith("## ")]
-    assert headings[4:] == [
+    assert headings[5:] == [
         "Motivation", "Composition", "Collection: who played, and how it was recorded", "Preprocessing", "Uses",
         "Distribution and licence", "Maintenance", "Consent and withdrawal", "Citation",
     ]  # fmt: skip
@@ -108,30 +109,63 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
         render(DatasetFacts.read(dataset), "lab/table")
 
 
+def test_findings_are_counted_and_their_age_is_told(dataset):
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
+    assert dataset_command(["check", str(dataset)]) == 0
+    kept = json.loads((dataset / "meta" / "copolicy_check.json").read_text())
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
+    assert (
+        f"Checked on {kept['date'][:10]} by version 1.0.0 of the rules (`meta/copolicy_check.json`): {counts}" in text
+    )
+    assert "| severity | rule | findings | the first |" in text
+    assert "**Stale.**" not in text
+    _set_column(dataset, "discarded", [True] * 6)
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "## Checks\n\n**Stale.** The content of the data set changed since it was checked.\n\nChecked on" in text
+    # What `check --json > meta/copolicy_check.json` kept before it named the content.
+    entry = {"episode": "2", "rule": "idle_run", "figure": 5.25, "limit": 5, "severity": "warning", "message": "a|b"}
+    old = {"rules": 37, "findings": [entry, {**entry, "episode": "", "figure": None}]}
+    (dataset / "meta" / "copolicy_check.json").write_text(json.dumps(old))
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "**Unknown.** They do not say which content was checked: the data may have changed since." in text
+    assert "Checked (`meta/copolicy_check.json`): 0 errors, 2 warnings, 0 remarks." in text
+    assert "| warning | idle run | 2 | episode 2: a\\|b (5.25; limit 5) |" in text
+
+
+def test_routes_are_set_beside_those_of_people(dataset):
+    _set_column(dataset, "source", ["simulated"] * 6)
+    document = route_document(["LL", "LR", "RR", "RL"] * 10, 6)
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document))
+    assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
+    text = (dataset / "README.md").read_text()
+    assert (dataset / "figures" / "human_routes.png").read_bytes().startswith(b"\x89PNG")
+    routes = document["statistics"]["routes"]
+    distance = routes["human_distance_2_obstacles"]
+    low, high = distance["interval"]
+    caption = f"2 obstacles: {distance['value']:.3f} bits (95 % interval {low:.3f} to {high:.3f})."
+    assert "*Routes of this data set (simulated pairs) beside those of human-human demonstrations" in text
+    assert caption in text
+    ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
+    assert "<details><summary>Routes of simulated pairs in each of 1 configurations</summary>" in text
+    row = next(line for line in text.splitlines() if line.startswith(f"| {name} | 40 |"))
+    bits = " to ".join(f"{bound:.4g}" for bound in entry["interval"])
+    assert f"| {entry['entropy_bits']:.4g} | {bits} | {entry['effective_modes']:.4g} |" in row
+    assert "by version 2.0.0 of the definitions" in text
+    assert "**Stale.**" not in text.partition("## Multimodality")[2].partition("## Checks")[0]
+    document["dataset"]["episodes"] = 7
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document))
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "**Stale.** They were computed when the data set had 7 episodes; it has 6 now." in text
+
+
 def test_a_release_is_named(dataset):
     release = {"version": "1.2.0", "date": "2026-01-02", "content_hash": "abc"}
     (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release))
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert 'LeRobotDataset("lab/table", revision="data-1.2.0")' in text
     assert "- Version 1.2.0 of 2026-01-02; changes are in `CHANGELOG.md`." in text
-
-
-def test_croissant_names_every_file_and_field(dataset):
-    assert main(["dataset", str(dataset), "--repo-id", "lab/table", "--croissant", "--no-figures"]) == 0
-    metadata = json.loads((dataset / "meta" / "croissant.json").read_text())
-    assert (metadata["@type"], metadata["conformsTo"]) == ("sc:Dataset", "http://mlcommons.org/croissant/1.0")
-    assert metadata["license"] == "cc-by-4.0"
-    files = [entry for entry in metadata["distribution"] if entry["@type"] == "cr:FileObject"]
-    assert files
-    for entry in files:
-        content = (dataset / entry["contentUrl"]).read_bytes()
-        assert entry["sha256"] == hashlib.sha256(content).hexdigest()
-    (records,) = metadata["recordSet"]
-    info = json.loads((dataset / "meta" / "info.json").read_text())
-    assert [field["source"]["extract"]["column"] for field in records["field"]] == list(info["features"])
-    repeated = {field["name"] for field in records["field"] if field.get("repeated")}
-    assert "frames/action" in repeated
-    assert "frames/timestamp" not in repeated
 
 
 def test_simulated_episodes_are_called_that(dataset):

@@ -18,7 +18,10 @@ def _evaluation(maps: str = "holdout", mean: float = 0.75, complete: bool = True
     return {
         "study": "coplan",
         "label": "co-planning in simulation: no person took part",
-        "policy": {"weights_sha256": hashlib.sha256(WEIGHTS).hexdigest(), "parameters": 1_132_464},
+        "policy": {
+            "weights_sha256": hashlib.sha256(WEIGHTS).hexdigest(), "parameters": 1_132_464, "sampler": "ddim",
+            "num_inference_steps": 10, "initial_noise_scale": 0.7,
+        },
         "settings": {
             "maps": maps, "map_count": 84 if complete else 5, "complete_set": complete, "orientations": False,
             "repeats": 1, "seed": 11, "device": "cpu",
@@ -75,8 +78,11 @@ def test_a_card_states_what_training_and_evaluation_wrote(run, dataset, tmp_path
     assert json.loads(capsys.readouterr().out)["trained_on"] == {"simulated": 4}
     card = ModelCard.load(_card(run))
     text = card.text
-    assert "| coplan | holdout | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 11 | 15.62 | 0.05004 | 22.41 on cpu |" in text
-    assert "| coplan | unseen, first 5 | 50.0 ± 4.7 |" in text
+    assert (
+        "| coplan | holdout | ddim, 10 steps, noise x 0.7 | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 11 | 15.62 | 0.05004 |"
+        in text
+    )
+    assert "| coplan | unseen, first 5 | ddim, 10 steps, noise x 0.7 | 50.0 ± 4.7 |" in text
     assert "Only a part of the maps of unseen was tried." in text
     assert "**Co-planning in simulation: no person took part.**" in text
     assert "**No person took part.** Two scripted pilots" in text
@@ -103,6 +109,71 @@ def test_the_hub_reads_results_from_the_model_index(run, dataset, tmp_path):
     assert metadata["library_name"] == "lerobot"
     assert "trained-on-simulated" in metadata["tags"]
     assert "license" not in metadata
+
+
+@pytest.fixture
+def exported(run) -> Path:
+    """The folder of a policy that was exported: a recipe instead of the training's configuration, and results."""
+    folder = run / "checkpoints" / "last" / "pretrained_model"
+    (folder / "train_config.json").unlink()
+    config = {"type": "copolicy", "n_obs_steps": 3, "horizon": 12, "n_action_steps": 8, "past_human_action": True}
+    (folder / "config.json").write_text(json.dumps(config | {"ema": False}))
+    recipe = {
+        "weights": {"exported_from": "f" * 64, "averaged": True},
+        "training": {"steps": 900, "batch_size": 64, "seed": 3, "samples": 57_600},
+        "dataset": {
+            "repo_id": "local/pairs", "episodes": 20, "episodes_used": 18, "frames": 3400, "fps": 10,
+            "source": {"simulated": 18}, "map_set": {"training": 18}, "license": {"cc0-1.0": 18},
+            "pair_id": {"S01": 18},
+        },
+        "commands": ["copolicy-collect simulate --episodes 20", "copolicy-train --steps=900"],
+    }  # fmt: skip
+    (folder / "recipe.json").write_text(json.dumps(recipe))
+    holdout = _evaluation()
+    holdout["policy"]["weights_sha256"] = "f" * 64  # of the checkpoint that it was exported from
+    partner = _evaluation("unseen", 0.9)
+    partner |= {"study": "partner", "label": "with SIMULATED partners, no person took part", "name": "CoDP-H"}
+    partner["settings"] |= {"configurations": 60, "actions_per_plan": 1}
+    partner["summary"] |= {"robot_share": 0.48, "by_partner": {"slow": {"success": {"mean": 0.95}}}}
+    partner["baselines"] = [{"name": "passive", "summary": {**_evaluation()["summary"], "robot_share": 0.0}}]
+    (folder / "eval.json").write_text(json.dumps({"evaluations": [holdout, partner]}))
+    return folder
+
+
+def test_the_card_of_an_exported_policy_comes_from_its_own_files(exported, capsys):
+    assert main(["model", str(exported), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["evaluations"], said["trained_on"]) == (2, {"simulated": 18})
+    text = (exported / "README.md").read_text()
+    assert "In: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
+    assert "Training data: **No person took part.**" in text
+    assert "- Data set: `local/pairs` (a local name, not one on the Hub)" in text
+    assert "- Episodes used: 18 of 20 (90.0 %)\n- Frames: 3,400 at 10 Hz\n- Pairs: S01 (18)\n" in text
+    assert "| training `steps` | 900 |" in text
+    assert "| weights | moving average over the training, alone |" in text
+    assert "`ema`" not in text
+    assert "```bash\ncopolicy-collect simulate --episodes 20\ncopolicy-train --steps=900\n```" in text
+    assert "hf download" not in text
+    assert "trained-on-simulated" in text
+
+
+def test_a_study_with_partners_has_a_table_of_its_own(exported):
+    assert main(["model", str(exported)]) == 0
+    text = (exported / "README.md").read_text()
+    assert "**With SIMULATED partners, no person took part.**" in text
+    assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) a plan, ddim, 10 steps" in text
+    assert "| CoDP-H | 90.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0.48 | 95.0 |" in text
+    assert "| passive | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0 | - |" in text
+    assert "The partners of the study above are simulated too" in text
+
+
+def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
+    folder = exported.rename(tmp_path / "pretrained")
+    assert main(["model", str(folder)]) == 0
+    text = (folder / "README.md").read_text()
+    assert "copolicy-collect play --pilots keyboard policy:pretrained\n" in text
+    assert "copolicy-eval coplan --policy pretrained --maps holdout --out eval.json\n" in text
+    assert "`copolicy-train pretrained` says where it is" in text
 
 
 def test_what_is_not_at_hand_is_not_stated(run):

@@ -39,7 +39,7 @@ def test_statistics_lie_in_the_data_set_and_are_the_same_the_next_time(folder, c
     assert not list((folder / "meta").glob(".*"))
     document = json.loads(first)
     assert printed == {"written": str(folder / STATISTICS_FILE), **document}
-    assert document["definition_version"] == "1.0.0"
+    assert document["definition_version"] == "2.0.0"
     assert document["settings"]["seed"] == 0
     assert document["dataset"]["source_labels"] == {"simulated": "scripted pairs, no person took part"}
     assert list(document["statistics"]) == FAMILIES

@@ -71,21 +71,56 @@ def test_actions_that_do_not_depend_on_the_state_have_ratio_one():
     )
 
 
-def test_frames_of_the_same_episode_are_no_neighbours():
-    # Each episode has an action of its own and all share one path: its own frames would say that nothing varies.
+def test_frames_of_one_episode_count_once_and_never_for_their_own():
+    # Each episode has an action of its own and all share one path: the place tells nothing. Its own frames would say
+    # that nothing varies, and many frames of few others that little does.
     rng = np.random.default_rng(4)
     level = rng.uniform(-1, 1, (30, 4))
     data = trajectories([(carried("L", ONE), np.tile(level[n], (120, 1))) for n in range(30)], [row()] * 30)
-    value = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"].value
-    assert value is not None
-    assert value > 0.6
+    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    assert estimate.value == pytest.approx(1.0, abs=0.1)
 
 
-def test_without_enough_other_frames_there_is_no_ratio():
-    data = trajectories([(still(20), None)] * 2, [row()] * 2)
+def test_noise_that_lasts_counts_as_noise():
+    rng = np.random.default_rng(6)
+    episodes, kept = [], np.exp(-1 / 10)
+    offsets = np.linspace(-100, 100, 40)
+    for offset in offsets:
+        states = still(120)
+        states[:, 0], states[:, 1] = np.linspace(240, 960, 120), 300 + offset
+        noise = rng.standard_normal((120, 4))
+        for step in range(1, 120):
+            noise[step] = kept * noise[step - 1] + np.sqrt(1 - kept**2) * noise[step]
+        episodes.append((states, 0.2 * offset / offsets.std() + 0.2 * noise))
+    data = trajectories(episodes, [row()] * 40)
+    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    assert estimate.interval is not None
+    assert estimate.interval[0] < 0.5 < estimate.interval[1]
+    assert estimate.value == pytest.approx(0.5, abs=0.06)
+
+
+def test_a_signal_between_neighbours_is_no_noise():
+    # Few episodes on a steep line and no noise at all: neighbours differ, but only by what the state explains.
+    rng = np.random.default_rng(7)
+    offsets = np.linspace(-100, 100, 20)
+    episodes = []
+    for offset in offsets:
+        states = still(60)
+        states[:, 0], states[:, 1] = np.linspace(240, 960, 60), 300 + offset
+        episodes.append((states, np.full((60, 4), offset / 200)))
+    data = trajectories(episodes, [row()] * 20)
+    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    among = estimate.details["among_episodes"]
+    assert among["2"] < among["4"] < among["8"]
+    assert among["8"] > 0.05
+    assert estimate.value == pytest.approx(0.0, abs=0.01)
+
+
+def test_without_enough_other_episodes_there_is_no_ratio():
+    data = trajectories([(still(20), None)] * 8, [row()] * 8)
     estimate = neighbour_statistics(data, _bootstrap(data), np.random.default_rng(0))["action_variance_ratio"]
     assert estimate.value is None
-    assert estimate.note == "no goal and obstacles with 64 frames in other episodes"
+    assert estimate.note == "no goal and obstacles with 9 episodes"
 
 
 def test_the_decision_zone_ends_at_the_near_side_of_the_first_obstacle():

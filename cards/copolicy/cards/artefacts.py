@@ -1,16 +1,55 @@
 """What other commands left in a data set's `meta/` folder, when they were run."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.checks.stored_check import CHECK_FILE, Validity, content_hash, validity
 from copolicy.dataset.exceptions import FileFormatError
 
-CHECK_FILE = Path("meta/copolicy_check.json")
-"""Findings of `copolicy-dataset check`."""
+__all__ = [
+    "CHECK_FILE",
+    "CONVERSION_FILE",
+    "RELEASE_FILE",
+    "STATISTICS_FILE",
+    "KeptFindings",
+    "estimates",
+    "kept_findings",
+    "read_json",
+    "statistics_doubt",
+]
 
 STATISTICS_FILE = Path("meta/copolicy_stats.json")
 """Multimodality statistics of `copolicy-dataset stats`."""
+
+RELEASE_FILE = Path("meta/copolicy_release.json")
+"""The newest release, made by `copolicy-dataset release`."""
+
+CONVERSION_FILE = Path("meta/copolicy.json")
+"""How the data set was converted, made by `copolicy-convert`."""
+
+
+@dataclass(frozen=True)
+class KeptFindings:
+    """Findings of `copolicy-dataset check`, and whether they are about the data beside them."""
+
+    document: dict[str, Any]
+    validity: Validity
+
+
+def kept_findings(root: Path, path: Path | None = None) -> KeptFindings | None:
+    """The findings kept in a data set or in another file, None where there are none.
+
+    Raises:
+        FileFormatError: there is a file, and it holds no JSON object.
+    """
+    document = read_json(path or root / CHECK_FILE)
+    if document is None:
+        return None
+    # Reading the whole content is worth the time only where there is something to compare it with.
+    content = content_hash(root) if document.get("content_hash") else None
+    return KeptFindings(document, validity(document, content))
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
@@ -30,11 +69,15 @@ def read_json(path: Path) -> dict[str, Any] | None:
     return value
 
 
-RELEASE_FILE = Path("meta/copolicy_release.json")
-"""The newest release, made by `copolicy-dataset release`."""
-
-CONVERSION_FILE = Path("meta/copolicy.json")
-"""How the data set was converted, made by `copolicy-convert`."""
+def statistics_doubt(stored: dict[str, Any], episodes: int) -> str:
+    """Why stored statistics are not those of a data set with so many episodes; empty where nothing speaks for it."""
+    described = stored.get("dataset", {})
+    if "episodes" not in described:
+        return ""
+    counted = described["episodes"] + sum(described.get("left_out", {}).values())
+    if counted == episodes:
+        return ""
+    return f"They were computed when the data set had {counted} episodes; it has {episodes} now."
 
 
 def estimates(node: Any, path: tuple[str, ...] = ()) -> list[dict[str, Any]]:

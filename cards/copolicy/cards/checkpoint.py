@@ -10,26 +10,31 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 
 from .artefacts import read_json
 from .facts import DatasetFacts
+from .training_data import TrainingData
 
 WEIGHTS = "model.safetensors"
+RECIPE = "recipe.json"
+EVALUATIONS = "eval.json"
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A folder with a policy, as LeRobot saves it.
+    """A folder with a policy, as LeRobot saves it or as `copolicy-train export` does.
 
     Attributes:
         config: `config.json`.
-        training: `train_config.json`, empty where there is none.
+        training: steps, batch size, seed, optimizer; empty where not stated.
+        data: what it was trained on.
         weights_sha256: hash of the weights.
-        dataset: facts of the data set that it was trained on, None where its folder is not at hand.
+        recipe: `recipe.json` of an exported policy, else empty.
     """
 
     folder: Path
     config: dict[str, Any]
     training: dict[str, Any]
+    data: TrainingData
     weights_sha256: str
-    dataset: DatasetFacts | None
+    recipe: dict[str, Any]
 
     @classmethod
     def read(cls, path: Path, dataset_root: Path | None = None) -> "Checkpoint":
@@ -37,7 +42,7 @@ class Checkpoint:
 
         Args:
             dataset_root: folder of the data set it was trained on (default: where the training found it, if it is
-                still there).
+                still there, else what the recipe says).
 
         Raises:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
@@ -47,28 +52,38 @@ class Checkpoint:
         if "type" not in config:
             raise FileFormatError(folder / "config.json", "a policy's configuration with its type", "none")
         training = read_json(folder / "train_config.json") or {}
-        root = dataset_root or _training_root(training)
+        recipe = read_json(folder / RECIPE) or {}
+        settings = training.get("dataset") or {}
+        root = dataset_root or _training_root(settings)
+        if root is not None:
+            data = TrainingData.from_data_set(DatasetFacts.read(root), settings or recipe.get("dataset") or {})
+        elif recipe.get("dataset"):
+            data = TrainingData.from_recipe(recipe["dataset"])
+        else:
+            data = TrainingData.from_settings(settings)
         with (folder / WEIGHTS).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        return cls(folder, config, training, digest, None if root is None else DatasetFacts.read(root))
+        return cls(folder, config, training or recipe.get("training") or {}, data, digest, recipe)
 
     @property
-    def repo_id(self) -> str:
-        """Name of the data set that it was trained on, empty where not stated."""
-        return str((self.training.get("dataset") or {}).get("repo_id") or "")
-
-    @property
-    def training_episodes(self) -> list[int] | None:
-        """The episodes that it was trained on, None for all of them."""
-        return (self.training.get("dataset") or {}).get("episodes")
+    def commands(self) -> list[str]:
+        """How to make data and policy again, as far as it is stated."""
+        return [str(command) for command in self.recipe.get("commands") or ()]
 
     def evaluations(self, paths: Sequence[Path]) -> list[dict[str, Any]]:
-        """Reads `eval.json` files of this very policy.
+        """Reads results of `copolicy-eval` on this very policy.
+
+        Args:
+            paths: one result each; without any, those that an exported policy keeps in `eval.json`.
 
         Raises:
             FileFormatError: not there, no evaluation, or one of other weights.
             InvalidValueError: the same file twice.
         """
+        if not paths:
+            kept = self.folder / EVALUATIONS
+            results = (read_json(kept) or {}).get("evaluations") or []
+            return [self._checked(kept, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InvalidValueError("--eval", "each file once", [str(path) for path in paths])
         return [self._evaluation(path) for path in paths]
@@ -77,6 +92,9 @@ class Checkpoint:
         result = read_json(path)
         if result is None:
             raise FileFormatError(path, "a result of copolicy-eval", "no such file")
+        return self._checked(path, result)
+
+    def _checked(self, path: Path, result: dict[str, Any]) -> dict[str, Any]:
         try:
             label, weights = result["label"], result["policy"]["weights_sha256"]
             success = result["summary"]["success"]
@@ -84,14 +102,15 @@ class Checkpoint:
             _ = success["episodes"], success["wilson_95"], result["summary"]["planning_ms_per_call"]
         except (KeyError, TypeError) as error:
             raise FileFormatError(path, "a result of copolicy-eval", f"none: {error} is missing") from None
-        if weights != self.weights_sha256:
+        # An exported policy makes the same plans as the checkpoint that it came from, and so has the same results.
+        if weights not in (self.weights_sha256, (self.recipe.get("weights") or {}).get("exported_from")):
             expected = f"an evaluation of {self.folder.name} (weights {self.weights_sha256[:12]})"
             raise FileFormatError(path, expected, f"one of weights {str(weights)[:12]}")
         return result
 
 
-def _training_root(training: dict[str, Any]) -> Path | None:
-    root = (training.get("dataset") or {}).get("root")
+def _training_root(settings: dict[str, Any]) -> Path | None:
+    root = settings.get("root")
     return Path(root) if root and (Path(root) / "meta" / "info.json").is_file() else None
 
 

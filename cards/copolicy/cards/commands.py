@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
+from copolicy.dataset.exceptions import InvalidValueError
 
 from .new_file import require_new, write_whole
 
@@ -22,7 +23,9 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
     dataset.add_argument("--pretty-name", help="title of the card (default: the data set's name)")
     dataset.add_argument("--no-figures", action="store_true", help="draw no pictures")
     dataset.add_argument(
-        "--croissant", action="store_true", help="also write meta/croissant.json, Croissant 1.0 metadata as JSON-LD"
+        "--croissant",
+        action="store_true",
+        help="also write meta/croissant.json, Croissant 1.0 metadata as JSON-LD (needs --repo-id)",
     )
     dataset.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
 
@@ -37,7 +40,14 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
         "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
     )
     model.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run (its last checkpoint)")
-    model.add_argument("--eval", action="append", type=Path, default=[], metavar="FILE", help="result of copolicy-eval")
+    model.add_argument(
+        "--eval",
+        action="append",
+        type=Path,
+        default=[],
+        metavar="FILE",
+        help="result of copolicy-eval (default: those that an exported policy keeps)",
+    )
     model.add_argument("--dataset", type=Path, help="folder of its training data (default: where training found it)")
     model.add_argument("--repo-id", default="local/copolicy", help="user/name on the Hub (default: local/copolicy)")
     model.add_argument("--license", help="Hub identifier of the licence of the weights (default: none is stated)")
@@ -52,6 +62,8 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     facts = DatasetFacts.read(arguments.root)
     path = arguments.root / "README.md"
     require_new(path, arguments.overwrite)
+    if arguments.croissant and not arguments.repo_id:
+        raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
     repo_id = arguments.repo_id or f"local/{arguments.root.resolve().name}"
     render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
     figures = []
@@ -76,5 +88,5 @@ def _model(arguments: argparse.Namespace) -> dict:
     require_new(path, arguments.overwrite)
     evaluations = checkpoint.evaluations(arguments.eval)
     write_whole(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
-    sources = checkpoint.dataset.counts("source") if checkpoint.dataset else "not stated: the data set is not at hand"
+    sources = checkpoint.data.sources or "not stated: the data set is not at hand"
     return {"card": str(path), "evaluations": len(evaluations), "trained_on": sources}

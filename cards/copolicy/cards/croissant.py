@@ -1,5 +1,8 @@
 """Croissant 1.0 metadata of a data set as JSON-LD, which search engines and loaders of other projects read.
 
+The data lie in the repository on the Hub, described as one file object that is fetched with git, as the Hub's own
+Croissant files have it; every file of the data is named in it with its sha256. A copy on the disk is read by naming its
+folder: `mlcroissant.Dataset("meta/croissant.json", mapping={"repository": FOLDER})`.
 Format: https://docs.mlcommons.org/croissant/docs/croissant-spec.html
 """
 
@@ -8,15 +11,22 @@ import json
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.episode import EPISODE_COLUMNS
+
 from .artefacts import RELEASE_FILE, read_json
-from .dataset_card import licence
+from .dataset_card import PAPER, licence
 from .facts import DatasetFacts
 
 CROISSANT_FILE = Path("meta/croissant.json")
 
+REPOSITORY = "repository"
+"""Id of what the data files lie in; a reader maps it to a folder."""
+
 _TYPES = {
     "float32": "sc:Float", "float64": "sc:Float", "int64": "sc:Integer", "bool": "sc:Boolean", "string": "sc:Text",
+    "float": "sc:Float", "int": "sc:Integer", "str": "sc:Text",
 }  # fmt: skip
+_PICTURES = ("video", "image")
 _CONTEXT = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -28,6 +38,7 @@ _CONTEXT = {
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
     "dct": "http://purl.org/dc/terms/",
+    "equivalentProperty": "cr:equivalentProperty",
     "examples": {"@id": "cr:examples", "@type": "@json"},
     "extract": "cr:extract",
     "field": "cr:field",
@@ -47,6 +58,7 @@ _CONTEXT = {
     "regex": "cr:regex",
     "repeated": "cr:repeated",
     "replace": "cr:replace",
+    "samplingRate": "cr:samplingRate",
     "sc": "https://schema.org/",
     "separator": "cr:separator",
     "source": "cr:source",
@@ -56,7 +68,9 @@ _CONTEXT = {
 
 
 def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> str:
-    """The JSON-LD: every data file with its hash, and one record set of frames.
+    """The JSON-LD: every data file with its hash, one record set of frames and one of episodes.
+
+    Version and date of publication are those of the newest release, and left out where there is none.
 
     Raises:
         InvalidValueError: a licence that is not in the Hub's form.
@@ -67,7 +81,7 @@ def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = 
 def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> dict[str, Any]:
     """The same as a JSON-able dict."""
     release = read_json(facts.root / RELEASE_FILE) or {}
-    files = [_file(facts.root, path) for path in sorted((facts.root / "data").glob("*/*.parquet"))]
+    url = f"https://huggingface.co/datasets/{repo_id}"
     metadata: dict[str, Any] = {
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
@@ -77,28 +91,13 @@ def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | Non
             f"{len(facts.episodes)} episodes of two players carrying a table; source: "
             f"{', '.join(facts.values('source'))}."
         ),
-        "url": f"https://huggingface.co/datasets/{repo_id}",
+        "url": url,
+        "citeAs": PAPER,
         "keywords": ["robotics", "LeRobot", "human-robot collaboration", *facts.values("source")],
-        "distribution": [
-            *files,
-            {
-                "@type": "cr:FileSet",
-                "@id": "frames-files",
-                "name": "frames-files",
-                "containedIn": [{"@id": file["@id"]} for file in files],
-                "encodingFormat": "application/x-parquet",
-                "includes": "data/*/*.parquet",
-            },
-        ],
-        "recordSet": [
-            {
-                "@type": "cr:RecordSet",
-                "@id": "frames",
-                "name": "frames",
-                "field": [_field(key, feature) for key, feature in facts.info["features"].items()],
-            }
-        ],
-    }
+        "distribution": [_repository(url), *_file_set(facts.root, "frames", "data"),
+                         *_file_set(facts.root, "episodes", "meta/episodes")],
+        "recordSet": [_frames(facts), _episodes()],
+    }  # fmt: skip
     stated = licence(facts)
     if stated not in ("unknown", "other"):
         metadata["license"] = stated
@@ -107,31 +106,77 @@ def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | Non
     return metadata
 
 
-def _file(root: Path, path: Path) -> dict[str, Any]:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    name = path.relative_to(root).as_posix()
+def _repository(url: str) -> dict[str, Any]:
     return {
         "@type": "cr:FileObject",
-        "@id": name,
-        "name": name,
-        "contentUrl": name,
-        "encodingFormat": "application/x-parquet",
-        "contentSize": f"{path.stat().st_size} B",
-        "sha256": digest,
+        "@id": REPOSITORY,
+        "name": REPOSITORY,
+        "description": "The data set's repository; the files in it have their own check sums.",
+        "contentUrl": url,
+        "encodingFormat": "git+https",
+        # The format asks for a check sum of every file object; a repository has none, and this issue is what stands
+        # in its place in the Croissant files of the Hub.
+        "sha256": "https://github.com/mlcommons/croissant/issues/80",
     }
 
 
-def _field(key: str, feature: dict[str, Any]) -> dict[str, Any]:
-    names = feature.get("names")
-    field: dict[str, Any] = {
+def _file_set(root: Path, name: str, folder: str) -> list[dict[str, Any]]:
+    """A file set of the Parquet files in a folder, and each of them with its check sum."""
+    parquet = "application/x-parquet"
+    within = {"containedIn": {"@id": REPOSITORY}, "encodingFormat": parquet}
+    files = {"@type": "cr:FileSet", "@id": f"{name}-files", "name": f"{name}-files", **within}
+    return [{**files, "includes": f"{folder}/*/*.parquet"}, *(
+        {"@type": "cr:FileObject", "@id": place, "name": place, "contentUrl": place, **within,
+         "contentSize": f"{path.stat().st_size} B", "sha256": _sha256(path)}
+        for path in sorted((root / folder).glob("*/*.parquet"))
+        for place in (path.relative_to(root).as_posix(),)
+    )]  # fmt: skip
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _frames(facts: DatasetFacts) -> dict[str, Any]:
+    """The columns of the data files; pictures lie in files of their own."""
+    fields = []
+    for key, feature in facts.info["features"].items():
+        if feature["dtype"] in _PICTURES:
+            continue
+        names = feature.get("names")
+        field = _field("frames", key, feature["dtype"], ", ".join(names) if isinstance(names, list) else key)
+        if tuple(feature["shape"]) not in ((), (1,)):
+            field["repeated"] = True
+        fields.append(field)
+    return {
+        "@type": "cr:RecordSet",
+        "@id": "frames",
+        "name": "frames",
+        "description": f"One record a frame, {facts.info['fps']:g} a second.",
+        "key": {"@id": "frames/index"},
+        "field": fields,
+    }
+
+
+def _episodes() -> dict[str, Any]:
+    columns = {"episode_index": "int", "length": "int", **EPISODE_COLUMNS}
+    return {
+        "@type": "cr:RecordSet",
+        "@id": "episodes",
+        "name": "episodes",
+        "description": "One record an episode: who carried what with whom on which map, and how it ended.",
+        "key": {"@id": "episodes/episode_index"},
+        "field": [_field("episodes", name, kind, name.replace("_", " ")) for name, kind in columns.items()],
+    }
+
+
+def _field(records: str, column: str, kind: str, description: str) -> dict[str, Any]:
+    return {
         "@type": "cr:Field",
-        "@id": f"frames/{key}",
-        "name": f"frames/{key}",
-        "description": ", ".join(names) if isinstance(names, list) else key,
-        "dataType": _TYPES.get(feature["dtype"], "sc:Text"),
-        "source": {"fileSet": {"@id": "frames-files"}, "extract": {"column": key}},
+        "@id": f"{records}/{column}",
+        "name": f"{records}/{column}",
+        "description": description,
+        "dataType": _TYPES.get(kind, "sc:Text"),
+        "source": {"fileSet": {"@id": f"{records}-files"}, "extract": {"column": column}},
     }
-    if tuple(feature["shape"]) not in ((), (1,)):
-        field["repeated"] = True
-    return field

@@ -8,6 +8,7 @@ from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from .artefacts import RELEASE_FILE, read_json
 from .datasheet import datasheet
 from .facts import DatasetFacts
+from .findings import findings
 from .markdown import share, table
 from .multimodality import multimodality
 
@@ -27,19 +28,20 @@ SOURCES = {
         "Those files do not say who or what held the sticks."
     ),
 }
-CITATION = """## Citation
-
-The task, its dynamics and its maps are those of the paper:
-
-```bibtex
-@article{ng2023diffusion,
+PAPER = """@article{ng2023diffusion,
   title   = {Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks},
   author  = {Ng, Eley and Liu, Ziang and Kennedy, Monroe},
   journal = {IEEE Robotics and Automation Letters},
   year    = {2023},
   eprint  = {2305.12171},
   archivePrefix = {arXiv}
-}
+}"""
+CITATION = f"""## Citation
+
+The task, its dynamics and its maps are those of the paper:
+
+```bibtex
+{PAPER}
 ```"""
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
@@ -55,7 +57,7 @@ def render(
 
     Raises:
         InvalidValueError: `repo_id` or a licence is not in the Hub's form.
-        FileFormatError: statistics, release or another file in `meta/` cannot be read.
+        FileFormatError: statistics, findings, release or another file in `meta/` cannot be read.
     """
     if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo_id):
         raise InvalidValueError("--repo-id", "user/name in letters, digits, '-', '_' and '.'", repo_id)
@@ -66,6 +68,7 @@ def render(
         _loading(facts, repo_id),
         _episodes(facts),
         multimodality(facts),
+        findings(facts),
         _features(facts),
         *datasheet(facts),
         CITATION,

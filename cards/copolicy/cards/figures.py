@@ -1,4 +1,4 @@
-"""Pictures of a data set for its card: trajectories and shares of the routes."""
+"""Pictures of a data set for its card: trajectories, shares of the routes, and routes beside those of people."""
 
 import math
 from collections import Counter, defaultdict
@@ -10,6 +10,7 @@ from copolicy.dataset.task import GOAL_SIZE, WINDOW
 
 from .facts import DatasetFacts
 from .frames import EpisodeFrames, read_frames
+from .human_figure import human_figure
 
 try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -34,20 +35,22 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
         For each its path in that folder, and a caption.
 
     Raises:
-        FileFormatError: the frames cannot be read.
+        FileFormatError: the frames or the stored statistics cannot be read.
     """
     (facts.root / FOLDER).mkdir(exist_ok=True)
     sources = " and ".join(facts.values("source"))
     total, groups = _by_obstacles(facts)
     most = f", the {len(groups)} most frequent of {total} sets of obstacles" if len(groups) < total else ""
     what = f"{len(facts.episodes)} episodes, source: {sources}{most}"
-    pictures = (
-        ("trajectories.png", f"Paths of the table's centre by route class ({what}).", _trajectories),
-        ("routes.png", f"Routes by set of obstacles ({what}).", _route_shares),
-    )
+    pictures = [
+        ("trajectories.png", f"Paths of the table's centre by route class ({what}).", _trajectories(groups)),
+        ("routes.png", f"Routes by set of obstacles ({what}).", _route_shares(groups)),
+    ]
+    people = human_figure(facts)
+    if people is not None:
+        pictures.append(("human_routes.png", people[1], people[0]))
     saved = []
-    for name, caption, draw in pictures:
-        figure = draw(groups)
+    for name, caption, figure in pictures:
         partial = facts.root / FOLDER / f".{name}.part"
         figure.savefig(partial, format="png")
         partial.replace(facts.root / FOLDER / name)

@@ -7,7 +7,8 @@ from copolicy.dataset.exceptions import MissingExtraError
 
 from .checkpoint import Checkpoint
 from .dataset_card import CITATION, SOURCES
-from .markdown import listing, number, share, table
+from .markdown import listing, share, table
+from .model_results import results
 
 try:
     from huggingface_hub import EvalResult, ModelCardData
@@ -20,7 +21,8 @@ _SETTINGS = (
     "n_action_steps", "n_layers", "width", "n_heads", "num_train_timesteps", "prediction_type", "sampler",
     "num_inference_steps", "initial_noise_scale", "mirror", "permute_obstacles", "ema",
 )  # fmt: skip
-_TRAINING = ("steps", "batch_size", "seed")
+_WITH_PACKAGE = "pretrained"  # folder of the model that the package brings
+_TRAINING = ("steps", "batch_size", "samples", "seed")
 
 
 def render_model_card(
@@ -35,10 +37,11 @@ def render_model_card(
     """
     sections = (
         _overview(checkpoint, name),
-        _results(evaluations),
+        results(evaluations),
         _data(checkpoint),
         _configuration(checkpoint, evaluations),
-        _usage(name, evaluations),
+        *_again(checkpoint),
+        _usage(checkpoint, name, evaluations),
         _limits(checkpoint, evaluations),
         CITATION,
     )
@@ -50,21 +53,23 @@ def hub_metadata(
     checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]], name: str, licence: str | None
 ) -> ModelCardData:
     """The YAML block that the Hub reads, with a model-index where there are evaluations."""
-    sources = checkpoint.dataset.values("source") if checkpoint.dataset else []
-    repo_id = checkpoint.repo_id
-    on_hub = "/" in repo_id and not repo_id.startswith("local/")
+    repo_id = checkpoint.data.repo_id
     return ModelCardData(
         license=licence or checkpoint.config.get("license"),
         library_name="lerobot",
         pipeline_tag="robotics",
         tags=[
             "robotics", "lerobot", "copolicy", checkpoint.config["type"], "human-robot-collaboration",
-            *(f"trained-on-{source}" for source in sources),
+            *(f"trained-on-{source}" for source in sorted(checkpoint.data.sources)),
         ],
-        datasets=[repo_id] if on_hub else None,
+        datasets=[repo_id] if _on_hub(repo_id) else None,
         model_name=name.rpartition("/")[2],
         eval_results=[_eval_result(evaluation) for evaluation in evaluations] or None,
     )  # fmt: skip
+
+
+def _on_hub(repo_id: str) -> bool:
+    return "/" in repo_id and not repo_id.startswith("local/")
 
 
 def _eval_result(evaluation: dict[str, Any]) -> EvalResult:
@@ -87,110 +92,104 @@ def _eval_result(evaluation: dict[str, Any]) -> EvalResult:
 def _overview(checkpoint: Checkpoint, name: str) -> str:
     parts = [
         f"# {name.rpartition('/')[2]}",
-        f"A policy of type `{checkpoint.config['type']}` that carries a table together with a partner: from what both "
-        "did it plans the actions of both players.",
+        f"A policy of type `{checkpoint.config['type']}` that carries a table together with a partner, in a simulated "
+        "plane seen from above: it plans the next actions of both players, and the robot executes its half.",
+        *_interface(checkpoint),
     ]
-    if checkpoint.dataset is None:
+    if checkpoint.data.at_hand:
+        parts += [f"Training data: {SOURCES.get(source, source)}" for source in sorted(checkpoint.data.sources)]
+    else:
         parts.append(
             "**Source of the training data: not stated.** The data set was not at hand when this card was written."
         )
-    else:
-        parts += [f"Training data: {SOURCES.get(source, source)}" for source in checkpoint.dataset.values("source")]
     return "\n\n".join(parts)
 
 
-def _results(evaluations: Sequence[dict[str, Any]]) -> str:
-    if not evaluations:
-        return "## Results\n\nNot evaluated: no `eval.json` was given."
-    rows = [_result_row(evaluation) for evaluation in evaluations]
-    header = (
-        "study", "maps", "success, % ± s.e.", "95 % interval, %", "episodes", "evaluation seed",
-        "time to completion, s", "interaction force", "planning, ms a call (median)",
-    )  # fmt: skip
-    labels = sorted({evaluation["label"] for evaluation in evaluations})
-    return "\n\n".join(
-        (
-            "## Results",
-            *(f"**{label[0].upper()}{label[1:]}.**" for label in labels),
-            table(header, rows),
-            "s.e.: binomial standard error over episodes of this one training; it says nothing about other training "
-            "seeds. Interval: Wilson. Times to completion count successes only. Interaction force: mean size, in "
-            "units of a player's full force. A call plans for all tables that are still being carried at once.",
-        )
-    )
-
-
-def _result_row(evaluation: dict[str, Any]) -> tuple[object, ...]:
-    settings, summary = evaluation["settings"], evaluation["summary"]
-    success = summary["success"]
-    low, high = success["wilson_95"]
-    part = "" if settings.get("complete_set", True) else f", first {settings['map_count']}"
-    turned = ", four start orientations" if settings.get("orientations") else ""
-    return (
-        evaluation["study"],
-        settings["maps"] + part + turned,
-        f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f}",
-        f"{100 * low:.1f} to {100 * high:.1f}",
-        success["episodes"],
-        settings.get("seed", "not stated"),
-        number((summary.get("time_to_completion_s") or {}).get("mean")),
-        number((summary.get("interaction_force") or {}).get("mean")),
-        f"{number(summary['planning_ms_per_call'].get('p50'))} on {settings.get('device', 'a device not stated')}",
-    )
+def _interface(checkpoint: Checkpoint) -> list[str]:
+    """What goes in and what comes out, where the configuration says so."""
+    config, rate = checkpoint.config, f" at {checkpoint.data.fps:g} Hz" if checkpoint.data.fps else ""
+    if not {"n_obs_steps", "horizon", "n_action_steps"} <= config.keys():
+        return []
+    human = ", the human's past actions" if config.get("past_human_action") else ""
+    return [
+        f"In: the last {config['n_obs_steps']} frames{rate} of the table's pose and velocity, the map (start, goal, "
+        f"up to three obstacles){human}. Out: {config['horizon']} actions of both players, forces in [-1, 1]; up to "
+        f"{config['n_action_steps']} are executed before the next plan."
+    ]
 
 
 def _data(checkpoint: Checkpoint) -> str:
-    name = f"`{checkpoint.repo_id}`" if checkpoint.repo_id else "not stated"
-    lines = [f"- Data set: {name}"]
-    revision = (checkpoint.training.get("dataset") or {}).get("revision")
-    if revision:
-        lines.append(f"- Revision: `{revision}`")
-    chosen = checkpoint.training_episodes
-    facts = checkpoint.dataset
-    if facts is None:
-        lines += ["- Source: not stated", f"- Episodes used: {'all' if chosen is None else len(chosen)}"]
+    data = checkpoint.data
+    where = "" if _on_hub(data.repo_id) else " (a local name, not one on the Hub)"
+    lines = [f"- Data set: `{data.repo_id}`{where}" if data.repo_id else "- Data set: not stated"]
+    for title, value in (("Revision", data.revision), ("Version", data.version), ("Content", data.content_hash)):
+        lines += [f"- {title}: `{value}`"] if value else []
+    if not data.at_hand:
+        lines += ["- Source: not stated", f"- Episodes used: {'all' if data.used is None else data.used}"]
     else:
-        used = len(facts.episodes) if chosen is None else len(chosen)
         lines += [
-            f"- Source: {listing(facts.counts('source'))}",
-            f"- Episodes used: {share(used, len(facts.episodes))}",
-            f"- Frames: {facts.info['total_frames']:,} at {facts.info['fps']:g} Hz",
-            f"- Map sets: {listing(facts.counts('map_set'))}",
-            f"- Licences: {listing(facts.counts('license'))}",
+            f"- Source: {listing(data.sources)}",
+            f"- Episodes used: {share(data.used or 0, data.episodes or 0)}",
+            f"- Frames: {data.frames:,} at {data.fps:g} Hz",
+            f"- Pairs: {listing(data.pairs)}" if data.pairs else "- Pairs: not stated",
+            f"- Map sets: {listing(data.map_sets)}",
+            f"- Licences: {listing(data.licences)}",
         ]
     return "## Training data\n\n" + "\n".join(lines)
 
 
 def _configuration(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> str:
-    rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config]
+    averaged = (checkpoint.recipe.get("weights") or {}).get("averaged")
+    # Said otherwise below, or of no consequence.
+    skipped = ({"ema"} if averaged else set()) | ({"n_heads"} if checkpoint.config.get("network") == "mlp" else set())
+    rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config.keys() - skipped]
     training = [(f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if key in checkpoint.training]
     optimizer = checkpoint.training.get("optimizer") or {}
     training += [(f"optimizer `{key}`", optimizer[key]) for key in ("type", "lr", "weight_decay") if key in optimizer]
     sizes = {evaluation["policy"].get("parameters") for evaluation in evaluations} - {None}
     size = [("parameters", f"{parameters:,}") for parameters in sizes]
     weights = [("sha256 of the weights", f"`{checkpoint.weights_sha256}`")]
+    if averaged:
+        weights.insert(0, ("weights", "moving average over the training, alone"))
     text = table(("setting", "value"), [*rows, *size, *training, *weights])
     if not checkpoint.training:
-        text += "\n\nHow it was trained is not stated (no `train_config.json`)."
+        text += "\n\nHow it was trained is not stated (no `train_config.json` or `recipe.json`)."
     return f"## Policy and training\n\n{text}"
 
 
-def _usage(name: str, evaluations: Sequence[dict[str, Any]]) -> str:
-    maps = evaluations[0]["settings"]["maps"] if evaluations else "holdout"
-    return f"""## How to use it
+def _again(checkpoint: Checkpoint) -> list[str]:
+    """How it was made, where that is on record."""
+    if not checkpoint.commands:
+        return []
+    return ["## How it was made\n\n```bash\n" + "\n".join(checkpoint.commands) + "\n```"]
 
-```bash
-pip install 'lerobot_policy_copolicy[train]'
-hf download {name} --local-dir checkpoint
-copolicy-eval coplan --policy checkpoint --maps {maps} --out eval.json
-copolicy-collect play --pilots policy:checkpoint joystick --pair P01 --out recordings
-```"""
+
+def _usage(checkpoint: Checkpoint, name: str, evaluations: Sequence[dict[str, Any]]) -> str:
+    maps = evaluations[0]["settings"]["maps"] if evaluations else "holdout"
+    commands = ["pip install 'lerobot_policy_copolicy[train]'"]
+    place = "checkpoint"
+    if checkpoint.folder.name == _WITH_PACKAGE:
+        place = _WITH_PACKAGE  # the commands know it by this name
+    elif _on_hub(name):
+        commands.append(f"hf download {name} --local-dir checkpoint")
+    commands += [
+        f"copolicy-collect play --pilots keyboard policy:{place}",
+        f"copolicy-eval coplan --policy {place} --maps {maps} --out eval.json",
+    ]
+    text = "## How to use it\n\n```bash\n" + "\n".join(commands) + "\n```"
+    if place == _WITH_PACKAGE:
+        text += "\n\nIt comes with the package; `copolicy-train pretrained` says where it is, for LeRobot's commands."
+    return text
 
 
 def _limits(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> str:
     lines = ["- Everything above was measured in a simulated plane; nothing here says how a real robot would carry."]
-    if checkpoint.dataset and "simulated" in checkpoint.dataset.values("source"):
+    if "simulated" in checkpoint.data.sources:
         lines.append("- Trained on simulated pairs: how it carries with a person has not been measured.")
+    if any(evaluation["study"] == "partner" for evaluation in evaluations):
+        lines.append(
+            "- The partners of the study above are simulated too, by the same kind of pilot as the training data."
+        )
     incomplete = [e["settings"]["maps"] for e in evaluations if not e["settings"].get("complete_set", True)]
     lines += [f"- Only a part of the maps of {maps} was tried." for maps in incomplete]
     return "## Limits\n\n" + "\n".join(lines)

@@ -1,8 +1,11 @@
 """The section of a card on how many ways the data set shows of doing the same thing."""
 
-from .artefacts import STATISTICS_FILE, estimates, read_json
+from typing import Any
+
+from .artefacts import STATISTICS_FILE, estimates, read_json, statistics_doubt
 from .facts import DatasetFacts
 from .markdown import number, table
+from .routes import RouteStatistics, route_statistics
 
 
 def multimodality(facts: DatasetFacts) -> str:
@@ -29,11 +32,51 @@ def multimodality(facts: DatasetFacts) -> str:
     return "\n\n".join(
         (
             heading,
-            f"From `{STATISTICS_FILE}`, written by `copolicy-dataset stats`.",
+            *_origin(stored, facts),
             table(("statistic", "value", "unit", "95 % interval", "by chance", "episodes"), rows),
+            *_routes(route_statistics(stored)),
             f"<details><summary>Definitions</summary>\n\n{definitions}\n\n</details>",
         )
     )
+
+
+def _origin(stored: dict[str, Any], facts: DatasetFacts) -> list[str]:
+    version = stored.get("definition_version")
+    which = f" by version {version} of the definitions" if version else ""
+    doubt = statistics_doubt(stored, len(facts.episodes))
+    return [
+        *([f"**Stale.** {doubt}"] if doubt else []),
+        f"From `{STATISTICS_FILE}`, written by `copolicy-dataset stats`{which}.",
+    ]
+
+
+def _routes(routes: RouteStatistics | None) -> list[str]:
+    """Entropy of each configuration, folded away: there may be dozens."""
+    if routes is None or not routes.configurations:
+        return []
+    rows = [
+        (
+            entry["name"],
+            entry["episodes"],
+            ", ".join(f"{word} {count}" for word, count in entry["counts"].items()),
+            number(entry.get("entropy_bits")),
+            _interval(entry.get("interval")),
+            number(entry.get("effective_modes")),
+            _interval(entry.get("effective_modes_interval")),
+        )
+        for entry in routes.configurations
+    ]
+    heads = (
+        "configuration",
+        "episodes",
+        "routes",
+        "entropy, bits",
+        "95 % interval",
+        "effective modes",
+        "95 % interval",
+    )
+    title = f"Routes of {routes.played_by} in each of {len(rows)} configurations"
+    return [f"<details><summary>{title}</summary>\n\n{table(heads, rows)}\n\n</details>"]
 
 
 def _interval(interval: list | None) -> str:

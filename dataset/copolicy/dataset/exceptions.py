@@ -56,9 +56,9 @@ class OutputExistsError(CopolicyError):
 class MissingExtraError(CopolicyError):
     """A command whose packages were not installed."""
 
-    def __init__(self, package: str):
+    def __init__(self, package: str, extra: str = "train"):
         super().__init__(
-            f"{package} is not installed: this command needs the extra, pip install 'lerobot_policy_copolicy[train]'"
+            f"{package} is not installed: this command needs the extra, pip install 'lerobot_policy_copolicy[{extra}]'"
         )
 
 

@@ -56,9 +56,15 @@ _PLACES = tuple((start, goal) for start in range(4) for goal in range(3))
 MAP_SETS: dict[str, tuple[MapConfig, ...]] = {
     # Every map that the recording program can draw: 4 starts x 3 goals x 7 sets of obstacles.
     "training": tuple(_map(s, g, _family(subset), 50) for s, g in _PLACES for subset in _SUBSETS),
-    # "36 configurations": 3 sets of obstacles x 4 starts x 3 goals. Which three sets is not published; the human
-    # labels have one, two and three obstacles, so one nested set of each size stands in.
-    "paper36": tuple(_map(s, g, _family(subset), 50) for s, g in _PLACES for subset in ("0", "01", "012")),
+    # "36 configurations": 4 starts, 3 goals, and 1, 2 or 3 obstacles. Of the three sets of 1 and of 2 obstacles the
+    # recording program draws one in each episode, so each configuration is here with all three (the one set of 3
+    # obstacles three times): equal numbers of episodes for each entry are equal numbers for each configuration.
+    "paper36": tuple(
+        _map(s, g, _family(subset), 50)
+        for s, g in _PLACES
+        for size in (1, 2, 3)
+        for subset in (*combinations(range(3), size),) * (3 if size == 3 else 1)
+    ),
     "holdout": tuple(_map(*_PLACES[i // 7], _family(draw), 45) for i, draw in enumerate(_HOLDOUT)),
     "unseen": tuple(_map(s, g, layout, 45) for s, g in _PLACES for layout in _UNSEEN),
 }

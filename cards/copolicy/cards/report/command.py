@@ -6,7 +6,7 @@ from pathlib import Path
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError
 
-from ..artefacts import CHECK_FILE, STATISTICS_FILE, read_json
+from ..artefacts import CHECK_FILE, STATISTICS_FILE, KeptFindings, kept_findings, read_json
 
 REPORT_NAME = "report.html"
 
@@ -24,7 +24,9 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
     report.add_argument("--out", type=Path, help=f"the page (default: {REPORT_NAME} in the data set's folder)")
     report.add_argument("--title", help="heading of the page (default: the folder's name)")
     report.add_argument(
-        "--findings", type=Path, help=f"output of `copolicy-dataset check --json` (default: {CHECK_FILE}, if there)"
+        "--findings",
+        type=Path,
+        help=f"output of `copolicy-dataset check --json` (default: {CHECK_FILE}, which it keeps)",
     )
     report.add_argument("--overwrite", action="store_true", help="replace an existing page")
 
@@ -38,7 +40,7 @@ def _report(arguments: argparse.Namespace) -> dict:
     path = arguments.out or arguments.root / REPORT_NAME
     facts = DatasetFacts.read(arguments.root)
     require_new(path, arguments.overwrite)
-    findings = read_json(arguments.findings or arguments.root / CHECK_FILE)
+    findings = kept_findings(arguments.root, arguments.findings)
     if findings is None and arguments.findings is not None:
         raise FileFormatError(arguments.findings, "a file with the output of `copolicy-dataset check --json`", "none")
     statistics = read_json(arguments.root / STATISTICS_FILE)
@@ -50,6 +52,14 @@ def _report(arguments: argparse.Namespace) -> dict:
         "episodes": len(facts.episodes),
         "megabytes": round(len(text.encode()) / 1e6, 2),
         "frames_shown": "all" if payload["frame_step"] == 1 else f"one in {payload['frame_step']}",
-        "findings": "copolicy-dataset check was not run" if payload["check"] is None else "shown",
+        "findings": _shown(findings),
         "statistics": "copolicy-dataset stats was not run" if payload["statistics"] is None else "shown",
     }
+
+
+def _shown(findings: KeptFindings | None) -> str:
+    if findings is None:
+        return "copolicy-dataset check was not run"
+    if findings.validity.state == "current":
+        return "shown"
+    return f"shown as {findings.validity.state}: {findings.validity.reason}"

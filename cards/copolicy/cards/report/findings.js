@@ -1,14 +1,14 @@
 /** What `copolicy-dataset check` found. */
 
 const SEVERITIES = ["error", "warning", "info"];
+const STATES = { stale: "These findings are stale.", unknown: "These findings may be stale." };
 
 function showFindings(chosen) {
   const place = byId("finding-list");
   if (!data.check) {
     place.replaceChildren(
-      make("p", { class: "absent" }, "copolicy-dataset check was not run on this data set, or its result was not kept: " +
-        "nothing is known here about its quality. To keep it: copolicy-dataset check FOLDER --json > " +
-        "FOLDER/meta/copolicy_check.json"),
+      make("p", { class: "absent" }, "copolicy-dataset check was not run on this data set, or its findings were not kept: " +
+        "nothing is known here about its quality. This runs it and keeps them: copolicy-dataset check FOLDER"),
     );
     return;
   }
@@ -18,7 +18,11 @@ function showFindings(chosen) {
   const count = (severity) => found.filter((finding) => finding.severity === severity).length;
   const summary = SEVERITIES.map((severity) => `${count(severity)} ${severity}${severity === "info" || count(severity) === 1 ? "" : "s"}`);
   const rules = data.check.rules ? `${formatNumber(data.check.rules)} rules were applied: ` : "";
-  const nodes = [make("p", {}, `${rules}${summary.join(", ")}.${found.length < all.length ? ` ${all.length - found.length} more concern other episodes.` : ""}`)];
+  const nodes = data.check.state === "current" ? [] : [make("p", { class: "doubt", role: "note" }, make("strong", {}, `${STATES[data.check.state]} `), data.check.reason)];
+  if (data.check.date) {
+    nodes.push(make("p", {}, `Checked on ${data.check.date.slice(0, 10)} by version ${data.check.rules_version} of the rules.`));
+  }
+  nodes.push(make("p", {}, `${rules}${summary.join(", ")}.${found.length < all.length ? ` ${all.length - found.length} more concern other episodes.` : ""}`));
   const groups = [...groupBy(found, (finding) => `${finding.severity}|${finding.rule}`).values()].sort(
     (a, b) => SEVERITIES.indexOf(a[0].severity) - SEVERITIES.indexOf(b[0].severity) || b.length - a.length,
   );

@@ -19,6 +19,7 @@ for (const section of document.querySelectorAll("main > section")) {
   byId("contents").append(make("li", {}, make("a", { href: `#${section.id}` }, section.querySelector("h2").textContent)));
 }
 showHeading();
+showRouteStatistics();
 showStatistics();
 setUpTheme(redraw);
 setUpTrajectories();

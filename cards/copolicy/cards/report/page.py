@@ -14,6 +14,7 @@ SCRIPTS = (
     "scene.js",
     "filters.js",
     "overview.js",
+    "route_statistics.js",
     "trajectories.js",
     "heatmaps.js",
     "pairs.js",

@@ -10,9 +10,10 @@ import numpy as np
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.task import GOAL_SIZE, RECORD_HZ, WINDOW
 
-from ..artefacts import estimates
+from ..artefacts import KeptFindings, estimates, statistics_doubt
 from ..facts import DatasetFacts
 from ..frames import EpisodeFrames, read_frames
+from ..routes import route_statistics
 
 FRAME_SCALES = {
     "x": 20, "y": 20, "theta": 10_000,
@@ -29,14 +30,14 @@ _COLUMNS = (*EPISODE_COLUMNS, "episode_index", "length")
 def build_payload(
     facts: DatasetFacts,
     title: str,
-    findings: dict[str, Any] | None = None,
+    findings: KeptFindings | None = None,
     statistics: dict[str, Any] | None = None,
     frame_bytes: int = FRAME_BYTES,
 ) -> dict[str, Any]:
     """Everything that the page shows, JSON-able: numbers that are not finite become null.
 
     Args:
-        findings: what `copolicy-dataset check --json` printed, None where it was not run.
+        findings: what `copolicy-dataset check` kept, None where it was not run.
         statistics: what `copolicy-dataset stats` stored, None where it was not run.
 
     Raises:
@@ -67,6 +68,7 @@ def build_payload(
         )
         blocks.append(block)
         start += len(block)
+    routes = None if statistics is None else route_statistics(statistics)
     return {
         "title": title,
         "software": f"copolicy {version('lerobot_policy_copolicy')}",
@@ -79,9 +81,17 @@ def build_payload(
         "scales": FRAME_SCALES,
         "episodes": rows,
         "frames": base64.b64encode(np.concatenate(blocks).astype("<i2").tobytes()).decode(),
-        "check": findings,
+        "check": None if findings is None else _check(findings),
         "statistics": None if statistics is None else estimates(statistics),
+        "statistics_doubt": statistics_doubt(statistics or {}, len(facts.episodes)),
+        "routes": None if routes is None else routes.to_json(),
     }
+
+
+def _check(findings: KeptFindings) -> dict[str, Any]:
+    """What the page shows of the findings; the limits and the names of all rules stay in the file."""
+    kept = {name: findings.document.get(name) for name in ("date", "rules_version", "rules", "findings")}
+    return {**kept, "state": findings.validity.state, "reason": findings.validity.reason}
 
 
 def _quantised(frames: EpisodeFrames) -> np.ndarray:

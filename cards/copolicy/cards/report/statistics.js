@@ -25,9 +25,16 @@ function showStatistics() {
   );
   const heads = ["Statistic", "Value", "Unit", "95 % interval", "By chance", "Episodes", "Note"];
   place.replaceChildren(
+    ...statisticsDoubt(),
     make("p", {}, `All episodes of the data set, whatever is chosen above. ${entries.length} statistics.`),
     make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Statistics" },
       make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
         make("tbody", {}, ...rows))),
   );
+}
+
+/** Why the stored statistics may be those of other data, as a list of at most one paragraph. */
+function statisticsDoubt() {
+  if (!data.statistics_doubt) return [];
+  return [make("p", { class: "doubt", role: "note" }, make("strong", {}, "These statistics are stale. "), data.statistics_doubt)];
 }

@@ -84,6 +84,8 @@ def _weights(name: str, counts: Counter[str]) -> dict[str, int]:
 
 
 RULES = (
-    Rule("balance", "the maps of a set are equally frequent", _maps, (), ("map_set", "map_id")),
-    Rule("balance_pairs", "pairs are equally frequent, on the same maps", _pairs, (), ("pair_id", "map_id")),
+    Rule("balance", "the maps of a set are equally frequent", _maps, (), ("map_set", "map_id"), whole=True),
+    Rule(
+        "balance_pairs", "pairs are equally frequent, on the same maps", _pairs, (), ("pair_id", "map_id"), whole=True
+    ),
 )

@@ -1,5 +1,6 @@
 """Runs every rule over a data set."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +39,13 @@ RULES: tuple[Rule, ...] = (
     *leakage.RULES,
 )
 """Every rule, in the order of the report."""
+
+RECORDING_RULES: tuple[Rule, ...] = tuple(rule for rule in RULES if "recordings" in rule.kinds and not rule.whole)
+"""The rules that say something of each recording, whatever else there is: any part of a folder can be held against
+them on its own."""
+
+DATA_SET_RULES: tuple[Rule, ...] = tuple(rule for rule in RULES if rule not in RECORDING_RULES)
+"""The others, for the data set that the recordings became: both together leave no rule out."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +96,15 @@ def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
         against: another one that must share no episode with it, for example the test data.
     """
     result = check_table(read_table(root))
-    if against is None:
-        return result
+    return result if against is None else add_leaks(result, root, against)
+
+
+def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:
+    """The same with the episodes that a data set shares with another one.
+
+    Args:
+        result: of the check of `root`.
+    """
     other = read_table(against)
     shared = leakage.leaks(
         leakage.Part(root.name, result.table, range(len(result.table.labels))),
@@ -99,12 +114,12 @@ def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
     return CheckResult(result.table, findings, (*result.applied, "against"), result.not_applied)
 
 
-def check_table(table: EpisodeTable) -> CheckResult:
-    """Applies every rule that a table has the columns for."""
+def check_table(table: EpisodeTable, rules: Sequence[Rule] = RULES) -> CheckResult:
+    """Applies every one of the rules that a table has the columns for."""
     findings: list[Finding] = []
     applied: list[str] = []
     not_applied: dict[str, str] = {}
-    for rule in RULES:
+    for rule in rules:
         reason = _why_not(rule, table)
         if reason:
             not_applied[rule.name] = reason

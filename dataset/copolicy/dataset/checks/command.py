@@ -1,15 +1,16 @@
 """`copolicy-dataset check`."""
 
 import argparse
+import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..commandline import add_command
 from ..exceptions import InvalidValueError
-from .finding import SEVERITIES
 from .limits import LIMITS
 from .location import locate
+from .stored_check import CHECK_FILE, check_document, content_hash
 
 if TYPE_CHECKING:
     from .checking import CheckResult
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _EXAMPLE = """copolicy-dataset check recordings/session-1
   copolicy-dataset check datasets/train --against datasets/test --strict
   copolicy-dataset check my-lab/table --revision data-1.0.0 --json"""
+_SHOWN = ("kind", "episodes", "frames", "rules", "not_applied", "counts")
 
 
 def add_check_command(commands: argparse._SubParsersAction) -> None:
@@ -30,6 +32,12 @@ def add_check_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--revision", help="tag, branch or commit on the Hub")
     parser.add_argument("--against", metavar="PATH", help="data that must share no episode with PATH")
     parser.add_argument("--strict", action="store_true", help="warnings, too, give exit status 1")
+    parser.add_argument(
+        "--save",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help=f"keep the findings in a data set folder, as {CHECK_FILE} (default: yes)",
+    )
     parser.add_argument("--rules", action="store_true", help="print every limit with its reason, and check nothing")
 
 
@@ -38,31 +46,44 @@ def _check(arguments: argparse.Namespace) -> dict:
         return {name: f"{one.value:g} {one.unit}: {one.reason}" for name, one in LIMITS.items()}
     if arguments.path is None:
         raise InvalidValueError("PATH", "a folder, or USER/NAME of a data set on the Hub", None)
-    from .checking import check_dataset  # scipy, which `--help` need not wait for
+    from .checking import add_leaks, check_dataset  # scipy, which `--help` need not wait for
 
     root = locate(arguments.path, arguments.revision)
     against = None if arguments.against is None else locate(arguments.against)
-    result = check_dataset(root, against)
-    summary = _summary(result, arguments.path, arguments.strict)
+    alone = check_dataset(root)
+    # What the Hub's client keeps of a data set is a cache, no place for findings.
+    wanted = arguments.save and alone.table.kind == "lerobot" and Path(arguments.path).exists()
+    content = content_hash(root) if alone.table.kind == "lerobot" and (wanted or arguments.json) else None
+    saved = _save(root, check_document(alone, content)) if wanted else None
+    result = alone if against is None else add_leaks(alone, root, against)
+    document = check_document(result, content, arguments.strict)
+    return _summary(arguments, result, document, saved)
+
+
+def _save(root: Path, document: dict[str, Any]) -> str | None:
+    """Keeps the findings of the data set alone, whatever it was compared with; a folder may refuse them."""
+    from ..statistics.command import write_document
+
+    try:
+        write_document(document, root / CHECK_FILE)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        logging.warning(
+            "warning: %s: the findings were not kept there: %s; --no-save does not try", root / CHECK_FILE, reason
+        )
+        return None
+    return str(root / CHECK_FILE)
+
+
+def _summary(
+    arguments: argparse.Namespace, result: "CheckResult", document: dict[str, Any], saved: str | None
+) -> dict[str, Any]:
+    path = {"path": str(Path(arguments.path))}
+    status = {"exit_status": int(not document["passed"])}
     if arguments.json:
-        summary["findings"] = [finding.to_dict() for finding in result.findings]
-    else:
-        for finding in result.findings:
-            print(finding)
-        sys.stdout.flush()
-    return summary
-
-
-def _summary(result: "CheckResult", path: str, strict: bool) -> dict:
-    failed = result.failed(strict)
-    return {
-        "path": str(Path(path)),
-        "kind": result.table.kind,
-        "episodes": len(result.table.labels),
-        "frames": result.table.frame_count,
-        "rules": len(result.applied),
-        "not_applied": result.not_applied,
-        "counts": {severity: result.count(severity) for severity in SEVERITIES},
-        "passed": not failed,
-        "exit_status": int(failed),
-    }
+        return {**path, "saved": saved, **document, **status}
+    for finding in result.findings:
+        print(finding)
+    sys.stdout.flush()
+    kept = {} if saved is None else {"saved": saved}
+    return {**path, **{name: document[name] for name in _SHOWN}, **kept, "passed": document["passed"], **status}

@@ -33,5 +33,5 @@ def _license(table: EpisodeTable) -> Iterator[Finding]:
 
 RULES = (
     Rule("consent", "people agreed to be recorded", _consent, (), ("source", "consent_id")),
-    Rule("license", "every episode states one licence", _license, (), ("license",)),
+    Rule("license", "every episode states one licence", _license, (), ("license",), whole=True),
 )

@@ -42,6 +42,13 @@ def _repeated(values: Iterable[str], labels: list[str], what: str) -> Iterator[F
 
 
 RULES = (
-    Rule("duplicate_names", "every episode_uuid and every source file once", _by_column, (), ("episode_uuid",)),
-    Rule("duplicate_motion", "no two episodes with the same states and actions", _by_bits, (STATE, ACTION)),
+    Rule(
+        "duplicate_names",
+        "every episode_uuid and every source file once",
+        _by_column,
+        (),
+        ("episode_uuid",),
+        whole=True,
+    ),
+    Rule("duplicate_motion", "no two episodes with the same states and actions", _by_bits, (STATE, ACTION), whole=True),
 )

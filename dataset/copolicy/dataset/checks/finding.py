@@ -1,5 +1,6 @@
 """What a check has to say: which episode, which rule, the figure, its limit, and how bad it is."""
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -29,7 +30,10 @@ class Finding:
 
     def to_dict(self) -> dict:
         """JSON-able; numbers that JSON does not know become None."""
-        return {name: None if value != value else value for name, value in asdict(self).items()}
+        return {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in asdict(self).items()
+        }
 
     def __str__(self) -> str:
         place = f"episode {self.episode}: " if self.episode else ""

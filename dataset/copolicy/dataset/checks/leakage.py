@@ -98,4 +98,6 @@ def _people(part: Part) -> bool:
     return sources is None or bool(np.isin(sources[list(part.places)], ("human", "upstream")).any())
 
 
-RULES = (Rule("leakage", "the splits of meta/info.json share nothing", _between_splits, kinds=("lerobot",)),)
+RULES = (
+    Rule("leakage", "the splits of meta/info.json share nothing", _between_splits, kinds=("lerobot",), whole=True),
+)

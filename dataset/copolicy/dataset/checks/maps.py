@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..exceptions import CopolicyError
+from ..exclusions import FLAG
 from ..features import ENVIRONMENT_STATE, STATE, map_of
 from ..task import MAP_SETS, MapConfig, map_set
 from .episode_table import EpisodeTable
@@ -45,7 +46,11 @@ def _named(table: EpisodeTable) -> Iterator[Finding]:
         np.char.find(table.columns["quality_flags"], "map_mismatch") >= 0 if "quality_flags" in table.columns else ()
     )
     for place in np.flatnonzero(flagged):
-        message = "the importer found another map in the file than was played (map_mismatch)"
+        flags = str(table.columns["quality_flags"][place]).split(",")
+        then = "it was recovered" if "map_recovered" in flags else "the one in the rows may be wrong"
+        if any(flag.startswith(FLAG) for flag in flags):
+            then += "; excluded from training"
+        message = f"the importer found another map in the file than was played (map_mismatch): {then}"
         yield Finding(table.labels[place], "map_name", None, None, "warning", message)
 
 

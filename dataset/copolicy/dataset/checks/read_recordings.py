@@ -1,5 +1,6 @@
 """A folder of recordings, one MCAP file an episode, as an `EpisodeTable`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,10 +38,18 @@ def read_recordings(root: Path) -> EpisodeTable:
             labels.append(label)
         else:
             damage.append(Finding(label, "empty", 0, 1, "error", "a recording without a single step"))
-    return _table(root, labels, episodes, tuple(damage))
+    return recordings_table(root, labels, episodes, tuple(damage))
 
 
-def _table(root: Path, labels: list[str], episodes: list[Episode], damage: tuple[Finding, ...]) -> EpisodeTable:
+def recordings_table(
+    root: Path, labels: Sequence[str], episodes: Sequence[Episode], damage: tuple[Finding, ...] = ()
+) -> EpisodeTable:
+    """Recordings that are in memory already.
+
+    Args:
+        labels: how findings name them.
+        episodes: of at least one step each.
+    """
     lengths = np.array([len(episode.actions) for episode in episodes], np.int64)
     columns = {
         name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[kind])

@@ -18,6 +18,8 @@ class Rule:
         frames: columns of the frames that it reads.
         columns: episode columns that it reads.
         kinds: the kinds of data that it says something about.
+        whole: it compares episodes with each other, or says something of the files as they lie; a part of the episodes
+            is not enough to apply it.
     """
 
     name: str
@@ -26,6 +28,7 @@ class Rule:
     frames: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ("lerobot", "recordings")
+    whole: bool = False
 
 
 def each(

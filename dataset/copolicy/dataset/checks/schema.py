@@ -108,9 +108,10 @@ def _alignment(table: EpisodeTable) -> Iterable[Finding]:
 
 
 RULES = (
-    Rule("format", "version and rate of a LeRobot data set", _format, kinds=("lerobot",)),
-    Rule("features", "the feature table, in meta/info.json and in the files", _features, kinds=("lerobot",)),
-    Rule("columns", "the episode columns and what stands in them", _columns),
+    Rule("format", "version and rate of a LeRobot data set", _format, kinds=("lerobot",), whole=True),
+    Rule("features", "the feature table, in meta/info.json and in the files", _features, kinds=("lerobot",),
+         whole=True),
+    Rule("columns", "the episode columns and what stands in them", _columns, whole=True),
     Rule("outcome", "success and how the episode ended agree", _outcome, columns=("success", "termination_reason")),
     Rule("outcome_of_frames", "next.done and next.success agree with the episode", _outcome_of_frames,
          ("next.done", "next.success"), ("success",), ("lerobot",)),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..checks.checking import check_dataset
+from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
 from ..versions.content import read_content
 from ..versions.data_version import newest
@@ -94,8 +95,8 @@ def _require_checked(root: Path) -> None:
 def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     """Checks that the folder holds what its newest release says, and brings the manifest up to date with the card.
 
-    Card, figures and report may be made anew after a release, so that they can name its version; data and metadata
-    may not change.
+    Card, figures and report may be made anew after a release, so that they can name its version, and so may the
+    findings of a check; data and other metadata may not change.
 
     Raises:
         FileFormatError: no release, no card, a damaged manifest, or a folder that is no data set.
@@ -106,7 +107,7 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", "none")
     told, found = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
     differences = told.differences(found)
-    changed = [line for line in differences if line.startswith(_CHECKED)]
+    changed = [line for line in told.differences(found, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"

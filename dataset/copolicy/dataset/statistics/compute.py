@@ -23,8 +23,8 @@ from .steering_dip import dip_statistics
 from .trajectories import Trajectories
 from .visitation import visitation_statistics
 
-DEFINITION_VERSION = "1.0.0"
-"""Of the statistics' definitions: major where a value means something else, minor where one is added."""
+DEFINITION_VERSION = "2.0.0"
+"""Of the statistics' definitions: major where a value is computed otherwise, minor where one is added."""
 
 REPLICATES = 1000
 _LABELS = {

@@ -5,6 +5,7 @@ import os
 import secrets
 from pathlib import Path
 
+from ..checks.stored_check import CHECK_FILE
 from ..exceptions import InvalidValueError, RunError
 from .changelog import CHANGELOG_FILE, with_release
 from .content import Content, read_content
@@ -62,9 +63,9 @@ def _changes(last: ReleaseRecord | None, content: Content, files_sha256: str) ->
 
 
 def _own_files(manifest: Manifest) -> set[str]:
-    """What a release writes; it changes by releasing."""
+    """What a release writes, which changes by releasing; and the findings, which change by looking."""
     earlier = {name for name in manifest.files if name.startswith(EARLIER_FOLDER + "/")}
-    return {CHANGELOG_FILE, RELEASE_FILE, *earlier}
+    return {CHANGELOG_FILE, RELEASE_FILE, CHECK_FILE.as_posix(), *earlier}
 
 
 def _write(
