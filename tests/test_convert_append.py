@@ -129,6 +129,27 @@ def test_an_interruption_is_made_good(made, root, monkeypatch, renamed):
     assert load(root).num_episodes == 7
 
 
+def test_everything_is_on_the_disk_before_it_takes_the_place(made, root, monkeypatch):
+    happened: list = []
+    fsync, rename = os.fsync, Path.rename
+
+    def synced(descriptor):
+        happened.append(os.fstat(descriptor).st_ino)
+        fsync(descriptor)
+
+    def renamed(self, target):
+        happened.append(Path(target))
+        return rename(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", synced)
+        patch.setattr(Path, "rename", renamed)
+        assert add(made / "b", root) == 0
+    place = happened.index(root)
+    assert {path.stat().st_ino for path in (root, *root.rglob("*"))} <= set(happened[:place])
+    assert happened[place + 1 :] == [root.parent.stat().st_ino]
+
+
 def test_a_damaged_recording_changes_nothing(made, root, tmp_path, capsys):
     folder = shutil.copytree(made / "b", tmp_path / "damaged")
     broken = folder / "episode_000001.mcap"

@@ -1,6 +1,9 @@
+import os
+from pathlib import Path
+
 import pytest
 
-from copolicy.convert.staging import new_folder
+from copolicy.convert.staging import new_file, new_folder
 from copolicy.dataset.exceptions import OutputExistsError
 
 
@@ -55,3 +58,42 @@ def test_a_broken_link_is_something(tmp_path):
     (tmp_path / "set").symlink_to(tmp_path / "nowhere")
     with pytest.raises(OutputExistsError), new_folder(tmp_path / "set"):
         pytest.fail("not reached")
+
+
+@pytest.fixture
+def order(monkeypatch) -> list:
+    """What is synced, by inode, and what is renamed, in order."""
+    happened: list = []
+    fsync, rename = os.fsync, Path.rename
+
+    def synced(descriptor):
+        happened.append(os.fstat(descriptor).st_ino)
+        fsync(descriptor)
+
+    def renamed(self, target):
+        happened.append("renamed")
+        return rename(self, target)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(Path, "rename", renamed)
+    return happened
+
+
+def inodes(*paths: Path) -> set[int]:
+    return {path.stat().st_ino for path in paths}
+
+
+def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, order):
+    with new_folder(tmp_path / "set") as partial:
+        (partial / "data").mkdir(parents=True)
+        (partial / "data" / "file").write_text("x")
+        (partial / "info").write_text("y")
+    place = order.index("renamed")
+    assert set(order[:place]) == inodes(tmp_path / "set", *(tmp_path / "set").rglob("*"))
+    assert set(order[place + 1 :]) == inodes(tmp_path)
+
+
+def test_so_is_a_single_file(tmp_path, order):
+    with new_file(tmp_path / "one") as partial:
+        partial.write_text("x")
+    assert order == [*inodes(tmp_path / "one"), "renamed", *inodes(tmp_path)]

@@ -16,7 +16,9 @@ from copolicy.dataset.log import read_metadata
 from .lerobot_writer import RECORD_FILE
 from .prepare import Conversion
 from .recordings import convert_recordings, find_recordings
+from .scene_video import SCENE
 from .shifted_tables import Place, Shift, numbered_files, read_table, write_like
+from .staging import sync_folder, sync_tree
 
 try:
     from lerobot.datasets.compute_stats import aggregate_stats
@@ -45,6 +47,27 @@ def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, H
         if asked is not None and asked != found:
             raise InvalidValueError(name, f"{found!r}, as {root} has it", asked)
     return stored
+
+
+def stored_video(root: Path, asked: bool, size: tuple[int, int] | None) -> tuple[int, int] | None:
+    """Width and height (px) of a data set's video, which what is added gets, too; None where it has none.
+
+    Args:
+        asked: whether a video is asked for.
+        size: its size, if one was named.
+
+    Raises:
+        InvalidValueError: another size, or a video where the data set has none.
+    """
+    feature = _info(root).get("features", {}).get(SCENE)
+    if feature is None:
+        if asked:
+            raise InvalidValueError("--video", f"none, as {root} has no video", "one")
+        return None
+    height, width, _ = feature["shape"]
+    if size and size != (width, height):
+        raise InvalidValueError("--video-size", f"{width}x{height}, as {root} has it", "{}x{}".format(*size))
+    return width, height
 
 
 def append_recordings(
@@ -82,6 +105,7 @@ def append_recordings(
             written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
             shutil.copytree(place, whole, copy_function=_link)
             info = _join(whole, added)
+            sync_tree(whole)
         except CopolicyError as error:
             # The folders in the making are gone when somebody reads this.
             error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
@@ -120,15 +144,16 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     if read_table(whole / _TASKS).to_pylist() != read_table(added / _TASKS).to_pylist():
         raise FileFormatError(whole / _TASKS, "the one task of copolicy-convert", "others")
     shift = Shift(info["total_episodes"], info["total_frames"])
-    places: dict[Place, Place] = {}
+    data: dict[Place, Place] = {}
     last, example = list(numbered_files(whole / "data").items())[-1]
     for old, path in numbered_files(added / "data").items():
-        places[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
+        data[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
         write_like(shift.frame_table(read_table(path)), example, _numbered(whole / "data", last))
+    moved = {"data": data, **_move_videos(whole, added, info)}
     last, example = list(numbered_files(whole / "meta" / "episodes").items())[-1]
     for path in numbered_files(added / "meta" / "episodes").values():
         last = update_chunk_file_indices(*last, info["chunks_size"])
-        table = shift.episode_table(read_table(path), places, last)
+        table = shift.episode_table(read_table(path), moved, last)
         write_like(table, example, _numbered(whole / "meta" / "episodes", last))
     statistics = [load_stats(whole), shift.statistics(load_stats(added) or {})]
     total = info["total_episodes"] + new["total_episodes"]
@@ -148,9 +173,25 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     return info
 
 
+def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:
+    """Moves the video files behind those that are there; where each went, by folder."""
+    moved: dict[str, dict[Place, Place]] = {}
+    for key in (name for name, feature in info["features"].items() if feature["dtype"] == "video"):
+        folder = f"videos/{key}"
+        last = list(numbered_files(whole / folder, "mp4"))[-1]
+        places = moved[folder] = {}
+        for old, path in numbered_files(added / folder, "mp4").items():
+            places[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
+            target = _numbered(whole / folder, last, "mp4")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.rename(target)
+    return moved
+
+
 def _take_place(whole: Path, root: Path) -> None:
     root.rename(_before(root))
     whole.rename(root)
+    sync_folder(root.parent)
     shutil.rmtree(_before(root))
 
 
@@ -165,8 +206,8 @@ def _link(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def _numbered(folder: Path, place: Place) -> Path:
-    return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.parquet"
+def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
+    return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
 
 
 def _info(root: Path) -> dict[str, Any]:

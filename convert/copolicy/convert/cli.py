@@ -1,7 +1,6 @@
 """`copolicy-convert`: recordings, and files of the original program, to LeRobot v3 data sets, and these to others."""
 
 import argparse
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
@@ -11,8 +10,11 @@ from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import InvalidValueError
 
 from .export.command import add_export_command
+from .merge.command import add_merge_command
 from .prepare import Conversion
 from .recordings import convert_recordings
+from .repo_id import checked_repo_id
+from .scale.command import add_scale_flags, convert_in_shards, scale_of
 from .upstream import convert_upstream
 from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
 
@@ -39,9 +41,12 @@ def _parser() -> argparse.ArgumentParser:
     mcap.add_argument("--keep-discarded", action="store_true", help="keep episodes that the operator discarded")
     mcap.add_argument("--no-drift", action="store_true", help="leave out the re-simulation (replay_drift_px)")
     mcap.add_argument(
-        "--workers", type=int, default=1, metavar="N",
-        help="processes that read; pays from thousands of files on, the result is the same (default: %(default)s)",
-    )  # fmt: skip
+        "--video", action="store_true", help="draw the feature observation.images.scene, a picture a frame, as H.264"
+    )
+    mcap.add_argument(
+        "--video-size", metavar="WxH", help="its size in px (default: 600x300; with --append that of the data set)"
+    )
+    add_scale_flags(mcap)
     upstream = add_command(
         commands, "upstream", _upstream,
         "convert files of the original program (raw pickles, processed npz, or its 10 Hz zarr store)",
@@ -57,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
         "--obstacle-size", type=int, default=50, metavar="PX",
         help="side of the obstacles, which the files do not tell (default: %(default)s, as in the training maps)",
     )  # fmt: skip
+    add_merge_command(commands)
     add_export_command(commands)
     return parser
 
@@ -89,31 +95,40 @@ def _mcap(arguments: argparse.Namespace) -> dict:
         arguments.license,
         keep_discarded=arguments.keep_discarded,
         drift=not arguments.no_drift,
+        video=_video(arguments),
     )
+    scale = scale_of(arguments)
+    repo_id = checked_repo_id(arguments.repo_id)
+    if scale is not None:
+        return convert_in_shards(arguments.folders, arguments.root, repo_id, conversion, arguments.skip_damaged, scale)
     return convert(
-        arguments.folders,
-        arguments.root,
-        _repo_id(arguments.repo_id),
-        conversion,
-        arguments.skip_damaged,
-        arguments.workers,
+        arguments.folders, arguments.root, repo_id, conversion, arguments.skip_damaged, arguments.workers or 1
     )
+
+
+def _video(arguments: argparse.Namespace) -> tuple[int, int] | None:
+    if arguments.video_size and not arguments.video:
+        raise InvalidValueError("--video-size", "--video beside it", arguments.video_size)
+    if not arguments.video and not arguments.append:
+        return None
+    from .scene_video import DEFAULT_SIZE, parse_size
+
+    asked = parse_size(arguments.video_size) if arguments.video_size else None
+    if not arguments.append:
+        return asked or DEFAULT_SIZE
+    from .append import stored_video
+
+    return stored_video(arguments.root, arguments.video, asked)
 
 
 def _upstream(arguments: argparse.Namespace) -> dict:
     return convert_upstream(
         arguments.path,
         arguments.root,
-        _repo_id(arguments.repo_id),
+        checked_repo_id(arguments.repo_id),
         _DEFAULT_FPS if arguments.fps is None else arguments.fps,
         arguments.hold,
         UpstreamOptions(arguments.angular_limit, arguments.obstacle_size),
         arguments.license,
         arguments.skip_damaged,
     )
-
-
-def _repo_id(text: str) -> str:
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", text):
-        raise InvalidValueError("--repo-id", "USER/NAME", text)
-    return text

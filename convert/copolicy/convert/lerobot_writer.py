@@ -7,6 +7,7 @@ metadata at every episode, and loses the set when it is interrupted. The files a
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,20 @@ from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
 from copolicy.dataset.task import RECORD_HZ
 
+from .frame_files import FrameFiles
 from .prepare import PreparedEpisode
+from .scene_video import SCENE, scene_encoder, scene_feature
 from .staging import new_folder
 from .statistics import episode_statistics
+from .video_files import VideoFiles
 
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
     from lerobot.datasets.compute_stats import aggregate_stats
     from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
-    from lerobot.datasets.feature_utils import get_hf_features_from_features
     from lerobot.datasets.io_utils import write_info, write_stats
-    from lerobot.datasets.utils import DEFAULT_EPISODES_PATH, update_chunk_file_indices
+    from lerobot.datasets.utils import DEFAULT_EPISODES_PATH
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
@@ -62,6 +65,7 @@ def write_dataset(
     hold: Hold,
     record: Callable[[], dict],
     data_file_mb: int | None = None,
+    video_file_mb: int | None = None,
 ) -> WrittenDataset:
     """Writes the episodes, in their order, as a LeRobot v3 data set at `root`.
 
@@ -71,25 +75,32 @@ def write_dataset(
     info.json do not survive, and inside a feature they would keep sets of different versions from being merged.
 
     Args:
-        episodes: consumed one by one.
+        episodes: consumed one by one; all have a film, or none has.
         record: JSON-able facts about the conversion, asked for once all episodes are consumed.
         data_file_mb: size of a data file after which the next is begun, LeRobot's default if None.
+        video_file_mb: the same for a video file.
 
     Raises:
         OutputExistsError: there is something at `root`; nothing is touched.
         RunError: no episodes, or two with the same episode_uuid; nothing is left behind.
     """
     with new_folder(root) as partial:
-        meta = LeRobotDatasetMetadata.create(
-            repo_id, fps, _features(hold), ROBOT_TYPE, partial, use_videos=False, data_files_size_in_mb=data_file_mb
-        )
-        meta.save_episode_tasks([TASK])
-        rows, statistics, notes = _write_data(episodes, meta)
-        if not rows:
+        remaining = iter(episodes)
+        first = next(remaining, None)
+        if first is None:
             raise RunError(f"{root}: expected at least one episode to write, found none")
+        features = _features(hold, first)
+        meta = LeRobotDatasetMetadata.create(
+            repo_id, fps, features, ROBOT_TYPE, partial, use_videos=SCENE in features,
+            data_files_size_in_mb=data_file_mb, video_files_size_in_mb=video_file_mb,
+        )  # fmt: skip
+        meta.save_episode_tasks([TASK])
+        rows, statistics, notes = _write_data(chain((first,), remaining), meta)
         _write_episodes(rows, statistics, partial)
         meta.info.total_episodes, meta.info.total_frames = len(rows), rows[-1]["dataset_to_index"]
         meta.info.total_tasks, meta.info.splits = 1, {"train": f"0:{len(rows)}"}
+        if SCENE in features:
+            meta.update_video_info(SCENE, scene_encoder(fps))
         write_info(meta.info, partial)
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
@@ -98,21 +109,23 @@ def write_dataset(
     return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
 
 
-def _features(hold: Hold) -> dict[str, dict]:
+def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
     action = {**FEATURES[ACTION], "hold": hold, "record_hz": RECORD_HZ}
-    return {**FEATURES, ACTION: action}
+    video = {SCENE: scene_feature(example.scene.size)} if example.scene else {}
+    return {**FEATURES, ACTION: action, **video}
 
 
 def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
     """Rows of meta/episodes without statistics, statistics of every episode, and notes by episode."""
-    schema = get_hf_features_from_features(meta.features).arrow_schema
     rows: list[dict] = []
     statistics: list[dict] = []
     notes: dict[str, list[str]] = {}
     seen: dict[str, int] = {}
-    chunk = file = start = 0
-    writer = None
-    try:
+    start = 0
+    with (
+        FrameFiles(meta.root, meta.features, meta.data_files_size_in_mb, meta.chunks_size) as frames,
+        VideoFiles(meta.root, SCENE, meta.fps, meta.video_files_size_in_mb, meta.chunks_size) as videos,
+    ):
         for index, episode in enumerate(episodes):
             uuid = episode.meta.episode_uuid
             if uuid in seen:
@@ -120,25 +133,15 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
                     f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}"
                 )
             seen[uuid] = index
-            path = meta.root / meta.data_path.format(chunk_index=chunk, file_index=file)
-            if writer is not None and path.stat().st_size >= meta.data_files_size_in_mb * 2**20:
-                writer.close()
-                writer = None
-                chunk, file = update_chunk_file_indices(chunk, file, meta.chunks_size)
-                path = meta.root / meta.data_path.format(chunk_index=chunk, file_index=file)
-            if writer is None:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                writer = pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True)
             clock = _clock_columns(index, start, episode.frames, meta.fps)
-            writer.write_table(_table({**episode.columns, **clock}, schema))
             end = start + episode.frames
             rows.append(
                 {
                     "episode_index": index,
                     "tasks": [TASK],
                     "length": episode.frames,
-                    "data/chunk_index": chunk,
-                    "data/file_index": file,
+                    **frames.append({**episode.columns, **clock}),
+                    **(videos.append(episode.scene.mp4, episode.frames) if episode.scene else {}),
                     "dataset_from_index": start,
                     "dataset_to_index": end,
                     **asdict(episode.meta),
@@ -150,9 +153,6 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
             if episode.notes:
                 notes[uuid] = list(episode.notes)
             start = end
-    finally:
-        if writer is not None:
-            writer.close()
     return rows, statistics, notes
 
 
@@ -165,18 +165,6 @@ def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, n
         "index": start + order,
         "task_index": np.zeros(frames, np.int64),
     }
-
-
-def _table(columns: dict[str, np.ndarray], schema) -> "pa.Table":
-    arrays = []
-    for field in schema:
-        values = columns[field.name]
-        if pa.types.is_fixed_size_list(field.type):
-            flat = pa.array(values.reshape(-1), field.type.value_type)
-            arrays.append(pa.FixedSizeListArray.from_arrays(flat, type=field.type))
-        else:
-            arrays.append(pa.array(values, field.type))
-    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> None:

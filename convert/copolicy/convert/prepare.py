@@ -3,17 +3,21 @@ belongs into one."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, RunError
+from copolicy.dataset.features import STATE
 
 from .frames import frame_columns
 from .replay import replay_drift
 from .statistics import episode_statistics
+
+if TYPE_CHECKING:
+    from .scene_video import SceneClip
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class Conversion:
         license: filled in where an episode states none.
         keep_discarded: keep episodes that the operator discarded.
         drift: re-simulate each episode that does not say how far its replay drifts.
+        video: width and height (px) of the pictures to draw of each frame; None for no video.
     """
 
     fps: int = 10
@@ -33,16 +38,18 @@ class Conversion:
     license: str = ""
     keep_discarded: bool = False
     drift: bool = True
+    video: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class PreparedEpisode:
-    """Frames, their statistics, and the row of meta/episodes."""
+    """Frames, their statistics, the row of meta/episodes, and the film if one was asked for."""
 
     columns: dict[str, np.ndarray]
     statistics: dict[str, dict[str, np.ndarray]]
     meta: EpisodeMeta
     notes: tuple[str, ...] = ()
+    scene: "SceneClip | None" = None
 
     @property
     def frames(self) -> int:
@@ -84,6 +91,7 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
 
     Raises:
         InvalidValueError: the episode cannot be had at this rate (see `frame_columns`).
+        MissingExtraError: a video is asked for and lerobot is not installed.
     """
     columns = frame_columns(episode, conversion.fps, conversion.hold)
     meta = episode.meta
@@ -92,7 +100,17 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
     if conversion.drift and np.isnan(meta.replay_drift_px):
         # Positions do not depend on the rotation, so that its settings do not matter here.
         meta = replace(meta, replay_drift_px=replay_drift(episode, episode.physics))
-    return PreparedEpisode(columns, episode_statistics(columns), meta, episode.notes)
+    statistics = episode_statistics(columns)
+    if conversion.video is None:
+        return PreparedEpisode(columns, statistics, meta, episode.notes)
+
+    # They load what a conversion without a video never needs.
+    from .scene_pictures import scene_pictures
+    from .scene_video import SCENE, scene_clip
+
+    pictures = scene_pictures(columns[STATE], episode.map_config, conversion.video)
+    clip = scene_clip(pictures, conversion.fps, conversion.video)
+    return PreparedEpisode(columns, {**statistics, SCENE: clip.statistics}, meta, episode.notes, clip)
 
 
 def prepare_from(name: str, read: Callable[[], Episode], conversion: Conversion) -> PreparedEpisode | NotPrepared:

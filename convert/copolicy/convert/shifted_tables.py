@@ -16,6 +16,7 @@ except ModuleNotFoundError:
 Place = tuple[int, int]
 """Numbers of a chunk and of a file in it."""
 
+_PLACE = ("chunk_index", "file_index")
 _COUNTED = ("count", "std")  # statistics that do not move with the values
 
 
@@ -46,11 +47,13 @@ class Shift:
             table = _added(table, name, by)
         return table
 
-    def episode_table(self, table: "pa.Table", data: Mapping[Place, Place], own: Place) -> "pa.Table":
+    def episode_table(
+        self, table: "pa.Table", moved_files: Mapping[str, Mapping[Place, Place]], own: Place
+    ) -> "pa.Table":
         """A table of meta/episodes.
 
         Args:
-            data: where each file of frames went.
+            moved_files: for each folder of numbered files (`data`, `videos/KEY`), where each file went.
             own: where the table itself goes.
         """
         moved = {
@@ -60,13 +63,10 @@ class Shift:
         }
         for name, by in moved.items():
             table = _added(table, name, by)
-        places = zip(
-            table.column("data/chunk_index").to_pylist(), table.column("data/file_index").to_pylist(), strict=True
-        )
-        files = [data[place] for place in places]
-        for folder, where in (("data", files), ("meta/episodes", [own] * table.num_rows)):
-            for part, name in enumerate(("chunk_index", "file_index")):
-                table = _replaced(table, f"{folder}/{name}", [place[part] for place in where])
+        for folder, places in moved_files.items():
+            numbers = (table.column(f"{folder}/{part}").to_pylist() for part in _PLACE)
+            table = _placed(table, folder, [places[place] for place in zip(*numbers, strict=True)])
+        table = _placed(table, "meta/episodes", [own] * table.num_rows)
         for name in table.column_names:
             feature, _, kind = name.removeprefix("stats/").rpartition("/")
             if name.startswith("stats/") and feature in self.columns and kind not in _COUNTED:
@@ -76,9 +76,9 @@ class Shift:
         return table
 
 
-def numbered_files(folder: Path) -> dict[Place, Path]:
-    """The Parquet files `chunk-000/file-000.parquet` of a folder by their numbers, in order."""
-    files = sorted(folder.glob("chunk-*/file-*.parquet"))
+def numbered_files(folder: Path, suffix: str = "parquet") -> dict[Place, Path]:
+    """The files `chunk-000/file-000.parquet` of a folder by their numbers, in order."""
+    files = sorted(folder.glob(f"chunk-*/file-*.{suffix}"))
     return dict(sorted(((int(path.parent.name[6:]), int(path.stem[5:])), path) for path in files))
 
 
@@ -107,6 +107,12 @@ def write_like(table: "pa.Table", example: Path, path: Path) -> None:
         raise FileFormatError(example, f"columns {', '.join(sorted(table.column_names)[:4])}, ...", f"not {differ[:4]}")
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table.select(schema.names).cast(schema), path, compression="snappy", use_dictionary=True)
+
+
+def _placed(table: "pa.Table", folder: str, places: list[Place]) -> "pa.Table":
+    for part, name in enumerate(_PLACE):
+        table = _replaced(table, f"{folder}/{name}", [place[part] for place in places])
+    return table
 
 
 def _added(table: "pa.Table", name: str, by: int) -> "pa.Table":

@@ -1,4 +1,4 @@
-"""A folder or file that appears complete or not at all."""
+"""A folder or file that appears complete or not at all, also where the power fails."""
 
 import os
 import secrets
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from copolicy.dataset.exceptions import OutputExistsError
+
+_FILE = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only what is open for writing
 
 
 def require_new(path: Path) -> None:
@@ -32,8 +34,10 @@ def new_folder(path: Path) -> Iterator[Path]:
     partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
     try:
         yield partial
+        sync_tree(partial)
         require_new(path)
         partial.rename(path)
+        sync_folder(path.parent)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
@@ -47,7 +51,34 @@ def new_file(path: Path) -> Iterator[Path]:
     partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
     try:
         yield partial
+        _sync(partial, _FILE)
         require_new(path)
         partial.rename(path)
+        sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def sync_tree(folder: Path) -> None:
+    """Waits until every file and folder below `folder`, and itself, are on the disk.
+
+    What was written back already, such as a file that two data sets share by a hard link, costs next to nothing.
+    """
+    for inside, _, names in os.walk(folder, topdown=False):
+        for name in names:
+            _sync(Path(inside, name), _FILE)
+        sync_folder(Path(inside))
+
+
+def sync_folder(folder: Path) -> None:
+    """Waits until the names in a folder are on the disk, where the system can (Windows cannot open a folder)."""
+    if hasattr(os, "O_DIRECTORY"):
+        _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _sync(path: Path, flags: int) -> None:
+    descriptor = os.open(path, flags)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -96,7 +96,8 @@ def convert_upstream(
         if hold == "mean":
             raise InvalidValueError("hold", "'first': the store holds the first of three actions only", hold)
     hold = hold or ("first" if source.format == "zarr" else "mean")
-    conversion = Conversion(fps, hold, license)
+    # Nobody discarded anything here; what is excluded for its map stays in the data set, flagged.
+    conversion = Conversion(fps, hold, license, keep_discarded=True)
     left_out, noticed = LeftOut(), _Noticed()
     results = (prepare_from(name, lambda read=read: read(options), conversion) for name, read in source.readers)
 
@@ -114,6 +115,7 @@ def convert_upstream(
         "format": source.format,
         **written.summary(),
         "damaged_left_out": left_out.messages,
+        "excluded": noticed.excluded,
         "quality_flags": dict(noticed.flags),
         "noticed": noticed.notes,
     }
@@ -125,10 +127,12 @@ class _Noticed:
     def __init__(self):
         self.flags: Counter[str] = Counter()
         self.notes: list[str] = []
+        self.excluded = 0
 
     def watch(self, episodes: Iterator[PreparedEpisode]) -> Iterator[PreparedEpisode]:
         for episode in episodes:
             self.flags.update(flag for flag in episode.meta.quality_flags.split(",") if flag)
+            self.excluded += episode.meta.discarded
             origin, *rest = episode.notes
             self.notes += [f"{note} ({origin})" for note in rest]
             yield episode

@@ -2,8 +2,10 @@
 
 Quality flags that they set:
     map_mismatch       the file's map is not the one that was played (its script picks map files by substring)
-    map_recovered      goal and obstacles were told from the stored rewards instead
+    map_recovered      goal and obstacles are those of the rows instead, or were told from the stored rewards
     goal_recovered     only the goal could be told, from where the table ended; the obstacles are the file's
+    excluded: map_mismatch
+                       the obstacles, or the goal too, may be wrong; as after `copolicy-dataset exclude`
     dynamics_mismatch  the rows do not follow from the actions under the dynamics
     outcome_differs    the file's own success flag is not the one that the contact test gives
 """
@@ -18,6 +20,7 @@ import numpy as np
 
 from copolicy.collect.world import TableWorld
 from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
+from copolicy.dataset.exclusions import FLAG
 from copolicy.dataset.features import theta_of
 from copolicy.dataset.routes import route_class
 from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics, identify
@@ -117,6 +120,9 @@ def build_episode(
 ) -> Episode:
     """An Episode with the columns that such a file can fill.
 
+    One whose map is not the one that was played and could not be recovered is excluded: it shows two people steering
+    around obstacles that were elsewhere, and a policy would learn to.
+
     Args:
         content: bytes that identify the episode; its id and `source_sha256` follow from them.
         origin: where in the files the episode is; the first note says so.
@@ -132,6 +138,9 @@ def build_episode(
     steps = len(states) if fps == RECORD_HZ else (len(states) - 1) * RECORD_HZ // fps + 1
     if reason is None:
         reason = "timeout" if steps >= physics.step_limit else "unknown"
+    excluded = _wrong_map(flags)
+    if excluded:
+        flags += (f"{FLAG}map_mismatch",)
     digest = hashlib.sha256(content).hexdigest()
     map_id, map_set = identify(config)
     path = np.vstack((states[:, :2], final_state[:2]))
@@ -145,9 +154,14 @@ def build_episode(
         duration_s=steps / RECORD_HZ,
         route_class=route_class(path, config),
         quality_flags=",".join(flags),
+        discarded=excluded,
         source_sha256=digest,
     )
     limit = next(name for name, value in ANGULAR_LIMITS.items() if value == physics.angular_acceleration_limit)
     notes = (f"from {origin}, angular limit {limit}", *notes)
     episode = Episode(states, trajectory.actions, final_state, meta, config, fps, physics, notes)
     return replace(episode, meta=replace(meta, replay_drift_px=replay_drift(episode, physics)))
+
+
+def _wrong_map(flags: tuple[str, ...]) -> bool:
+    return "map_mismatch" in flags and "map_recovered" not in flags

@@ -45,7 +45,7 @@ def read_raw(path: Path, options: UpstreamOptions) -> Episode:
     if file_map is None:
         notes += ("no map file of this name: start found by undoing the first step",)
     elif difference := _difference(file_map, config, first):
-        flags += ("map_mismatch",)
+        flags += ("map_mismatch", "map_recovered")
         notes += (f"map file is not the one played: {difference}; start, goal and obstacles are those of the rows",)
     if trajectory.residual > _FOLLOWS:
         flags += ("dynamics_mismatch",)

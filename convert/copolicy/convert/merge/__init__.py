@@ -1,0 +1,1 @@
+"""Several data sets of this project, of several labs perhaps, as one."""

@@ -1,0 +1,225 @@
+"""Merges data sets with LeRobot's aggregation, and puts right what that does to the tables.
+
+LeRobot reads tables with pandas, which writes NaN ("not measured") as null and vectors of a fixed length as lists of
+any, and it leaves the statistics of the running numbers unmoved. Numbers, files and times are taken from what it
+wrote; every other column from the data sets as they were, with its type. The content of every episode is then
+compared with what it was.
+"""
+
+import contextlib
+import io
+import json
+import logging
+import shutil
+from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
+from copolicy.dataset.versions.content import Content, read_content
+
+from ..lerobot_writer import RECORD_FILE
+from ..shifted_tables import Shift, numbered_files, read_table
+from ..staging import new_folder, require_new
+from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
+from .source import MergeSource, require_alike
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from datasets import config
+    from lerobot.datasets.aggregate import aggregate_datasets
+    from lerobot.datasets.compute_stats import aggregate_stats
+    from lerobot.datasets.feature_utils import get_hf_features_from_features
+    from lerobot.datasets.io_utils import load_stats, write_stats
+except ImportError as error:
+    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
+
+_MOVED = ("data/", "videos/", "meta/episodes/", "stats/index/", "stats/episode_index/", "stats/task_index/")
+_NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
+
+
+def merge_datasets(
+    roots: Sequence[Path],
+    root: Path,
+    repo_id: str,
+    prefixes: Sequence[str] | None = None,
+    same_people: bool = False,
+) -> dict[str, Any]:
+    """Writes the episodes of several data sets, one after the other, as one at `root`.
+
+    Exclusions are episode columns and stay. Statistics, releases, cards and recordings are about one data set and
+    stay behind; the result's record `meta/copolicy.json` names the content hash of each.
+
+    Args:
+        prefixes: one for each data set, put before the names that its lab gave (see `people`).
+        same_people: a name in several data sets is the same person.
+
+    Returns:
+        Summary.
+
+    Raises:
+        OutputExistsError: there is something at `root`.
+        FileFormatError: not all are data sets of this project with the same rate and features, or two share an episode.
+        InvalidValueError: two use the same name for a person, and nobody says whether it is the same one.
+    """
+    require_new(root)
+    if prefixes is not None:
+        require_prefixes(prefixes, len(roots))
+    sources = [MergeSource.read(path) for path in roots]
+    require_alike(sources)
+    if prefixes is None and not same_people:
+        require_strangers(sources)
+    tables = [
+        source.episodes if prefixes is None else renamed(source.episodes, prefixes[place])
+        for place, source in enumerate(sources)
+    ]
+    expected = _joined(sources, tables)
+    with new_folder(root) as partial:
+        with _quiet(partial.with_name(f"{partial.name}.cache")):
+            # Videos stay in the files they are in: joined, their packets would be written in another form.
+            aggregate_datasets([repo_id] * len(roots), repo_id, list(roots), partial, concatenate_videos=False)
+        write_stats(aggregate_stats(list(_moved_statistics(sources))), partial)
+        _restore_episodes(partial, expected)
+        _restore_frames(partial)
+        content = read_content(partial)
+        _verify(content, sources, set(LOCAL_NAMES) if prefixes else set())
+        record = _record(sources, prefixes)
+        (partial / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n")
+    left_behind = {str(source.root): names for source in sources if (names := source.left_behind())}
+    return {
+        "root": str(root),
+        "repo_id": repo_id,
+        "episodes": len(content.episodes),
+        "frames": sum(episode.frames for episode in content.episodes),
+        "excluded": sum(bool(mark) for mark in expected.column("discarded").to_pylist()),
+        "content_hash": content.hash,
+        "left_behind": left_behind,
+    }
+
+
+def _moved_statistics(sources: Sequence[MergeSource]) -> Iterator[dict[str, dict[str, Any]]]:
+    episodes = frames = 0
+    for source in sources:
+        yield Shift(episodes, frames).statistics(load_stats(source.root) or {})
+        episodes, frames = episodes + source.info["total_episodes"], frames + source.info["total_frames"]
+
+
+def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa.Table":
+    """All rows of meta/episodes as they were, with null where a data set lacks a column."""
+    types = {field.name: field.type for field in tables[0].schema}
+    for source, table in zip(sources, tables, strict=True):
+        for field in table.schema:
+            known = types.setdefault(field.name, field.type)
+            if pa.types.is_null(known):
+                types[field.name] = field.type
+            elif field.type != known and not pa.types.is_null(field.type):
+                where = source.root / "meta" / "episodes"
+                raise FileFormatError(where, f"column {field.name} of type {known}", str(field.type))
+    return pa.concat_tables(
+        [
+            pa.table(
+                {
+                    name: table.column(name).cast(kind)
+                    if name in table.column_names
+                    else pa.nulls(table.num_rows, kind)
+                    for name, kind in types.items()
+                }
+            )
+            for table in tables
+        ]
+    )
+
+
+def _restore_episodes(root: Path, expected: "pa.Table") -> None:
+    start = 0
+    for path in numbered_files(root / "meta" / "episodes").values():
+        merged = read_table(path)
+        rows = expected.slice(start, merged.num_rows)
+        for name in rows.column_names:
+            if name in _NUMBERS or name.startswith(_MOVED):
+                place = rows.column_names.index(name)
+                field = rows.schema.field(place)
+                rows = rows.set_column(place, field, merged.column(name).cast(field.type))
+        pq.write_table(rows, path, compression="snappy", use_dictionary=True)
+        start += merged.num_rows
+
+
+def _restore_frames(root: Path) -> None:
+    """The data files with the types of the feature table, a row group an episode; one file is in memory at a time."""
+    features = json.loads((root / "meta" / "info.json").read_text())["features"]
+    features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
+    schema = get_hf_features_from_features(features).arrow_schema
+    for path in numbered_files(root / "data").values():
+        table = read_table(path).select(schema.names).cast(schema)
+        episodes = table.column("episode_index").to_pylist()
+        with pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True) as writer:
+            start = 0
+            for row in range(1, len(episodes) + 1):
+                if row == len(episodes) or episodes[row] != episodes[start]:
+                    writer.write_table(table.slice(start, row - start))
+                    start = row
+
+
+def _verify(content: Content, sources: Sequence[MergeSource], renamed_columns: set[str]) -> None:
+    before = [episode for source in sources for episode in source.content.episodes]
+    if len(content.episodes) != len(before):
+        raise RunError(f"merge: expected {len(before)} episodes, found {len(content.episodes)}; nothing was written")
+    for was, now in zip(before, content.episodes, strict=True):
+        kept = {name: digest for name, digest in was.columns.items() if name not in renamed_columns}
+        parts = {
+            "episode_uuid": was.episode_uuid == now.episode_uuid,
+            "frames": was.frames == now.frames,
+            **{name: now.features.get(name) == digest for name, digest in was.features.items()},
+            **{name: now.columns.get(name) == digest for name, digest in kept.items()},
+        }
+        if not all(parts.values()):
+            changed = next(name for name, same in parts.items() if not same)
+            raise RunError(
+                f"episode {was.episode_uuid}: expected {changed} unchanged by the merge, found otherwise; "
+                "nothing was written"
+            )
+
+
+def _record(sources: Sequence[MergeSource], prefixes: Sequence[str] | None) -> dict[str, Any]:
+    notes: dict[str, Any] = {}
+    merged = []
+    for place, source in enumerate(sources):
+        record = dict(source.record)
+        notes |= record.pop("notes", {})
+        merged.append(
+            {
+                "name": source.root.resolve().name,
+                "content_hash": source.content.hash,
+                "episodes": len(source.content.episodes),
+                "prefix": prefixes[place] if prefixes else "",
+                "record": record,
+            }
+        )
+    info = sources[0].info
+    return {
+        "converter": "copolicy-convert merge",
+        "version": version("lerobot_policy_copolicy"),
+        "merged": merged,
+        "fps": info["fps"],
+        "hold": info["features"]["action"].get("hold", ""),
+        "notes": notes,
+    }
+
+
+@contextlib.contextmanager
+def _quiet(cache: Path) -> Iterator[None]:
+    """LeRobot logs each of its steps, draws progress bars whether or not stderr is a terminal, and leaves a copy of
+    each table of episodes in the user's cache; here in one that goes away."""
+    logger = logging.getLogger("lerobot")
+    level, place = logger.level, config.HF_DATASETS_CACHE
+    logger.setLevel(logging.WARNING)
+    config.HF_DATASETS_CACHE = cache
+    try:
+        with contextlib.redirect_stderr(io.StringIO()):
+            yield
+    finally:
+        config.HF_DATASETS_CACHE = place
+        logger.setLevel(level)
+        shutil.rmtree(cache, ignore_errors=True)

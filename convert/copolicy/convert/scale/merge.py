@@ -1,0 +1,124 @@
+"""All shards to the one data set, with what can only be said of all episodes together."""
+
+import json
+import shutil
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.checks.finding import SEVERITIES
+from copolicy.dataset.exceptions import RunError
+
+from ..lerobot_writer import RECORD_FILE, WrittenDataset
+from ..prepare import LeftOut
+from ..shifted_tables import numbered_files, read_table
+from ..staging import require_new, sync_folder, sync_tree
+from .aggregation import aggregate
+from .findings import all_findings
+from .plan import DATA_SET, ShardPlan
+
+FINDINGS_FILE = "findings.json"
+
+
+def merge_shards(plan: ShardPlan) -> dict[str, Any]:
+    """Writes the data set at `plan.root`; it appears complete, in one renaming.
+
+    Returns:
+        Summary of what was written, left out and found.
+
+    Raises:
+        RunError: a shard is not finished, no episode is left, or one is there twice.
+        OutputExistsError: there is something at `plan.root`.
+    """
+    require_new(plan.root)
+    records = [record for rank in range(len(plan)) if (record := plan.record(rank)) is not None]
+    if len(records) != len(plan):
+        raise RunError(f"{plan.folder}: expected {len(plan)} finished shards, found {len(records)}")
+    _require_once([uuid for record in records for uuid in record["episodes"]])
+    roots = [plan.shard(rank) / DATA_SET for rank, record in enumerate(records) if record["episodes"]]
+    if not roots:
+        raise RunError(f"{plan.root}: expected at least one episode to write, found none")
+    left_out = LeftOut()
+    for record in records:
+        left_out.damaged += record["left_out"]["damaged"]
+        left_out.discarded += record["left_out"]["discarded"]
+        left_out.messages += record["left_out"]["messages"]
+    with _staging(plan.root) as partial:
+        info = aggregate(roots, plan.repo_id, partial, plan.folder / "cache")
+        _write_record(plan, partial, roots, left_out)
+        findings = all_findings(partial, records)
+        if plan.statistics:
+            _write_statistics(partial)
+        tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
+        successes = sum(sum(table.column("success").to_pylist()) for table in tables)
+    document = json.dumps([finding.to_dict() for finding in findings], indent=1)
+    (plan.folder / FINDINGS_FILE).write_text(document + "\n")
+    conversion = plan.conversion
+    written = WrittenDataset(
+        plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
+        successes,
+    )  # fmt: skip
+    counts = Counter(finding.severity for finding in findings)
+    return {
+        **written.summary(),
+        "damaged_left_out": left_out.messages,
+        "discarded_left_out": left_out.discarded,
+        "unfinished_recordings": list(plan.unfinished),
+        "shards": len(plan),
+        "found": {severity: counts[severity] for severity in SEVERITIES},
+        "findings": [str(finding) for finding in findings],
+    }
+
+
+def _require_once(uuids: list[str]) -> None:
+    seen: dict[str, int] = {}
+    for index, uuid in enumerate(uuids):
+        if uuid in seen:
+            raise RunError(f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}")
+        seen[uuid] = index
+
+
+@contextmanager
+def _staging(root: Path) -> Iterator[Path]:
+    """A folder beside `root` that becomes `root`; unlike `staging.new_folder` with one name, so that the next run
+    finds and removes what a killed one left."""
+    root.parent.mkdir(parents=True, exist_ok=True)
+    partial = root.parent / f".{root.name}.merging"
+    shutil.rmtree(partial, ignore_errors=True)
+    try:
+        yield partial
+        sync_tree(partial)
+        require_new(root)
+        partial.rename(root)
+        sync_folder(root.parent)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+
+
+def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> None:
+    notes: dict[str, list[str]] = {}
+    for part in roots:
+        notes |= json.loads((part / RECORD_FILE).read_text())["notes"]
+    document = {
+        "converter": "copolicy-convert mcap",
+        "version": version("lerobot_policy_copolicy"),
+        "files": len(plan.files),
+        "left_out": left_out.record(),
+        "fps": plan.conversion.fps,
+        "hold": plan.conversion.hold,
+        "notes": notes,
+    }
+    (root / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n")
+
+
+def _write_statistics(root: Path) -> None:
+    from copolicy.dataset.statistics.command import STATISTICS_FILE, write_document
+    from copolicy.dataset.statistics.compute import compute_statistics
+    from copolicy.dataset.statistics.reading import read_trajectories
+
+    data, left_out = read_trajectories(root)
+    write_document(compute_statistics(data, left_out=left_out), root / STATISTICS_FILE)

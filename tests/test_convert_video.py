@@ -1,0 +1,244 @@
+"""`copolicy-convert mcap --video`: the right picture for every frame, wherever its episode went."""
+
+import json
+import logging
+import shutil
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from checked_data import contents, make_data_set, make_recordings
+from lerobot.datasets import LeRobotDataset, dataset_reader
+from lerobot.datasets.compute_stats import compute_episode_stats
+from PIL import Image
+
+from copolicy.convert.cli import main
+from copolicy.convert.lerobot_writer import write_dataset
+from copolicy.convert.prepare import Conversion, prepare_episode
+from copolicy.convert.scene_pictures import scene_pictures
+from copolicy.convert.scene_video import SCENE, parse_size, scene_clip
+from copolicy.dataset.checks.checking import check_dataset
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.exclusions import exclude, excluded_episodes
+from copolicy.dataset.features import STATE
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.versions.content import read_content
+from copolicy.train.cli import main as train
+
+SIZE = (160, 80)
+FLAGS = ("--no-drift", "--video", "--video-size", "160x80")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Recordings in `raw/a` and `raw/b`; `a` and `b` of them, and `both`."""
+    folder = tmp_path_factory.mktemp("video")
+    for name, seed in (("a", 1), ("b", 2)):
+        make_recordings(folder / "raw" / name, 2, seed=seed)
+        make_data_set(folder / "raw" / name, folder / name, *FLAGS)
+    make_data_set(folder / "raw", folder / "both", *FLAGS)
+    return folder
+
+
+@pytest.fixture
+def root(made, tmp_path) -> Path:
+    return Path(shutil.copytree(made / "a", tmp_path / "a"))
+
+
+@pytest.fixture(autouse=True)
+def _logging_as_before():
+    """LeRobot replaces the handlers of the root logger."""
+    logger = logging.getLogger()
+    before = logger.handlers[:], logger.level
+    yield
+    logger.handlers[:], logger.level = before
+
+
+def load(root: Path, **options) -> Any:
+    # torchcodec, LeRobot's first choice, needs ffmpeg's libraries on the machine; PyAV brings its own.
+    return LeRobotDataset("lab/table", root=root, video_backend="pyav", **options)
+
+
+def drawn(raw: Path) -> list[np.ndarray]:
+    """For each recording the pictures of its frames at 10 Hz, `(T, 80, 160, 3)`."""
+    episodes = [read_episode(path) for path in sorted(raw.rglob("*.mcap"))]
+    return [
+        np.stack(list(scene_pictures(episode.states[::3].astype(np.float32), episode.map_config, SIZE)))
+        for episode in episodes
+    ]
+
+
+def decoded(dataset: Any, index: int) -> np.ndarray:
+    return dataset[index][SCENE].numpy().transpose(1, 2, 0) * 255
+
+
+def assert_pictures(dataset: Any, expected: list[np.ndarray]) -> None:
+    """The first, second, a middle and the last frame of each episode show what they should, and no other."""
+    rows = dataset.meta.episodes
+    assert len(rows) == len(expected)
+    for start, end, pictures in zip(rows["dataset_from_index"], rows["dataset_to_index"], expected, strict=True):
+        assert end - start == len(pictures)
+        for frame in (0, 1, len(pictures) // 2, len(pictures) - 1):
+            shown = decoded(dataset, start + frame)
+            distances = np.abs(pictures - shown).mean(axis=(1, 2, 3))
+            assert distances[frame] < 4  # levels of 255: lossy, and colour at half the resolution
+            # The table hardly moves from one frame to the next, least of all at the start.
+            assert distances[frame] <= distances.min() + 0.02
+
+
+def test_every_index_gives_its_own_picture(made):
+    dataset = load(made / "both")
+    pictures = drawn(made / "raw")
+    assert_pictures(dataset, pictures)
+    # Where one episode ends and the next begins, on another map.
+    boundary = dataset.meta.episodes["dataset_from_index"][1]
+    shown = decoded(dataset, boundary)
+    assert np.abs(shown - pictures[1][0]).mean() < np.abs(shown - pictures[0][0]).mean() - 1
+    assert np.abs(decoded(dataset, boundary - 1) - pictures[0][-1]).mean() < 4
+
+
+def test_the_metadata_are_those_of_lerobots_own_videos(made):
+    root = made / "both"
+    dataset = load(root)
+    feature = dataset.meta.features[SCENE]
+    assert (feature["dtype"], feature["shape"]) == ("video", (80, 160, 3))
+    assert feature["names"] == ["height", "width", "channels"]
+    info = feature["info"]
+    assert (info["video.codec"], info["video.pix_fmt"], info["video.fps"]) == ("h264", "yuv420p", 10)
+    assert info["is_depth_map"] is False
+    rows = dataset.meta.episodes
+    lengths = np.array(rows["length"])
+    assert rows[f"videos/{SCENE}/chunk_index"] == rows[f"videos/{SCENE}/file_index"] == [0] * 4
+    np.testing.assert_allclose(rows[f"videos/{SCENE}/to_timestamp"], np.cumsum(lengths) / 10)
+    np.testing.assert_allclose(rows[f"videos/{SCENE}/from_timestamp"], (np.cumsum(lengths) - lengths) / 10)
+    with av.open(str(root / "videos" / SCENE / "chunk-000" / "file-000.mp4")) as container:
+        stream = container.streams.video[0]
+        assert stream.frames == lengths.sum()
+        assert stream.average_rate == 10
+    assert [found for found in check_dataset(root).findings if found.severity == "error"] == []
+
+
+def test_statistics_are_lerobots_of_the_same_pictures(made, tmp_path):
+    episode = read_episode(min((made / "raw").rglob("*.mcap")))
+    pictures = list(scene_pictures(episode.states[:300:30], episode.map_config, (600, 300)))
+    ours = scene_clip(pictures, 10, (600, 300)).statistics
+    paths = [str(tmp_path / f"{place}.png") for place in range(len(pictures))]
+    for path, picture in zip(paths, pictures, strict=True):
+        Image.fromarray(picture).save(path)
+    theirs = compute_episode_stats({SCENE: paths}, {SCENE: {"dtype": "video", "shape": (300, 600, 3)}})[SCENE]
+    assert ours.keys() == theirs.keys()
+    for kind, value in ours.items():
+        assert value.shape == theirs[kind].shape
+        if kind not in ("mean", "std"):  # LeRobot adds a hundred thousand pixels in single precision: 15 % off
+            np.testing.assert_allclose(value, theirs[kind], atol=1e-3, err_msg=kind)
+    pixels = np.stack(pictures)[:, ::4, ::4].reshape(-1, 3) / 255
+    np.testing.assert_allclose(ours["mean"].ravel(), pixels.mean(axis=0))
+    np.testing.assert_allclose(ours["std"].ravel(), pixels.std(axis=0))
+
+
+def test_files_change_when_they_are_full(made, tmp_path):
+    paths = sorted((made / "raw").rglob("*.mcap"))
+    conversion = Conversion(drift=False, video=SIZE)
+    prepared = [prepare_episode(read_episode(path), conversion) for path in paths]
+    write_dataset(prepared, tmp_path / "set", "lab/table", 10, "mean", dict, video_file_mb=1e-6)  # pyright: ignore
+    dataset = load(tmp_path / "set")
+    assert dataset.meta.episodes[f"videos/{SCENE}/file_index"] == [0, 1, 2, 3]
+    assert dataset.meta.episodes[f"videos/{SCENE}/from_timestamp"] == [0] * 4
+    assert_pictures(dataset, drawn(made / "raw"))
+    whole = read_content(made / "both")
+    assert [episode.features for episode in read_content(tmp_path / "set").episodes] == [
+        episode.features for episode in whole.episodes
+    ]
+
+
+def test_the_content_does_not_depend_on_what_stands_beside_an_episode(made):
+    apart = [episode.digest for name in "ab" for episode in read_content(made / name).episodes]
+    assert len(set(apart)) == 4
+    changed = [episode.features[SCENE] for episode in read_content(made / "both").episodes]
+    assert changed == [episode.features[SCENE] for name in "ab" for episode in read_content(made / name).episodes]
+
+
+def append(folder: Path, root: Path, *flags: str) -> int:
+    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "CC-BY-4.0"]
+    return main([*arguments, "--append", "--no-drift", *flags])
+
+
+def test_appending_adds_a_file_with_the_same_size(made, root, capsys):
+    before = contents(root)
+    assert append(made / "raw" / "b", root) == 0
+    dataset = load(root)
+    assert dataset.meta.episodes[f"videos/{SCENE}/file_index"] == [0, 0, 1, 1]
+    assert_pictures(dataset, drawn(made / "raw"))
+    assert read_content(root).hash == read_content(made / "both").hash
+    first = f"videos/{SCENE}/chunk-000/file-000.mp4"
+    assert contents(root)[first] == before[first]
+    exclude(root, ["3"], "withdrawn")
+    assert [entry.episode for entry in excluded_episodes(root)] == [3]
+    assert_pictures(load(root), drawn(made / "raw"))
+
+
+def test_another_size_or_a_video_where_there_is_none_is_refused(made, root, tmp_path, capsys):
+    before = contents(root)
+    assert append(made / "raw" / "b", root, "--video", "--video-size", "320x160") == 2
+    plain = make_data_set(made / "raw" / "a", tmp_path / "plain", "--no-drift")
+    assert append(made / "raw" / "b", plain, "--video") == 2
+    assert append(made / "raw" / "b", plain, "--video-size", "160x80") == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"copolicy-convert: --video-size: expected 160x80, as {root} has it, found '320x160'",
+        f"copolicy-convert: --video: expected none, as {plain} has no video, found 'one'",
+        "copolicy-convert: --video-size: expected --video beside it, found '160x80'",
+    ]
+    assert contents(root) == before
+
+
+def test_merging_gives_what_one_conversion_gives(made, tmp_path, capsys):
+    arguments = ["merge", str(made / "a"), str(made / "b"), "--root", str(tmp_path / "m"), "--repo-id", "lab/both"]
+    assert main([*arguments, "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert json.loads(captured.out)["content_hash"] == read_content(made / "both").hash
+    assert_pictures(load(tmp_path / "m"), drawn(made / "raw"))
+
+
+@pytest.mark.parametrize("text", ["600", "601x300", "32x32", "600x", "axb", "600x300x3", "8000x4000"])
+def test_a_size_that_no_encoder_takes_is_refused(text):
+    expected = f"--video-size: expected WIDTHxHEIGHT in even px from 64 to 3840, found {text!r}"
+    with pytest.raises(InvalidValueError) as error:
+        parse_size(text)
+    assert str(error.value) == expected
+    assert parse_size("600x300") == (600, 300)
+
+
+def test_a_picture_shows_no_forces(made):
+    recording = read_episode(min((made / "raw" / "a").glob("*.mcap")))
+    state = recording.states[:1]
+    config = MAP_SETS["training"][0]
+    (one,) = scene_pictures(state, config, SIZE)
+    (other,) = scene_pictures(state, config, SIZE)
+    assert one.shape == (80, 160, 3)
+    assert one.dtype == np.uint8
+    np.testing.assert_array_equal(one, other)
+    (tall,) = scene_pictures(state, config, (160, 160))
+    np.testing.assert_array_equal(tall[40:120], one)
+    assert not tall[:40].any()
+
+
+def test_training_opens_no_video(made, tmp_path, monkeypatch, capsys):
+    def decode(*arguments, **options):
+        raise AssertionError("a video was decoded")
+
+    monkeypatch.setattr(dataset_reader, "decode_video_frames", decode)
+    small = ["--policy.preset=small", "--policy.width=16", "--policy.n_layers=1", "--policy.device=cpu"]
+    out = tmp_path / "out"
+    flags = [f"--dataset.root={made / 'a'}", f"--output_dir={out}", "--steps=2", "--batch_size=8", *small]
+    assert train(flags) == 0
+    error = capsys.readouterr().err
+    assert f"The policy does not look at {SCENE}: no video is decoded" in error
+    assert "LeRobot's own loader" not in error
+    assert (out / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
+    with pytest.raises(AssertionError, match="a video was decoded"):  # what the check would have seen
+        load(made / "a")[0]
+    assert STATE in json.loads((out / "checkpoints/last/pretrained_model/config.json").read_text())["input_features"]
