@@ -98,7 +98,7 @@ def test_loaded_configuration_takes_overrides(tmp_path):
     [
         ({"preset": "big"}, UnknownNameError, "unknown preset 'big'; available: default, paper, small"),
         ({"network": "unet"}, UnknownNameError, "unknown network 'unet'; available: mlp, transformer"),
-        ({"sampler": "euler"}, UnknownNameError, "unknown sampler 'euler'; available: ddim, ddpm"),
+        ({"sampler": "euler"}, UnknownNameError, "unknown sampler 'euler'; available: ddim, ddpm, dpmsolver++"),
         (
             {"n_action_steps": 11},
             InvalidValueError,
@@ -110,6 +110,11 @@ def test_loaded_configuration_takes_overrides(tmp_path):
             {"num_inference_steps": 101},
             InvalidValueError,
             "num_inference_steps: expected 1 to num_train_timesteps = 100, found 101",
+        ),
+        (
+            {"backend": "onnx", "planner": "plain"},
+            InvalidValueError,
+            "backend, for planner=plain: expected torch, found 'onnx'",
         ),
         ({"width": 30}, InvalidValueError, "width: expected a multiple of n_heads = 4, found 30"),
         ({"initial_noise_scale": -1.0}, InvalidValueError, "initial_noise_scale: expected zero or more, found -1.0"),

@@ -15,7 +15,8 @@ from copolicy.dataset.features import (
     state_vector,
 )
 from copolicy.dataset.task import MapConfig
-from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures, RelativeFeatures
+from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
+from lerobot_policy_copolicy.copolicy.range_scan import RANGE, RAYS, RangeScan
 
 
 def observation(pose=(240.0, 120.0, 3.14), obstacles=((480.0, 300.0),), human=(0.5, -1.0)) -> dict[str, torch.Tensor]:
@@ -71,9 +72,48 @@ def test_far_things_are_clipped():
     assert seen[11:15].tolist() == pytest.approx([-3.0, -589 / 300, -1.5, -1.5])
 
 
-@pytest.mark.parametrize("features", [AbsoluteFeatures(True), RelativeFeatures(True)])
+@pytest.mark.parametrize("features", [AbsoluteFeatures(True), RelativeFeatures(True), ScanFeatures(True)])
 def test_batches_and_histories_broadcast(features):
     single = observation()
     stacked = {key: values.expand(5, 3, -1) for key, values in single.items()}
     torch.testing.assert_close(features(stacked), features(single).expand(5, 3, -1))
     assert not list(features.state_dict())  # the bounds are the task's, not a checkpoint's
+
+
+def scan(x: float, y: float, *obstacles: tuple[float, float]) -> list[float]:
+    """Distances that a scan sees from (x, y), px."""
+    centres = torch.zeros(3, 2)
+    for slot, centre in enumerate(obstacles):
+        centres[slot] = torch.tensor(centre)
+    return ((1 - RangeScan()(torch.tensor([x, y]), centres)) / 2 * RANGE).tolist()
+
+
+def test_a_scan_sees_the_near_side_of_an_obstacle():
+    ahead, down, back, up = scan(600.0, 300.0, (750.0, 300.0))[:: RAYS // 4]
+    assert ahead == pytest.approx(125.0, abs=0.1)  # 150 px to the centre, 25 px nearer to its side
+    assert (down, back, up) == pytest.approx((300.0, RANGE, 300.0), abs=0.1)
+
+
+def test_a_scan_sees_the_nearest_of_all_whatever_their_order():
+    near, far = (700.0, 310.0), (850.0, 290.0)
+    assert scan(600.0, 300.0, far, near) == pytest.approx(scan(600.0, 300.0, near, far))
+    assert scan(600.0, 300.0, far, near)[0] == pytest.approx(75.0, abs=0.1)
+
+
+def test_a_slanted_ray_ends_where_it_enters_the_square():
+    # 30 degrees: the square about (600 + 173.2, 300 + 100) is entered by its left side.
+    ray = scan(600.0, 300.0, (773.2, 400.0))[3]
+    assert ray == pytest.approx((173.2 - 25) / math.cos(math.pi / 6), abs=0.1)
+
+
+def test_a_scan_from_inside_an_obstacle_is_contact():
+    assert scan(600.0, 300.0, (610.0, 310.0)) == pytest.approx([0.0] * RAYS, abs=1e-3)
+
+
+def test_scan_features_are_the_relative_ones_and_the_scan():
+    features = ScanFeatures(past_human_action=True)
+    seen = features(observation())
+    assert seen.shape == (features.size,) == (28 + RAYS,)
+    torch.testing.assert_close(seen[:28], RelativeFeatures(past_human_action=True)(observation()))
+    assert seen[28].item() == -1.0  # nothing ahead within reach
+    assert seen[28 + RAYS * 3 // 4].item() == pytest.approx(1 - 2 * 120 / RANGE)  # the upper wall

@@ -4,40 +4,12 @@ from typing import Any
 
 import pytest
 import torch
-from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.policies import get_policy_class
+from small_policies import MLP, OBSERVATIONS, TRANSFORMER, columns, policy
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
-from lerobot_policy_copolicy import CopolicyConfig
+from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-
-TINY = {"network": "transformer", "n_layers": 1, "width": 16, "n_heads": 2, "feedforward_width": 32}
-OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
-
-
-def policy(seed: int = 0, **settings) -> Any:
-    kinds = {ENVIRONMENT_STATE: FeatureType.ENV}
-    config = CopolicyConfig(
-        device="cpu",
-        input_features={
-            key: PolicyFeature(kinds.get(key, FeatureType.STATE), FEATURES[key]["shape"]) for key in OBSERVATIONS
-        },
-        output_features={ACTION: PolicyFeature(FeatureType.ACTION, (4,))},
-        **{**TINY, **settings},
-    )
-    torch.manual_seed(seed)
-    return CopolicyPolicy(config, dataset_stats={}, dataset_meta=None)
-
-
-def columns(*shape: int, seed: int = 0) -> dict[str, torch.Tensor]:
-    """Random observations within the bounds of the task, `shape + (n,)` each."""
-    generator = torch.Generator().manual_seed(seed)
-    batch = {}
-    for key in OBSERVATIONS:
-        low, high = (torch.tensor(BOUNDS[key][end], dtype=torch.float32) for end in (0, 1))
-        batch[key] = low + (high - low) * torch.rand(*shape, len(low), generator=generator)
-    return batch
 
 
 def training_batch(size: int = 8, seed: int = 0) -> dict[str, torch.Tensor]:
@@ -177,7 +149,7 @@ def test_augmentation_is_for_training_only():
     assert 16 < was_mirrored.sum() < 48
 
 
-@pytest.mark.parametrize("network", [TINY, {"network": "mlp", "n_layers": 1, "width": 16}])
+@pytest.mark.parametrize("network", [TRANSFORMER, MLP])
 def test_checkpoint_brings_back_the_same_plans(tmp_path, network):
     saved = policy(**network, initial_noise_scale=0.3)
     for parameter in saved.parameters():

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import io
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,11 +18,15 @@ from copolicy.dataset.exceptions import (
     RunError,
 )
 
+from .policy_commands import policy_parser
+
 _PROG = "copolicy-train"
 # What draccus puts before the reason, where a section of the configuration may also be absent.
 _UNDECODED = "Could not decode the value into any of the given types:"
 _HELP = """\
 usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
+       copolicy-train export CHECKPOINT --out FOLDER    averaged weights alone, to give away (export --help)
+       copolicy-train pretrained                        where the model that comes with the package is
 
 Trains a policy as lerobot-train does (same flags, same batches, same checkpoints, and each resumes the other's runs),
 with the data set in memory: loading goes from hundreds to hundreds of thousands of samples a second.
@@ -40,6 +45,10 @@ example:
   copolicy-train --config_path=outputs/small/checkpoints/last/pretrained_model/train_config.json \\
       --resume=true --steps=6000
 
+Mixed precision: ACCELERATE_MIXED_PRECISION=bf16 before the command. Several GPUs: accelerate launch --num_processes 2
+--mixed_precision bf16 $(which copolicy-train) ...; several processes on a CPU: torchrun --nproc_per_node 2 $(which
+copolicy-train) ... Each process gets --batch_size frames of a step, no two the same.
+
 --json prints one JSON object on stdout, --debug the traceback of an error.
 """
 
@@ -47,6 +56,10 @@ example:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status (0 done, 1 the data or the run has a problem, 2 the call is wrong)."""
     flags = list(sys.argv[1:] if argv is None else argv)
+    if flags and not flags[0].startswith("-"):  # LeRobot's trainer has flags only
+        parser, names = policy_parser()
+        if flags[0] in names:
+            return commandline.run(parser, flags)
     own = [flag for flag in flags if flag in ("--json", "--debug")]
     flags = [flag for flag in flags if flag not in own]
     if "--help" in flags or "-h" in flags:
@@ -55,7 +68,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     commandline.add_common_flags(parser)
     parser.add_argument("flags", nargs="*")
     parser.set_defaults(handler=_train)
-    return commandline.run(parser, [*own, "--", *flags])
+    first = os.environ.get("RANK", "0") == "0"
+    # Of several processes, one says what was done.
+    with contextlib.nullcontext() if first else contextlib.redirect_stdout(io.StringIO()):
+        return commandline.run(parser, [*own, "--", *flags])
 
 
 def with_defaults(flags: Sequence[str]) -> list[str]:
@@ -108,9 +124,11 @@ def _train(arguments: argparse.Namespace) -> dict:
             check_local_dataset(config.dataset.root)
         try:
             train_from_memory(config)
-        except (CopolicyError, OSError):
+        except CopolicyError:
             raise
-        except Exception as error:  # whatever LeRobot or torch raise; --debug shows where
+        except Exception as error:
+            if isinstance(error, OSError) and error.errno is not None:
+                raise  # the system's own, of a file; the Hub client's have pages of advice instead
             raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
     output = Path(config.output_dir or "")
     checkpoint = output / "checkpoints" / "last" / "pretrained_model"

@@ -5,67 +5,105 @@ batch; for data without images that is thousands of times slower than indexing t
 and yields the same batches: same keys in the same order, same values and dtypes, same padding.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import torch
 from lerobot.datasets import LeRobotDataset
-from torch import Tensor
 from torch.utils.data import Dataset
 from torch.utils.data._utils.collate import default_collate_fn_map
 
 from copolicy.dataset.exceptions import RunError
+
+from .frame_table import FrameTable, column_values, episode_bounds
 
 
 class WindowBatch(dict[str, Any]):
     """A batch that is complete, and that torch's `default_collate` therefore passes on as it is."""
 
 
-def _complete(batch: list[WindowBatch], *, collate_fn_map: dict | None = None) -> WindowBatch:
+class DeferredBatch:
+    """Which frames a batch is of; it becomes one where it is sent to a device, by gathering it there.
+
+    Accelerate's loader sends whatever has a `to`, and torch's pinning of host memory leaves it alone; so of a batch
+    for a GPU, whose data set lies there already, only the positions travel.
+    """
+
+    def __init__(self, dataset: "MemoryDataset", indices: Sequence[int]):
+        self._dataset = dataset
+        self._indices = indices
+
+    def __len__(self) -> int:
+        return len(self._indices)
+
+    def to(self, device: torch.device | str, non_blocking: bool = False) -> WindowBatch:
+        """The batch on a device."""
+        return self._dataset.window_batch(self._indices, torch.device(device))
+
+
+def _complete(batch: list[Any], *, collate_fn_map: dict | None = None) -> Any:
     return batch[0]
 
 
 # torch documents this table as the way to teach `default_collate` a type; LeRobot's trainer has no place for a
 # collate function of one's own.
 default_collate_fn_map[WindowBatch] = _complete
+default_collate_fn_map[DeferredBatch] = _complete
 
 
 class MemoryDataset(Dataset):
     """The frames of a `LeRobotDataset` without images as tensors, and windows of them around each frame.
 
     Has the attributes that LeRobot's trainer reads from a data set. An index is a position among the selected
-    episodes, as in `LeRobotDataset`.
-
-    Raises:
-        RunError: the rows of an episode are not there, not in order, or hold empty values.
+    episodes, as in `LeRobotDataset`. Videos are no part of it: nobody opens their files.
     """
 
-    def __init__(self, dataset: LeRobotDataset):
-        reader = dataset.reader
+    def __init__(self, dataset: LeRobotDataset, deferred: bool = False):
+        """
+        Args:
+            dataset: what to hold.
+            deferred: the loader gets a `DeferredBatch` for each batch, which is gathered where it is sent.
+
+        Raises:
+            RunError: the rows of an episode are not there, not in order, or hold empty values.
+        """
         self.meta = dataset.meta
         self.episodes = dataset.episodes
         self.hf_dataset = dataset.hf_dataset
         self.absolute_to_relative_idx = dataset.absolute_to_relative_idx
         self.num_frames = dataset.num_frames
         self.num_episodes = dataset.num_episodes
-        self._delta_indices: dict[str, list[int]] = reader.delta_indices or {}
+        self.deferred = deferred
         table = self.hf_dataset.data
-        self._columns: dict[str, Any] = {
-            name: _column(name, table.column(name), self.meta.features) for name in table.column_names
+        columns = {
+            name: column_values(name, table.column(name), self.meta.features[name]["shape"])
+            for name in table.column_names
         }
-        self._tasks = [str(task) for task in _present(self.meta.tasks).index]
-        self._first, self._last = self._episode_bounds()
+        episodes = _present(self.meta.episodes)
+        index, episode = np.asarray(columns["index"]), np.asarray(columns["episode_index"])
+        starts, stops = (np.asarray(episodes[name]) for name in ("dataset_from_index", "dataset_to_index"))
+        bounds = episode_bounds(index, episode, starts, stops, self.meta.root)
+        host = torch.device("cpu")
+        # LeRobot asks for a window of everything named observation.*, videos included, which are in files of their own.
+        deltas = {key: value for key, value in (dataset.reader.delta_indices or {}).items() if key in columns}
+        self._tables = {host: FrameTable(columns, bounds, deltas)}
+        self._host = self._tables[host]
+        tasks = [str(task) for task in _present(self.meta.tasks).index]
+        self._task_of = [tasks[task] for task in np.asarray(columns["task_index"]).tolist()]
 
     @staticmethod
-    def can_hold(dataset: Any) -> bool:
-        """Whether a data set is of the kind that fits: on disk, without images, videos or language columns."""
-        return (
-            isinstance(dataset, LeRobotDataset)
-            and not dataset.meta.camera_keys
-            and not dataset.meta.has_language_columns
-        )
+    def can_hold(dataset: Any, read: Collection[str] | None = None) -> bool:
+        """Whether a data set is of the kind that fits: on disk, without images or language columns, and without
+        videos that the policy looks at.
+
+        Args:
+            read: the observations that the policy reads; None where it may read any.
+        """
+        if not isinstance(dataset, LeRobotDataset) or dataset.meta.image_keys or dataset.meta.has_language_columns:
+            return False
+        videos = set(dataset.meta.video_keys)
+        return not videos if read is None else videos.isdisjoint(read)
 
     def __len__(self) -> int:
         return self.num_frames
@@ -73,57 +111,24 @@ class MemoryDataset(Dataset):
     def __getitem__(self, index: int) -> dict[str, Any]:
         return {key: values[0] for key, values in self.window_batch([index]).items()}
 
-    def __getitems__(self, indices: Sequence[int]) -> list[WindowBatch]:
+    def __getitems__(self, indices: Sequence[int]) -> list[WindowBatch | DeferredBatch]:
         """What torch's fetcher calls for a batch; one element, which is the batch."""
-        return [self.window_batch(indices)]
+        return [DeferredBatch(self, indices) if self.deferred else self.window_batch(indices)]
 
-    def window_batch(self, indices: Sequence[int]) -> WindowBatch:
-        """The collated batch of some frames.
+    def window_batch(self, indices: Sequence[int], device: torch.device | None = None) -> WindowBatch:
+        """The collated batch of some frames, see `FrameTable.batch`.
 
-        Returns:
-            A column with windows is `(B, window, n)` and has a mask `KEY_is_pad` `(B, window)`, true where the window
-            leaves the episode and repeats its first or last frame; any other column is `(B, n)`, or `(B,)` for n = 1.
+        Args:
+            device: where it is gathered; all frames are copied there the first time.
         """
+        table = self._host
         rows = torch.as_tensor(indices)
-        windows: dict[tuple[int, ...], tuple[Tensor, Tensor]] = {}
-        for deltas in map(tuple, self._delta_indices.values()):
-            if deltas not in windows:
-                windows[deltas] = self._window(rows, deltas)
-        batch = WindowBatch()
-        for key, values in self._columns.items():
-            positions = windows[tuple(self._delta_indices[key])][0] if key in self._delta_indices else rows
-            batch[key] = values[positions] if isinstance(values, Tensor) else [values[row] for row in indices]
-        for key, deltas in self._delta_indices.items():
-            # A copy for each key, since what LeRobot collates shares nothing either.
-            batch[f"{key}_is_pad"] = windows[tuple(deltas)][1].clone()
-        batch["task"] = [self._tasks[task] for task in batch["task_index"].tolist()]
+        if device is not None and device.type != "cpu":
+            table = self._tables.get(device) or self._tables.setdefault(device, self._host.to(device))
+            rows = rows.pin_memory().to(device, non_blocking=True) if device.type == "cuda" else rows.to(device)
+        batch = WindowBatch(table.batch(rows, indices))
+        batch["task"] = [self._task_of[index] for index in indices]
         return batch
-
-    def _window(self, rows: Tensor, deltas: tuple[int, ...]) -> tuple[Tensor, Tensor]:
-        wanted = rows[:, None] + torch.tensor(deltas)  # (B, window)
-        first, last = self._first[rows, None], self._last[rows, None]
-        return wanted.clamp(first, last), (wanted < first) | (wanted > last)
-
-    def _episode_bounds(self) -> tuple[Tensor, Tensor]:
-        """Positions of the first and the last frame of each frame's episode, `(frames,)` each."""
-        index, episode = self._columns["index"].numpy(), self._columns["episode_index"].numpy()
-        episodes = _present(self.meta.episodes)
-        starts, stops = (np.asarray(episodes[column]) for column in ("dataset_from_index", "dataset_to_index"))
-        broken = np.flatnonzero(episode >= len(starts))
-        if not len(broken):
-            position = np.arange(len(index))
-            first = position - (index - starts[episode])
-            last = position + (stops[episode] - 1 - index)
-            inside = (first >= 0) & (last < len(index)) & (first <= position) & (position <= last)
-            at_first, at_last = first.clip(0, len(index) - 1), last.clip(0, len(index) - 1)
-            ordered = (index[at_first] == starts[episode]) & (index[at_last] == stops[episode] - 1)
-            broken = np.flatnonzero(~(inside & ordered))
-            if not len(broken):
-                return torch.from_numpy(first), torch.from_numpy(last)
-        raise RunError(
-            f"{self.meta.root}: expected the rows of each episode together and in order, as meta/episodes says, "
-            f"found otherwise in episode {episode[broken[0]]}"
-        )
 
 
 def _present[T](table: T | None) -> T:
@@ -131,25 +136,3 @@ def _present[T](table: T | None) -> T:
     if table is None:
         raise RunError("expected a data set with episodes, found an empty one")
     return table
-
-
-def _column(name: str, column: pa.ChunkedArray, features: dict[str, dict]) -> Tensor | list[str]:
-    """A column with the dtypes that LeRobot's own reader gives: float32, int64, bool, or texts."""
-    array = column.combine_chunks()
-    if isinstance(array, pa.ExtensionArray):
-        array = array.storage
-    if pa.types.is_string(array.type) or pa.types.is_large_string(array.type):
-        return array.to_pylist()
-    empty = array.null_count
-    while pa.types.is_nested(array.type):
-        array = array.flatten()
-        empty += array.null_count
-    if empty:
-        raise RunError(f"{name}: expected a value in every row, found {empty} empty ones")
-    values = array.to_numpy(zero_copy_only=False)
-    if values.dtype.kind == "f":
-        values = values.astype(np.float32)
-    elif values.dtype.kind in "iu":
-        values = values.astype(np.int64)
-    shape = tuple(features[name]["shape"])
-    return torch.from_numpy(values.reshape(len(column), *(() if shape == (1,) else shape)).copy())

@@ -1,7 +1,7 @@
 """LeRobot's own trainer, fed from memory."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 from lerobot.configs.train import TrainPipelineConfig
@@ -40,7 +40,9 @@ def _datasets_in_memory() -> Iterator[None]:
 def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:
     if not config.resume:  # a resumed run goes on with the episodes that it began with
         _leave_out_discarded(config)
-    return tuple(None if dataset is None else _in_memory(dataset) for dataset in original(config))
+    # The co-policy says what it reads; any other policy takes what it finds.
+    read = getattr(config.policy, "observation_keys", None)
+    return tuple(None if dataset is None else _in_memory(dataset, read) for dataset in original(config))
 
 
 def _leave_out_discarded(config: TrainPipelineConfig) -> None:
@@ -54,8 +56,12 @@ def _leave_out_discarded(config: TrainPipelineConfig) -> None:
     source.episodes = training_episodes(source.episodes, meta.total_episodes, [bool(mark) for mark in marked])
 
 
-def _in_memory(dataset):
-    if MemoryDataset.can_hold(dataset):
+def _in_memory(dataset, read: Collection[str] | None):
+    if MemoryDataset.can_hold(dataset, read):
+        if dataset.meta.video_keys:
+            logging.info("The policy does not look at %s: no video is decoded", ", ".join(dataset.meta.video_keys))
         return MemoryDataset(dataset)
-    logging.warning("The data set has images or is streamed: frames come through LeRobot's own loader")
+    logging.warning(
+        "The policy may look at images of the data set, or it is streamed: frames come through LeRobot's own loader"
+    )
     return dataset

@@ -11,7 +11,7 @@ from copolicy.collect.controllers.checkpoint import Checkpoint
 
 _SETTINGS = (
     "preset", "past_human_action", "network", "prediction_type", "observation_features", "sampler",
-    "num_inference_steps", "initial_noise_scale", "horizon", "n_obs_steps",
+    "num_inference_steps", "planner", "backend", "initial_noise_scale", "horizon", "n_obs_steps",
 )  # fmt: skip
 
 
@@ -23,6 +23,7 @@ class Planner:
         frames: how many observations a plan is made from.
         planning_seconds: wall time of each call of `plan`, s.
         batch_sizes: number of tables in each call.
+        actions: how many actions of a plan are wanted from the current frame on, the fewer the faster; None for all.
     """
 
     def __init__(self, path: Path | str, device: str = "cpu", **settings: Any):
@@ -37,6 +38,7 @@ class Planner:
         self.frames = self.checkpoint.frames
         self.planning_seconds: list[float] = []
         self.batch_sizes: list[int] = []
+        self.actions: int | None = None
 
     def seed(self, seed: int) -> None:
         """Sets the source of the plans' noise."""
@@ -49,10 +51,10 @@ class Planner:
             history: observation keys to `(B, frames, n)` in physical units.
 
         Returns:
-            `(B, frames of the plan, 4)` joint actions in [-1, 1], the first for the current frame.
+            `(B, actions, 4)` joint actions in [-1, 1], the first for the current frame.
         """
         started = perf_counter()
-        plans = self.checkpoint.plan_batch(history)
+        plans = self.checkpoint.plan_batch(history, self.actions)
         self.planning_seconds.append(perf_counter() - started)
         self.batch_sizes.append(len(plans))
         return plans

@@ -26,8 +26,13 @@ def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
     }
 
 
-def summarise(outcomes: Sequence[Outcome], planner: Planner) -> dict[str, Any]:
-    """The summary of `eval.json`. Times to completion count successes only, as the paper's do."""
+def summarise(outcomes: Sequence[Outcome], planner: Planner | None) -> dict[str, Any]:
+    """The summary of `eval.json`. Times to completion count successes only, as the paper's do.
+
+    Args:
+        planner: whose planning time is told; None where nothing planned.
+    """
+    planning_seconds, tables = (planner.planning_seconds, sum(planner.batch_sizes)) if planner else ([], 0)
     rows = [outcome.to_json() for outcome in outcomes]
     reasons: dict[str, int] = defaultdict(int)
     by_map: dict[str, list[bool]] = defaultdict(list)
@@ -42,8 +47,8 @@ def summarise(outcomes: Sequence[Outcome], planner: Planner) -> dict[str, Any]:
         "ended_by": dict(sorted(reasons.items())),
         "time_to_completion_s": _spread([row["time_s"] for row in rows if row["success"]]),
         "interaction_force": {"mean": float(forces.mean()), "p95": float(np.quantile(forces, 0.95))},
-        "planning_ms_per_call": _spread([1e3 * seconds for seconds in planner.planning_seconds]),
-        "planning_ms_per_table": 1e3 * sum(planner.planning_seconds) / max(1, sum(planner.batch_sizes)),
+        "planning_ms_per_call": _spread([1e3 * seconds for seconds in planning_seconds]),
+        "planning_ms_per_table": 1e3 * sum(planning_seconds) / tables if tables else None,
         "by_obstacles": {count: success_rate(flags) for count, flags in sorted(by_obstacles.items())},
         "by_map": {
             name: {"success": sum(flags) / len(flags), "episodes": len(flags)} for name, flags in by_map.items()

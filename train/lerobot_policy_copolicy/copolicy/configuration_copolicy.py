@@ -14,9 +14,11 @@ from .presets import PRESETS
 
 _CHOICES = {
     "network": ("transformer", "mlp"),
-    "observation_features": ("absolute", "relative"),
+    "observation_features": ("absolute", "relative", "scan"),
     "prediction_type": ("epsilon", "sample", "v_prediction"),
-    "sampler": ("ddpm", "ddim"),
+    "sampler": ("ddpm", "ddim", "dpmsolver++"),
+    "planner": ("fast", "plain"),
+    "backend": ("torch", "onnx"),
 }
 
 
@@ -50,7 +52,7 @@ class CopolicyConfig(PreTrainedConfig):
     drop_n_last_frames: int | None = None  # frames at the end of an episode that start no training sample
     do_mask_loss_for_padding: bool = False  # leave actions beyond either end of the episode out of the loss
 
-    observation_features: str | None = None  # "absolute" positions or "relative" to the table
+    observation_features: str | None = None  # "absolute" positions, "relative" ones, or "scan": those and a range scan
     mirror: bool | None = None  # mirror half of the training samples in y
     permute_obstacles: bool | None = None  # shuffle the order of the obstacles in training samples
 
@@ -66,9 +68,11 @@ class CopolicyConfig(PreTrainedConfig):
     beta_schedule: str = "squaredcos_cap_v2"  # noise schedule, by its name in diffusers
     prediction_type: str | None = None  # what the network predicts: "epsilon", "sample" or "v_prediction"
     clip_sample_range: float = 1.0  # the sample is clipped to plus and minus this at each sampling step
-    sampler: str | None = None  # "ddpm" or "ddim"
+    sampler: str | None = None  # "ddpm", "ddim" or "dpmsolver++"
     num_inference_steps: int | None = None  # sampling steps of a plan
     initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
+    planner: str = "fast"  # "fast", or "plain": the same plans without its savings, to compare with
+    backend: str = "torch"  # what runs the network of a plan: "torch", or "onnx" (ONNX Runtime, on a CPU)
 
     ema: bool = True  # plan with an exponential moving average of the weights
     ema_power: float = 0.75  # its decay after n updates is 1 - (1 + n / inv_gamma) ** -power
@@ -119,6 +123,8 @@ class CopolicyConfig(PreTrainedConfig):
             )
         if self.network == "transformer" and filled.width % filled.n_heads:
             raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
+        if self.backend == "onnx" and self.planner == "plain":
+            raise InvalidValueError("backend, for planner=plain", "torch", self.backend)
         if filled.initial_noise_scale < 0:
             raise InvalidValueError("initial_noise_scale", "zero or more", self.initial_noise_scale)
         if any(mode is not NormalizationMode.IDENTITY for mode in self.normalization_mapping.values()):

@@ -33,6 +33,7 @@ class MlpDenoiser(nn.Module):
         width: int = 384,
     ):
         super().__init__()
+        self.horizon = horizon
         self.step_encoder = nn.Sequential(
             SinusoidalEmbedding(_STEP_SIZE), nn.Linear(_STEP_SIZE, width), nn.SiLU(), nn.Linear(width, width)
         )

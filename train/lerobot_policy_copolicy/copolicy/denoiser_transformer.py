@@ -22,6 +22,9 @@ class TransformerDenoiser(nn.Module):
         embedding_dropout: dropout after the embeddings.
     """
 
+    causal_mask: Tensor
+    memory_mask: Tensor
+
     def __init__(
         self,
         action_size: int,
@@ -36,6 +39,7 @@ class TransformerDenoiser(nn.Module):
         embedding_dropout: float = 0.0,
     ):
         super().__init__()
+        self.n_heads = n_heads
         self.action_embedding = nn.Linear(action_size, width)
         self.action_position = nn.Parameter(torch.empty(1, horizon, width))
         self.step_embedding = SinusoidalEmbedding(width)

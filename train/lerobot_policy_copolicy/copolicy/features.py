@@ -10,6 +10,8 @@ from torch import Tensor, nn
 from copolicy.dataset.features import BOUNDS, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import MAX_OBSTACLES
 
+from .range_scan import RAYS, RangeScan
+
 _GOAL = ENVIRONMENT_NAMES.index("goal_x")
 _OBSTACLES = ENVIRONMENT_NAMES.index("obstacle_0_x")
 
@@ -72,6 +74,20 @@ class RelativeFeatures(nn.Module):
         if self.past_human_action:
             parts.append(observation[HUMAN_ACTION])
         return torch.cat(parts, dim=-1)
+
+
+class ScanFeatures(RelativeFeatures):
+    """The map as seen from the table (`RelativeFeatures`), and a range scan of obstacles and walls (`RangeScan`)."""
+
+    def __init__(self, past_human_action: bool):
+        super().__init__(past_human_action)
+        self.size += RAYS
+        self.scan = RangeScan()
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Observation columns `(..., n)` in px, rad and s to `(..., size)`."""
+        obstacles = observation[ENVIRONMENT_STATE][..., _OBSTACLES:].unflatten(-1, (MAX_OBSTACLES, 2))
+        return torch.cat((super().forward(observation), self.scan(observation[STATE][..., :2], obstacles)), dim=-1)
 
 
 def _register_scale(module: nn.Module, keys: tuple[str, ...]) -> None:

@@ -21,12 +21,15 @@ from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
 from .diffusion import PlanDiffusion
 from .ema import ExponentialMovingAverage
-from .features import AbsoluteFeatures, RelativeFeatures
+from .fast_planner import FastPlanner
+from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
+from .onnx_denoiser import require_onnx
 
 _ACTION_SIZE = FEATURES[ACTION]["shape"][0]
 _PADDING = f"{ACTION}_is_pad"
 _SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
 _DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
+_FEATURES = {"absolute": AbsoluteFeatures, "relative": RelativeFeatures, "scan": ScanFeatures}
 _NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": (MlpDenoiser, _SIZES)}
 
 
@@ -62,10 +65,12 @@ class CopolicyPolicy(PreTrainedPolicy):
         if unused:
             logging.info("the co-policy does not read %s", ", ".join(unused))
         self.config = config
-        features = AbsoluteFeatures if config.observation_features == "absolute" else RelativeFeatures
-        self.features = features(config.past_human_action)
+        self.features = _FEATURES[config.filled.observation_features](config.past_human_action)
         self.denoiser = _make_denoiser(config, self.features.size)
         self.diffusion = PlanDiffusion(config)
+        if config.backend == "onnx":
+            require_onnx()
+        self._fast = FastPlanner(self.diffusion.table, config.backend) if config.planner == "fast" else None
         self.ema = (
             ExponentialMovingAverage(self.denoiser, config.ema_power, config.ema_inv_gamma, config.ema_max_decay)
             if config.ema
@@ -128,20 +133,27 @@ class CopolicyPolicy(PreTrainedPolicy):
 
     @torch.no_grad()
     def plan(
-        self, batch: dict[str, Tensor], generator: torch.Generator | None = None, noise: Tensor | None = None
+        self,
+        batch: dict[str, Tensor],
+        generator: torch.Generator | None = None,
+        noise: Tensor | None = None,
+        actions: int | None = None,
     ) -> Tensor:
-        """A whole plan for each history; keeps no state.
+        """A plan for each history; keeps no state.
 
         Args:
             batch: observation columns `(B, To, n)`, oldest frame first, in physical units.
             generator: source of the noise; the global one if None.
             noise: `(B, T, 4)` standard normal to start from, instead of a draw.
+            actions: how many are wanted from the current frame on. The plan ends there and is the same up to there;
+                the fewer, the faster. All of them if None.
 
         Returns:
-            `(B, T, 4)` actions in [-1, 1]; token `To - 1` is that of the current frame.
+            `(B, To - 1 + actions, 4)` in [-1, 1], a whole plan being `(B, T, 4)`; token `To - 1` is that of the
+            current frame.
 
         Raises:
-            InvalidValueError: a column is missing.
+            InvalidValueError: a column is missing, or more actions are wanted than a plan holds.
             ShapeError: a column has another shape.
         """
         observation = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
@@ -152,10 +164,13 @@ class CopolicyPolicy(PreTrainedPolicy):
             noise = torch.randn(shape, generator=generator, device=source)
         elif noise.shape != shape:
             raise ShapeError("noise", shape, tuple(noise.shape))
+        noise, tokens = noise.to(condition.device), self._tokens(actions)
         network = self.denoiser if self.ema is None else self.ema.model
-        return self.diffusion.sample(
-            lambda actions, steps: network(actions, steps, condition), noise.to(condition.device), generator
-        )
+        if self._fast is not None:
+            return self._fast.plan(network, condition, noise, tokens, generator)
+        return self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)[
+            :, :tokens
+        ]
 
     @torch.no_grad()
     def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
@@ -171,8 +186,8 @@ class CopolicyPolicy(PreTrainedPolicy):
         """
         if all(key in batch and batch[key].ndim == 2 for key in self.config.observation_keys):
             batch = self._observe(batch)
-        first = self.config.n_obs_steps - 1
-        return self.plan(batch, **kwargs)[:, first : first + self.config.n_action_steps]
+        plan = self.plan(batch, **kwargs, actions=self.config.n_action_steps)
+        return plan[:, self.config.n_obs_steps - 1 :]
 
     @torch.no_grad()
     def select_action(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
@@ -197,6 +212,13 @@ class CopolicyPolicy(PreTrainedPolicy):
             while len(frames) < self.config.n_obs_steps:
                 frames.append(frames[-1])
         return {key: torch.stack(tuple(frames), dim=1) for key, frames in self._history.items()}
+
+    def _tokens(self, actions: int | None) -> int:
+        """How many tokens of a plan end with the wanted action."""
+        most = self.config.horizon - self.config.n_obs_steps + 1
+        if actions is not None and not 1 <= actions <= most:
+            raise InvalidValueError("actions", f"1 to {most}", actions)
+        return self.config.n_obs_steps - 1 + (actions or most)
 
     def _augmented(self, sample: dict[str, Tensor]) -> dict[str, Tensor]:
         if self.config.mirror:

@@ -31,7 +31,7 @@ PRESETS: dict[str, dict] = {
 # effect), a table-relative view of goal and obstacles, the task's symmetries, and ten deterministic sampling steps.
 PRESETS["default"] = {
     **PRESETS["paper"],
-    "observation_features": "relative",
+    "observation_features": "scan",
     "mirror": True,
     "permute_obstacles": True,
     "prediction_type": "sample",

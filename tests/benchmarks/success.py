@@ -1,0 +1,153 @@
+"""What moves the co-policy's success: trains and evaluates one setting after the other, over several seeds.
+
+Demonstrations and partners are simulated pairs: none of these figures is a human result. Each row is a list of flags
+beyond the base command; rows whose results are in the folder already are not run again. An hour and more on a CPU:
+
+    uv run python tests/benchmarks/success.py --out outputs/success --rows codp-h codp --seeds 0 1 2
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+MAPS = ("holdout", "unseen")
+BATCH = 512
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting of the study."""
+
+    flags: tuple[str, ...] = ()
+    recipe: str = "pairs-sim-376"
+    steps: int = 6000
+    batch: int = BATCH
+    evaluation: tuple[str, ...] = ()
+
+
+def _policy(**settings: object) -> tuple[str, ...]:
+    return tuple(f"--policy.{name}={str(value).lower()}" for name, value in settings.items())
+
+
+_PAPER = {
+    "observation_features": "absolute", "prediction_type": "epsilon", "mirror": False, "permute_obstacles": False,
+    "sampler": "ddpm", "num_inference_steps": 100, "initial_noise_scale": 1.0,
+}  # fmt: skip
+_TRANSFORMER = {
+    "network": "transformer", "n_layers": 2, "width": 64, "n_heads": 4, "feedforward_width": 256,
+}  # fmt: skip
+ROWS = {
+    "codp-h": Row(),
+    "codp": Row(_policy(past_human_action=False)),
+    "no-symmetry": Row(_policy(mirror=False, permute_obstacles=False)),
+    "mirror-only": Row(_policy(permute_obstacles=False)),
+    "permutation-only": Row(_policy(mirror=False)),
+    "relative": Row(_policy(observation_features="relative")),
+    "absolute": Row(_policy(observation_features="absolute")),
+    "epsilon": Row(_policy(prediction_type="epsilon")),
+    "full-noise": Row(_policy(initial_noise_scale=1.0)),
+    "paper-settings": Row(_policy(**_PAPER)),
+    "paper-settings-long": Row(_policy(**_PAPER), steps=20000),
+    "wide-pairs": Row(recipe="pairs-sim-376-wide"),
+    "orientations": Row(recipe="pairs-sim-376-orientations", evaluation=("--orientations",)),
+    "turned": Row(evaluation=("--orientations",)),
+    "transformer": Row(_policy(**_TRANSFORMER), steps=12000, batch=256),
+    "transformer-codp": Row(_policy(**_TRANSFORMER, past_human_action=False), steps=12000, batch=256),
+    "long": Row(steps=20000),
+}
+
+
+def main() -> None:
+    """Runs the rows and prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS))
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
+    arguments = parser.parse_args()
+    for seed in arguments.seeds:
+        for name in arguments.rows:
+            run(arguments.out, name, seed)
+    print(table(arguments.out))
+
+
+def run(out: Path, name: str, seed: int) -> None:
+    """Trains and evaluates one row with one seed, as far as it is not done."""
+    row = ROWS[name]
+    folder = out / name / f"seed_{seed}"
+    dataset = _data_set(out, row.recipe)
+    training = folder / "training"
+    if not (training / "checkpoints" / "last").exists():
+        started = perf_counter()
+        _command(
+            "copolicy-train", "--policy.type=copolicy", "--policy.preset=small", "--policy.device=cpu",
+            f"--dataset.repo_id=local/{row.recipe}", f"--dataset.root={dataset}", f"--output_dir={training}",
+            f"--steps={row.steps}", f"--batch_size={row.batch}", f"--seed={seed}", f"--save_freq={row.steps}",
+            f"--log_freq={row.steps}", "--env_eval_freq=0", *row.flags, log=folder / "training.log",
+        )  # fmt: skip
+        (folder / "seconds.json").write_text(json.dumps(perf_counter() - started))
+    for maps in MAPS:
+        result = folder / f"{maps}.json"
+        if not result.exists():
+            _command(
+                "copolicy-eval", "coplan", "--policy", str(training), "--maps", maps, "--out", str(result),
+                *row.evaluation, log=folder / f"{maps}.log",
+            )  # fmt: skip
+    print(name, seed, *(f"{maps} {_successes(folder / f'{maps}.json').mean():.3f}" for maps in MAPS), flush=True)
+
+
+def table(out: Path) -> str:
+    """Mean and standard error over seeds of each row that has results, in percent."""
+    lines = ["| setting | samples | seeds | s of training | holdout % | unseen % |", "|---|---:|---:|---:|---:|---:|"]
+    for name, row in ROWS.items():
+        folders = [path.parent for path in sorted((out / name).glob("seed_*/unseen.json"))]
+        if folders:
+            seconds = np.mean([json.loads((folder / "seconds.json").read_text()) for folder in folders])
+            cells = [_mean([_successes(folder / f"{maps}.json").mean() for folder in folders]) for maps in MAPS]
+            samples = f"{row.steps * row.batch / 1e6:.1f} M"
+            lines.append(f"| {name} | {samples} | {len(folders)} | {seconds:.0f} | {cells[0]} | {cells[1]} |")
+    return "\n".join(lines)
+
+
+def _mean(rates: list[float]) -> str:
+    values = 100 * np.array(rates)
+    if len(values) == 1:
+        return f"{values[0]:.1f}"
+    return f"{values.mean():.1f} ± {values.std(ddof=1) / len(values) ** 0.5:.1f}"
+
+
+def _successes(result: Path) -> np.ndarray:
+    return np.array([episode["success"] for episode in json.loads(result.read_text())["episodes"]])
+
+
+def _data_set(out: Path, recipe: str) -> Path:
+    dataset, recordings = out / "data" / recipe, out / "data" / f"{recipe}-recordings"
+    if not dataset.exists():
+        log = out / "data" / f"{recipe}.log"
+        _command("copolicy-collect", "simulate", "--recipe", recipe, "--out", str(recordings), log=log)
+        _command(
+            "copolicy-convert", "mcap", str(recordings), "--root", str(dataset), "--repo-id", f"local/{recipe}",
+            "--license", "cc0-1.0", log=log,
+        )  # fmt: skip
+    return dataset
+
+
+def _command(name: str, *flags: str, log: Path) -> None:
+    log.parent.mkdir(parents=True, exist_ok=True)
+    program = str(Path(sysconfig.get_path("scripts")) / name)
+    environment = {"ACCELERATE_MIXED_PRECISION": "bf16", "OMP_NUM_THREADS": "1", **os.environ, "HF_HUB_OFFLINE": "1"}
+    with log.open("a") as file:
+        status = subprocess.run([program, *flags], env=environment, stdout=file, stderr=file).returncode
+    if status:
+        sys.exit(f"{name} ended with status {status}; see {log}")
+
+
+if __name__ == "__main__":
+    main()

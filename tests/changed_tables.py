@@ -1,0 +1,37 @@
+"""Tables of sound episodes with one thing changed, and what a rule finds in them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from copolicy.dataset.checks.checking import RULES
+from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.finding import Finding
+
+BY_NAME = {rule.name: rule for rule in RULES}
+
+
+def find(table: EpisodeTable, rule: str) -> list[Finding]:
+    return list(BY_NAME[rule].find(table))
+
+
+def of(findings: list[Finding]) -> list[tuple[str, str]]:
+    return [(finding.episode, finding.severity) for finding in findings]
+
+
+def with_frames(table: EpisodeTable, name: str, change) -> EpisodeTable:
+    values = table.frames[name].copy()
+    change(values)
+    return replace(table, frames={**table.frames, name: values})
+
+
+def with_column(table: EpisodeTable, name: str, values) -> EpisodeTable:
+    return replace(table, columns={**table.columns, name: np.array(values)})
+
+
+def with_entry(table: EpisodeTable, name: str, place: int, value) -> EpisodeTable:
+    return with_column(table, name, [*table.columns[name][:place], value, *table.columns[name][place + 1 :]])
+
+
+def all_frames(table: EpisodeTable, episode: int) -> slice:
+    return slice(table.starts[episode], table.ends[episode] + 1)

@@ -1,0 +1,342 @@
+"""The human study: its design, its statistics, and a session with a simulated player at the human seat."""
+
+import json
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from scipy import stats
+from untrained_policy import save_untrained_policy
+
+from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.session import recordings
+from copolicy.collect.simulate import simulate
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.log import read_episode
+from copolicy.dataset.task import MapConfig
+from copolicy.train.eval_cli import main
+from copolicy.train.human_study.latin_square import williams_square
+from copolicy.train.human_study.plan import Robot, StudyPlan, make_plan
+from copolicy.train.human_study.questionnaire import read_ratings
+from copolicy.train.human_study.repeated_measures import anova, rank_test, tukey
+from copolicy.train.human_study.schedule import BlindPlanner
+from copolicy.train.human_study.session import run_session
+from copolicy.train.human_study.summary import summarise_study
+from copolicy.train.partner_study.configurations import study_configurations
+from copolicy.train.result_file import write_json
+
+SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
+"""Straight ahead, about a second away."""
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_every_condition_comes_everywhere_and_after_every_other_one(count):
+    square = williams_square(count)
+    rows = len(square)
+    assert rows == (count if count % 2 == 0 else 2 * count)
+    assert all(sorted(row) == list(range(count)) for row in square)
+    for place in range(count):
+        assert set(Counter(row[place] for row in square).values()) == {rows // count}
+    after = Counter(pair for row in square for pair in pairwise(row))
+    assert set(after.values()) == {rows // count}
+    assert len(after) == count * (count - 1)
+
+
+ROBOTS = (Robot("CoDP-H", "a", "1"), Robot("CoDP", "b", "2"))
+
+
+def test_a_plan_pairs_starts_within_a_person_and_counterbalances_robots():
+    plan = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 0)
+    assert list(plan.trials) == [f"P{k:02d}" for k in range(1, 11)]
+    firsts = Counter()
+    for trials in plan.trials.values():
+        assert [trial.block for trial in trials] == [1] * 12 + [2] * 12
+        one, other = ([t for t in trials if t.block == block] for block in (1, 2))
+        assert {t.robot for t in one} != {t.robot for t in other}
+        assert {t.configuration for t in one} == {t.configuration for t in other}
+        assert len({t.configuration for t in one}) == 12
+        assert [t.configuration for t in one] != [t.configuration for t in other]
+        assert len({t.code for t in trials}) == 24
+        firsts[one[0].robot] += 1
+    assert firsts == {"CoDP-H": 5, "CoDP": 5}
+    used = Counter(t.configuration for trials in plan.trials.values() for t in trials)
+    assert set(used.values()) == {4}
+    assert len(used) == 60
+    same = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 0)
+    other = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 1)
+    assert plan == same
+    assert plan.plan_id != other.plan_id
+
+
+def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
+    path = tmp_path / "plan.json"
+    write_json(path, plan.to_json())
+    assert StudyPlan.read(path) == plan
+    content = json.loads(path.read_text())
+    content["trials"]["P01"][0]["robot"] = "CoDP"
+    content["trials"]["P01"][1]["robot"] = "CoDP"
+    content["trials"]["P01"][2]["robot"] = "CoDP-H"
+    content["trials"]["P01"][3]["robot"] = "CoDP-H"
+    content["seed"] = 4
+    path.write_text(json.dumps(content))
+    with pytest.raises(FileFormatError) as error:
+        StudyPlan.read(path)
+    assert f"{path}: expected the plan {plan.plan_id} as it was made, found a changed one, " in str(error.value)
+    path.write_text('{"study_plan": 1}')
+    with pytest.raises(FileFormatError, match="expected a plan of copolicy-eval human plan, found none: KeyError"):
+        StudyPlan.read(path)
+
+
+VALUES = np.array([[8.0, 7, 6, 7], [6, 5, 3, 4], [7, 6, 4, 8], [5, 5, 2, 3], [6, 7, 5, 6]])
+
+
+def test_the_anova_is_that_of_two_factors_without_interaction():
+    found = anova(VALUES)
+    assert found is not None
+    # Independent: the model fitted by least squares with and without conditions.
+    n, k = VALUES.shape
+    person, condition = np.repeat(np.arange(n), k), np.tile(np.arange(k), n)
+    people, conditions = np.eye(n)[person], np.eye(k)[condition][:, 1:]
+    residuals = [
+        float(np.linalg.lstsq(design, VALUES.ravel(), rcond=None)[1][0])
+        for design in (people, np.hstack((people, conditions)))
+    ]
+    f = ((residuals[0] - residuals[1]) / (k - 1)) / (residuals[1] / ((n - 1) * (k - 1)))
+    assert found["F"] == pytest.approx(f)
+    assert found["df"] == [3, 12]
+    assert found["p"] == pytest.approx(stats.f.sf(f, 3, 12))
+    assert 1 / 3 <= found["epsilon"] <= 1
+    assert found["p"] < found["p_greenhouse_geisser"] < 0.05
+
+
+def test_two_conditions_are_a_paired_t_test():
+    two = VALUES[:, 1:3]
+    expected = stats.ttest_rel(two[:, 0], two[:, 1])
+    found = anova(two)
+    assert found is not None
+    assert found["F"] == pytest.approx(expected.statistic**2)
+    assert found["p"] == pytest.approx(expected.pvalue)
+    assert found["epsilon"] == pytest.approx(1.0)
+    (pair,) = tukey(two, ("a", "b"))
+    assert pair["difference"] == pytest.approx(2.0)
+    assert pair["tukey"]["p"] == pytest.approx(expected.pvalue, rel=1e-3)
+    interval = expected.confidence_interval(0.95)
+    assert pair["tukey"]["interval_95"] == pytest.approx([interval.low, interval.high], rel=1e-3)
+    assert len(tukey(VALUES, "abcd")) == 6
+
+
+def test_what_cannot_be_tested_is_not():
+    assert anova(VALUES[:1]) is None
+    assert anova(np.ones((4, 3))) is None
+    assert tukey(np.ones((4, 2)), "ab")[0] == {"first": "a", "second": "b", "difference": 0.0, "tukey": None}
+    assert rank_test(np.ones((4, 3))) is None
+    assert rank_test(VALUES)["p"] == pytest.approx(stats.friedmanchisquare(*VALUES.T).pvalue)  # pyright: ignore
+    assert rank_test(VALUES[:, 1:3])["test"] == "Wilcoxon signed rank"  # pyright: ignore
+
+
+def _rows(source="human"):
+    """Three people, two robots, two episodes each: the first robot is better, by another amount for each person."""
+    return [
+        {
+            "participant": f"P0{person}", "robot": robot, "source": source, "success": not (robot == "B" and k < gap),
+            "time_s": 10.0 + person + (gap + 1 if robot == "B" else 0), "interaction_mean": 0.1 * (1 + (robot == "B")),
+            "interaction_p95": 0.3, "planning_ms": None,
+        }
+        for person, gap in ((1, 0), (2, 1), (3, 2))
+        for robot in "AB"
+        for k in range(2)
+    ]  # fmt: skip
+
+
+def test_a_summary_is_within_persons_and_says_who_they_were():
+    summary = summarise_study(_rows())
+    assert summary["label"] == "human-in-the-loop study: people at the human seat"
+    a, b = summary["robots"]["A"], summary["robots"]["B"]
+    assert (a["success"]["mean"], b["success"]["mean"]) == (1.0, 0.5)
+    assert b["success"]["standard_error"] == pytest.approx(0.5 / np.sqrt(3))
+    assert (b["time_s"]["mean"], b["time_s"]["participants"]) == (13.0, 2)  # the third never succeeded with B
+    assert a["planning_ms"] == {"mean": None, "standard_error": None, "participants": 0}
+    assert summary["tests"]["success"]["anova"]["F"] == pytest.approx(3.0)
+    assert summary["tests"]["time_s"]["anova"]["participants"] == 2
+    assert summary["tests"]["interaction_mean"]["anova"] is None  # the same difference for everybody: no spread
+    assert summary["tests"]["interaction_mean"]["pairs"][0]["difference"] == pytest.approx(-0.1)
+    assert summarise_study(_rows("simulated"))["label"].startswith("SIMULATED")
+
+
+def test_people_and_simulated_players_are_not_mixed():
+    with pytest.raises(Exception, match="expected one source, found human and simulated: summarise them apart"):
+        summarise_study([*_rows(), *_rows("simulated")])
+
+
+def test_ratings_get_their_robot_from_the_plan(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 2, 1, 0)
+    path = tmp_path / "ratings.csv"
+    path.write_text("participant,block,fluent,trust\nP01,1,6,5\nP01,2,4,\nP02,1,3,4\nP02,2,7,4\n")
+    ratings = read_ratings(path, plan)
+    assert [row["robot"] for row in ratings] == [
+        next(t.robot for t in plan.of(row["participant"]) if t.block == row["block"]) for row in ratings
+    ]
+    assert ratings[1]["trust"] is None
+    summary = summarise_study(_rows(), ratings)["ratings"]
+    assert list(summary) == ["fluent", "trust"]
+    assert {robot["participants"] for robot in summary["fluent"]["robots"].values()} == {2}
+    assert sum(robot["mean"] for robot in summary["fluent"]["robots"].values()) == pytest.approx(10.0)
+    path.write_text("participant,block,fluent\nP01,1,good\n")
+    with pytest.raises(FileFormatError) as error:
+        read_ratings(path, plan)
+    assert str(error.value) == f"{path}: expected a number for 'fluent' in row 1, found 'good'"
+    path.write_text("participant,block,fluent\nP01,3,1\n")
+    with pytest.raises(FileFormatError) as error:
+        read_ratings(path, plan)
+    assert str(error.value) == f"{path}: expected blocks of plan {plan.plan_id}, found P01 block 3 in row 1"
+
+
+def test_only_the_chosen_robot_plans():
+    class One:
+        name, actions_per_plan = "one", 8
+
+        def __init__(self, value, frames):
+            self.value, self.frames = value, frames
+
+        def seed(self, seed):
+            self.value += seed
+
+        def plan(self, history):
+            return np.full((10, 4), self.value)
+
+    one, other = One(1.0, 2), One(2.0, 3)
+    blind = BlindPlanner({"one": one, "other": other}, 1)
+    assert (blind.name, blind.actions_per_plan, blind.frames) == ("study", 1, 2)
+    blind.choose("other")
+    blind.seed(5)
+    assert blind.frames == 3
+    assert blind.plan({})[0, 0] == 7.0
+    assert one.value == 1.0
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Path:
+    """A plan of two robots, a person and two short starts, with checkpoints that differ in their weights."""
+    folder = tmp_path_factory.mktemp("study")
+    robots = []
+    for name in ("first", "second"):
+        torch.manual_seed(len(robots))
+        robots.append(Robot.of(name, str(save_untrained_policy(folder / name))))
+    plan = make_plan(robots, "custom", SHORT, 1, 2, 0, settings={"num_inference_steps": 2})
+    write_json(folder / "plan.json", plan.to_json())
+    return folder
+
+
+def _summarise(capsys, *flags) -> Any:
+    status = main(["human", "summarise", *map(str, flags), "--json"])
+    captured = capsys.readouterr()
+    return json.loads(captured.out) if status == 0 else (status, captured.err.strip())
+
+
+def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(study, tmp_path, capsys):
+    plan = StudyPlan.read(study / "plan.json")
+    out = tmp_path / "recordings"
+    flags = ["--participant", "P01", "--out", str(out), "--human", "scripted:S02", "--headless", "--json"]
+    flags += ["--practice", "1", "--countdown", "0"]
+    assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["complete"] is True
+    assert (told["kept"], told["episodes"], told["plan"]) == (5, 4, plan.plan_id)
+    found = sorted(out.rglob("*.mcap"))
+    episodes = [read_episode(path) for path in found]
+    codes = [f"study:{plan.plan_id}:P01:{code}" for code in ("practice", *(t.code for t in plan.of("P01")))]
+    assert [episode.meta.controller_0 for episode in episodes] == codes
+    assert {episode.meta.controller_1 for episode in episodes} == {"scripted:S02"}
+    assert {episode.meta.source for episode in episodes} == {"simulated"}
+    assert [e.map_config for e in episodes[1:]] == [plan.configurations[t.configuration] for t in plan.of("P01")]
+    assert {episode.physics.step_limit for episode in episodes} == {2000}
+    # Nothing in a recording tells the robot; the plan does.
+    for name in ("first", "second"):
+        digest = next(robot.weights_sha256 for robot in plan.robots if robot.name == name)
+        assert not any(digest[:8].encode() in path.read_bytes() for path in found)
+
+    summary = _summarise(capsys, out, "--plan", study / "plan.json", "--out", tmp_path / "result.json")
+    assert summary["label"].startswith("SIMULATED")
+    assert (summary["episodes"], summary["planned"]) == (4, 4)
+    assert summary["left_out"] == {"practice, discarded or interrupted": 1}
+    assert {name: robot["episodes"] for name, robot in summary["robots"].items()} == {"first": 2, "second": 2}
+    assert summary["robots"]["first"]["success"]["mean"] == 1.0
+    assert summary["robots"]["first"]["planning_ms"]["mean"] is not None
+    assert summary["tests"]["time_s"]["anova"] is None  # one person
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert (result["study"], len(result["rows"])) == ("human", 4)
+    assert [row["robot"] for row in result["rows"]] == [trial.robot for trial in plan.of("P01")]
+    assert all(row["interaction_mean"] > 0 for row in result["rows"])
+    named = _summarise(capsys, out)
+    assert sorted(named["robots"]) == sorted(codes[1:])
+
+    # The last recording is taken away: the session is not finished, and plays that trial again.
+    found[-1].unlink()
+    assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
+    capsys.readouterr()
+    kept = [one for one in recordings(out) if one.counts]
+    assert read_episode(kept[-1].path).meta.controller_0 == codes[-1]
+    assert len(kept) == 4
+
+
+def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsys):
+    simulate(tmp_path, 1, 0, workers=1)
+    status, error = _summarise(capsys, tmp_path, "--plan", study / "plan.json")
+    assert status == 1
+    assert error == (
+        f"copolicy-eval: {tmp_path}: expected kept recordings of the study, found none (left out: "
+        "{'not of this plan': 1})"
+    )
+    assert _summarise(capsys, tmp_path / "none")[1].endswith(
+        "none: expected a folder of recordings, found no such folder"
+    )
+    status, error = _summarise(capsys, tmp_path, "--ratings", tmp_path / "r.csv")
+    assert (
+        error
+        == "copolicy-eval: --ratings: expected --plan beside it, which tells the robot of each block, found 'none'"
+    )
+
+
+def test_other_weights_than_the_plans_are_refused(study, tmp_path):
+    path = tmp_path / "policy"
+    save_untrained_policy(path)
+    robot = Robot("first", str(path), "0" * 64)
+    plan = make_plan((robot, ROBOTS[1]), "custom", SHORT, 1, 1, 0)
+    with pytest.raises(FileFormatError, match=f"{path}: expected the plan's weights {'0' * 12}, found weights "):
+        run_session(plan, "P01", PilotSpec("scripted", "S01"), tmp_path / "out", headless=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_plan_command_deals_sixty_starts_among_five_people(study, tmp_path, capsys):
+    flags = [f"A={study / 'first'}", f"B={study / 'second'}", "--out", str(tmp_path / "plan.json"), "--json"]
+    assert main(["human", "plan", *flags]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["participants"] == ["P01", "P02", "P03", "P04", "P05"]
+    assert told["episodes_per_participant"] == 24
+    assert told["counterbalanced"] == "2 orders of robots: complete only with a multiple of 2 participants"
+    plan = StudyPlan.read(tmp_path / "plan.json")
+    assert Counter(t.configuration for trials in plan.trials.values() for t in trials) == dict.fromkeys(range(60), 2)
+    assert main(["human", "plan", *flags]) == 2
+    assert "nothing was overwritten" in capsys.readouterr().err
+    assert main(["human", "plan", str(study / "first"), "--out", str(tmp_path / "b.json")]) == 2
+    assert capsys.readouterr().err.startswith("copolicy-eval: NAME=CKPT: expected a name for each robot, found '")
+    assert main(["human", "plan", flags[0], "--out", str(tmp_path / "b.json")]) == 2
+    assert capsys.readouterr().err == (
+        "copolicy-eval: CKPT: expected at least two robots of different names, found ['A']\n"
+    )
+
+
+def test_wrong_calls_of_run_are_one_line(study, tmp_path, capsys):
+    plan = str(study / "plan.json")
+    assert main(["human", "run", plan, "--participant", "P09", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "copolicy-eval: unknown participant 'P09'; available: P01\n"
+    flags = ["--participant", "P01", "--out", str(tmp_path), "--human", "replay:x"]
+    assert main(["human", "run", plan, *flags]) == 2
+    assert capsys.readouterr().err == (
+        "copolicy-eval: --human: expected joystick, keyboard or scripted[:PAIR], found 'replay:x'\n"
+    )

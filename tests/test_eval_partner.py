@@ -1,0 +1,265 @@
+"""Simulated partners at the human seat: are they different people, is the protocol kept, what does a study say?"""
+
+import hashlib
+import json
+import math
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from untrained_policy import save_untrained_policy
+
+from copolicy.cards.cli import main as cards
+from copolicy.collect.pilots import Habits, ScriptedPilot
+from copolicy.collect.pilots.partners import PARTNERS, simulated_partner
+from copolicy.collect.world import TableWorld
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.task import MAP_SETS, Physics
+from copolicy.train.eval_cli import main
+from copolicy.train.partner_study.configurations import study_configurations
+from copolicy.train.partner_study.outcome import PartnerOutcome
+from copolicy.train.partner_study.robots import PolicyRobot, never_yields, passive
+from copolicy.train.partner_study.study import carry_with_partners
+from copolicy.train.partner_study.summary import differences, summarise_with_partners
+
+MAPS = MAP_SETS["training"][6:84:14]
+
+
+@pytest.fixture(scope="module")
+def habits():
+    """What an observer measures of each kind, with the same usual robot on the same maps."""
+    measured = {}
+    for kind in PARTNERS:
+        seconds, changes, effort, unrest = [], [], [], []
+        for seed, config in enumerate(MAPS):
+            robot, partner = ScriptedPilot(0, config, Habits(), seed), simulated_partner(config, kind, seed)
+            world, forces, outcome = TableWorld(config, Physics(step_limit=2000)), [], None
+            while outcome is None or not outcome.done:
+                state = world.observation
+                forces.append(partner.act(state))
+                outcome = world.step(np.concatenate((robot.act(state), forces[-1])))
+            seconds.append(len(forces) / 30)
+            changes.append(partner.intention.changes)
+            effort.append(np.hypot(*np.transpose(forces)).mean())
+            unrest.append(np.abs(np.diff(forces, axis=0)).mean())
+        measured[kind] = tuple(float(np.mean(one)) for one in (seconds, changes, effort, unrest))
+    return measured
+
+
+def test_kinds_of_partner_differ_in_what_can_be_measured(habits):
+    seconds, changes, effort, unrest = ({kind: one[k] for kind, one in habits.items()} for k in range(4))
+    assert seconds["slow"] == max(seconds.values()) > 1.2 * seconds["stubborn"]
+    assert changes["stubborn"] < min(changes["follower"], changes["erratic"])
+    assert effort["follower"] < 0.65 * effort["stubborn"]
+    assert unrest["erratic"] > 1.5 * max(unrest[kind] for kind in ("stubborn", "follower", "slow"))
+
+
+def test_a_partner_wants_its_route_whoever_the_other_is():
+    first, second = (simulated_partner(MAPS[0], "erratic", 5) for _ in range(2))
+    assert first.intention.route.sides == second.intention.route.sides
+    wishes = {simulated_partner(MAPS[0], "erratic", seed).intention.route.sides for seed in range(12)}
+    assert len(wishes) > 2
+    with pytest.raises(UnknownNameError) as error:
+        simulated_partner(MAPS[0], "kind", 0)
+    assert str(error.value) == "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"
+
+
+def test_sixty_configurations_are_spread_over_a_set():
+    starts = study_configurations("unseen", 60)
+    assert len(set(starts)) == 60
+    assert Counter(round(math.degrees(one.start[2])) for one in starts) == {0: 15, 90: 15, 180: 15, 270: 15}
+    assert set(Counter(one.obstacles for one in starts).values()) <= {8, 12}  # 7 layouts, two or three times four
+    assert set(Counter(one.goal for one in starts).values()) == {20}
+    assert set(Counter(one.start[1] for one in starts).values()) <= {12, 16}
+    holdout = study_configurations("holdout", 60)
+    assert len({one.digest for one in holdout}) == 60  # the set repeats maps, the study does not
+    assert len({one.start for one in study_configurations("paper36", 8)}) > 4
+    with pytest.raises(InvalidValueError) as error:
+        study_configurations("unseen", 58)
+    assert str(error.value) == "--configurations: expected a multiple of 4 from 4 to 336, found 58"
+
+
+class CountingPlanner:
+    """Plans forces that tell the plan's number, and remembers what it was shown."""
+
+    frames = 3
+    planning_seconds = (0.01,)
+    batch_sizes = (1,)
+
+    def __init__(self):
+        self.calls: list[dict[str, np.ndarray]] = []
+
+    def seed(self, seed):
+        """Nothing here is random."""
+
+    def plan(self, history):
+        self.calls.append(history)
+        plans = np.zeros((len(history[STATE]), 10, 4))
+        plans[:, :, 0] = 0.01 * len(self.calls)
+        plans[:, :, 1] = 0.001 * np.arange(10)
+        plans[:, :, 2:] = 1.0  # what it expects of the partner, which is not asked
+        return plans
+
+
+def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
+    planner = CountingPlanner()
+    robot = PolicyRobot("counter", planner)  # pyright: ignore[reportArgumentType]
+    (outcome,) = carry_with_partners(robot, MAPS[:1], ["stubborn"], Physics(step_limit=31))
+    assert outcome.steps == 31
+    assert outcome.plans == len(planner.calls) == 11
+    np.testing.assert_allclose(outcome.actions[:, 0], np.repeat(0.01 * np.arange(1, 12), 3)[:31])
+    assert not outcome.actions[:, 1].any()
+    world, states = TableWorld(MAPS[0]), []
+    for action in outcome.actions:
+        states.append(world.observation)
+        world.step(action)
+    first, last = planner.calls[0], planner.calls[10]
+    np.testing.assert_array_equal(first[STATE], np.tile(states[0], (1, 3, 1)))
+    assert not first[HUMAN_ACTION].any()
+    # The newest observation is that of the present step, and the past human action what the partner really did.
+    np.testing.assert_array_equal(last[STATE][0], [states[24], states[27], states[30]])
+    done = outcome.actions[:30, 2:].reshape(10, 3, 2).mean(axis=1)
+    np.testing.assert_allclose(last[HUMAN_ACTION][0], done[7:10])
+    np.testing.assert_array_equal(last[ENVIRONMENT_STATE][0], np.tile(environment_state(MAPS[0]), (3, 1)))
+
+
+def test_more_actions_a_plan_are_executed_in_turn():
+    planner = CountingPlanner()
+    robot = PolicyRobot("counter", planner, actions_per_plan=2)  # pyright: ignore[reportArgumentType]
+    (outcome,) = carry_with_partners(robot, MAPS[:1], ["slow"], Physics(step_limit=12))
+    np.testing.assert_allclose(outcome.actions[::3, :2], [[0.01, 0], [0.01, 0.001], [0.02, 0], [0.02, 0.001]])
+    assert len(planner.calls) == 2
+
+
+def test_every_robot_meets_the_same_partner():
+    physics = Physics(step_limit=40)
+    kinds = ["stubborn", "erratic"]
+    one = carry_with_partners(passive(), MAPS[:2], kinds, physics, repeats=2)
+    other = carry_with_partners(never_yields(), MAPS[:2], kinds, physics, repeats=2, seed=9)
+    assert [(o.map_index, o.partner, o.repeat) for o in one] == [
+        (m, k, r) for m in (0, 1) for k in kinds for r in (0, 1)
+    ]
+    # Before they have felt the other one they do the same; other tables have others.
+    np.testing.assert_array_equal([o.actions[0, 2:] for o in one], [o.actions[0, 2:] for o in other])
+    assert len({tuple(o.actions[0, 2:]) for o in one}) == 8
+    assert not np.concatenate([o.actions for o in one])[:, :2].any()
+    again = carry_with_partners(passive(), MAPS[:2], kinds, physics, repeats=2)
+    np.testing.assert_array_equal([o.path for o in one], [o.path for o in again])
+    changed = carry_with_partners(passive(), MAPS[:1], ["erratic"], physics, partner_seed=1)
+    assert (changed[0].actions[0] != one[2].actions[0]).any()
+
+
+def _outcome(actions, path, still, success=True):
+    steps = len(actions)
+    return PartnerOutcome(
+        0, MAPS[0], 0, success, "goal", 1, np.array(path, float), np.zeros(steps), "slow", np.array(actions, float),
+        np.array(still, bool), 2,
+    )  # fmt: skip
+
+
+def test_work_is_shared_by_what_pushes_along_the_way():
+    # 10 px to the right: the robot pushes with half a force, the partner with a full one; then one pulls back.
+    outcome = _outcome([[0.5, 9, 1, 0], [-1, 0, 1, 0]], [(0, 0), (10, 0), (20, 0)], [0, 0])
+    assert outcome.work == (5.0, 20.0)
+    assert outcome.robot_share == 0.2
+    assert _outcome([[0, 0, 0, 0]], [(0, 0), (0, 0)], [0]).robot_share == 0.0
+
+
+def test_a_deadlock_is_a_second_of_standing():
+    still = [0] * 10 + [1] * 29 + [0] + [1] * 30 + [0] * 5 + [1] * 45
+    outcome = _outcome(np.zeros((len(still), 4)), np.zeros((len(still) + 1, 2)), still)
+    assert outcome.deadlock_s == 2.5
+    summary = summarise_with_partners([outcome], None)
+    assert summary["deadlock"] == {"time_share": pytest.approx(75 / 120), "episode_share": 1.0}
+    assert summary["by_partner"]["slow"]["partner_changes"] == 2
+    assert summary["planning_ms_per_call"]["n"] == 0
+
+
+def test_differences_are_paired_and_times_count_where_both_succeed():
+    fast = _outcome(np.zeros((30, 4)), np.zeros((31, 2)), np.zeros(30))
+    slow = _outcome(np.zeros((60, 4)), np.zeros((61, 2)), np.zeros(60))
+    lost = _outcome(np.zeros((90, 4)), np.zeros((91, 2)), np.zeros(90), success=False)
+    found = differences([fast], [slow])["all"]
+    assert found["time_s"] == {"mean": -1.0, "bootstrap_95": None, "pairs": 1, "maps": 1}
+    assert differences([fast], [lost])["slow"]["success"]["mean"] == 1.0
+    assert differences([fast], [lost])["slow"]["time_s"]["mean"] is None
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory) -> Path:
+    """An untrained co-policy as a checkpoint folder."""
+    return save_untrained_policy(tmp_path_factory.mktemp("checkpoint"))
+
+
+def _command(checkpoint, out, *flags):
+    limits = ("--configurations", "4", "--step-limit", "30", "--maps", "unseen")
+    return main(["partner", str(checkpoint), "--out", str(out), *limits, *flags])
+
+
+def test_the_command_writes_every_robots_episodes_and_the_card_reads_them(checkpoint, tmp_path, capsys):
+    out = tmp_path / "results" / "partner.json"
+    flags = ["--partners", "slow", "stubborn", "--repeats", "2", "--json"]
+    assert main(["partner", f"ours={checkpoint}", "--out", str(out), "--configurations", "4", "--step-limit", "30",
+                 *flags]) == 0  # fmt: skip
+    told = json.loads(capsys.readouterr().out)
+    assert list(told["robots"]) == ["ours", "passive", "never-yields"]
+    result = json.loads(out.read_text())
+    assert result["study"] == "partner"
+    assert "SIMULATED" in result["label"]
+    assert "no person took part" in result["label"]
+    assert result["name"] == "ours"
+    assert result["settings"]["configurations"] == 4
+    assert result["settings"]["actions_per_plan"] == 1
+    assert result["settings"]["hold"] == 3
+    assert list(result["settings"]["partners"]) == ["slow", "stubborn"]
+    assert len(result["episodes"]) == 16 == result["summary"]["success"]["episodes"]
+    assert {row["partner"] for row in result["episodes"]} == {"slow", "stubborn"}
+    assert {row["steps"] for row in result["episodes"]} == {30}
+    assert [one["name"] for one in result["baselines"]] == ["passive", "never-yields"]
+    # An untrained network plans rest, as the passive robot does: no difference at all.
+    assert result["differences"]["passive"]["all"]["interaction_mean"]["mean"] == 0.0
+    assert result["differences"]["never-yields"]["all"]["robot_share"]["mean"] < 0
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    copy = save_untrained_policy(tmp_path / "copy")
+    card_input = tmp_path / "card.json"
+    card_input.write_text(json.dumps({**result, "policy": {"weights_sha256": _digest(copy), "parameters": 1}}))
+    assert cards(["model", str(copy), "--eval", str(card_input)]) == 0
+    text = (copy / "README.md").read_text()
+    assert "With simulated partners on 4 starts of the unseen maps, 1 action(s) a plan" in text
+    assert "| never-yields | 0.0 ± 0.0 | 0.0 to 19.4 | 16 |" in text
+
+
+def _digest(folder):
+    return hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
+        (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
+        (["--repeats", "0"], "--repeats: expected at least 1, found 0"),
+        (["--actions-per-plan", "11"], "--actions-per-plan: expected at most the plan's 10, found 11"),
+        (
+            ["--baseline", "passive", "passive"],
+            "--baseline: expected robots of different names (NAME=CKPT gives one), "
+            "found ['{name}', 'passive', 'passive']",
+        ),
+        (["--partner-seed", "-1"], "--partner-seed: expected a whole number, not negative, found -1"),
+    ],
+)
+def test_a_wrong_call_is_one_line(checkpoint, tmp_path, capsys, flags, message):
+    assert _command(checkpoint, tmp_path / "partner.json", *flags) == 2
+    name = f"policy:copolicy-{_digest(checkpoint)[:8]}"
+    assert capsys.readouterr().err.strip() == f"copolicy-eval: {message.format(name=name)}"
+    assert not (tmp_path / "partner.json").exists()
+
+
+def test_an_existing_result_is_not_replaced(checkpoint, tmp_path, capsys):
+    out = tmp_path / "partner.json"
+    out.write_text("{}")
+    assert _command(checkpoint, out) == 2
+    assert "nothing was overwritten" in capsys.readouterr().err
+    assert out.read_text() == "{}"

@@ -1,0 +1,75 @@
+"""The comparison as a table for a paper, a card or an issue."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def markdown(comparison: Mapping[str, Any]) -> str:
+    """Methods in rows, then differences in rows, then what they mean."""
+    methods, settings = comparison["methods"], comparison["settings"]
+    parts = list(next(iter(methods.values()))["parts"])
+    head = ["method", "runs", "success, % (max)", "time, s", "interaction force", *(f"{name}, %" for name in parts)]
+    rows = [[name, *_method(one, parts)] for name, one in methods.items()]
+    text = [
+        f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes a "
+        f"run, {settings.get('actions_per_plan', '?')} actions a plan, hold {settings.get('hold', '?')}, at most "
+        f"{settings.get('step_limit', '?')} steps ({comparison['label']}).",
+        _table(head, rows),
+    ]
+    if comparison["differences"]:
+        head = ["difference", "success, points", "time, s", "interaction force", "McNemar p", "between runs, points"]
+        text.append(_table(head, [_difference(one) for one in comparison["differences"]]))
+    notes = comparison["definitions"]
+    text.append("\n".join(f"- {name}: {notes[name]}." for name in ("success", "bootstrap_95", "between_runs")))
+    return "\n\n".join(text) + "\n"
+
+
+def _method(one: Mapping[str, Any], parts: list[str]) -> list[str]:
+    success = one["success"]
+    return [
+        str(success["runs"]),
+        f"{_percent(success)} ({100 * success['max']:.1f})",
+        _plain(one["time_s"], 2),
+        _plain(one["interaction_mean"], 4),
+        *(_percent(one["parts"][name]["success"]) for name in parts),
+    ]
+
+
+def _difference(one: Mapping[str, Any]) -> list[str]:
+    between, mcnemar = one["between_runs"], one["mcnemar"]
+    return [
+        f"{one['first']} - {one['second']}",
+        _interval(one["success"], 100, 1),
+        _interval(one["time_s"], 1, 2),
+        _interval(one["interaction_mean"], 1, 4),
+        f"{mcnemar['p']:.3g} ({mcnemar['only_first']} against {mcnemar['only_second']})" if mcnemar else "",
+        "{:+.1f} to {:+.1f}, p {:.3g}".format(*(100 * bound for bound in between["interval_95"]), between["p"])
+        if between
+        else "",
+    ]
+
+
+def _percent(success: Mapping[str, Any]) -> str:
+    return f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f}"
+
+
+def _plain(value: Mapping[str, Any], digits: int) -> str:
+    if value["mean"] is None:
+        return "none"
+    error = value["standard_error"]
+    return f"{value['mean']:.{digits}f}" + ("" if error is None else f" ± {error:.{digits}f}")
+
+
+def _interval(one: Mapping[str, Any], scale: float, digits: int) -> str:
+    if one["mean"] is None:
+        return "none"
+    mean = f"{scale * one['mean']:+.{digits}f}"
+    if one["bootstrap_95"] is None:
+        return mean
+    low, high = (f"{scale * bound:+.{digits}f}" for bound in one["bootstrap_95"])
+    return f"{mean} ({low} to {high})"
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

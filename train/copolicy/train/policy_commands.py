@@ -1,0 +1,65 @@
+"""`copolicy-train export` and `copolicy-train pretrained`: policies to give away, and the one that came along."""
+
+import argparse
+from pathlib import Path
+
+from copolicy.collect.controllers.checkpoint_folder import pretrained_folder
+from copolicy.dataset.commandline import add_command, command_parser
+from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+
+
+def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
+    """The parser of these commands, and their names; anything else is for LeRobot's trainer."""
+    parser, commands = command_parser("copolicy-train", "Give a trained policy away; find the one that came along.")
+    export = add_command(
+        commands,
+        "export",
+        _export,
+        "write a checkpoint's averaged weights as a small folder to give away, checked to make the same plans",
+        "copolicy-train export outputs/training --out outputs/model --eval outputs/eval/holdout.json",
+    )
+    export.add_argument("checkpoint", help="checkpoint folder, or that of a run (its last checkpoint)")
+    export.add_argument("--out", type=Path, required=True, help="folder to write")
+    export.add_argument(
+        "--eval", action="append", type=Path, default=[], metavar="FILE", help="a result of copolicy-eval to keep"
+    )
+    export.add_argument(
+        "--commands", type=Path, metavar="FILE", help="a text of the commands that make data and policy, one a line"
+    )
+    export.add_argument("--overwrite", action="store_true", help="replace the policy at --out, with its card")
+    add_command(
+        commands,
+        "pretrained",
+        _pretrained,
+        "say where the model that comes with the package is, for --policy.path of LeRobot's commands",
+        "lerobot-eval --env.type=table_carrying \\\n"
+        "      --policy.path=\"$(copolicy-train pretrained | sed -n 's/^path *//p')\"",
+    )
+    return parser, set(commands.choices)
+
+
+def _export(arguments: argparse.Namespace) -> dict:
+    try:
+        from .export import export_checkpoint
+    except ImportError as error:
+        raise MissingExtraError((error.name or "lerobot").partition(".")[0]) from error
+
+    commands = []
+    if arguments.commands is not None:
+        try:
+            text = arguments.commands.read_text()
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileFormatError(arguments.commands, "a text of commands", type(error).__name__) from None
+        commands = [line.strip() for line in text.replace("\\\n", " ").splitlines()]
+    return export_checkpoint(
+        arguments.checkpoint,
+        arguments.out,
+        arguments.eval,
+        [" ".join(line.split()) for line in commands if line and not line.startswith("#")],
+        arguments.overwrite,
+    )
+
+
+def _pretrained(_: argparse.Namespace) -> dict:
+    folder = pretrained_folder()
+    return {"path": str(folder), "bytes": sum(file.stat().st_size for file in folder.iterdir())}

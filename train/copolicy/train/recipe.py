@@ -1,0 +1,143 @@
+"""What an exported policy says of how it was made: training, data, results; without a path of a machine.
+
+`recipe.json` and `eval.json` stand beside the weights; `copolicy-cards model` writes the card from them.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+
+RECIPE_FILE = "recipe.json"
+EVALUATION_FILE = "eval.json"
+
+_TRAINING = ("batch_size", "seed")
+_RELEASE = "meta/copolicy_release.json"
+_COUNTED = ("source", "map_set", "license", "pair_id")
+_EPISODE = ("map_id", "start_theta", "partner", "robot", "repeat", "success", "reason", "time_s")
+
+
+def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands: Sequence[str]) -> dict[str, Any]:
+    """How the policy of a checkpoint was trained; a part that is not on record is left out.
+
+    Args:
+        folder: of the checkpoint. One that was exported already keeps its recipe.
+        weights_sha256: digest of its weights.
+        averaged: the exported weights are the moving average.
+        commands: how to make it again.
+
+    Raises:
+        FileFormatError: `train_config.json` or `recipe.json` cannot be read.
+        InvalidValueError: a command with a path that only this machine has.
+    """
+    for command in commands:
+        if str(Path.home()) in command or str(Path.cwd()) in command:
+            raise InvalidValueError("--commands", "paths that another machine has too", command)
+    earlier = _json(folder / RECIPE_FILE)
+    if earlier:
+        return {**earlier, **({"commands": list(commands)} if commands else {})}
+    recipe: dict[str, Any] = {
+        "weights": {"exported_from": weights_sha256, "averaged": averaged, "dtype": "float32"},
+    }
+    training = _json(folder / "train_config.json")
+    if training:
+        reached = _json(folder.parent / "training_state" / "training_step.json") or {}
+        steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
+        recipe["training"] = {
+            **{name: training.get(name) for name in _TRAINING},
+            "steps": steps,
+            "samples": steps * training["batch_size"] * processes,
+            "optimizer": training.get("optimizer"),
+            "scheduler": training.get("scheduler"),
+        }
+        recipe["dataset"] = _data_set(training.get("dataset") or {})
+    if commands:
+        recipe["commands"] = list(commands)
+    return recipe
+
+
+def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
+    """A result of `copolicy-eval` with its summary and the outcome of each episode, without the rest.
+
+    Raises:
+        FileFormatError: no result, or one of other weights.
+    """
+    result = _json(path)
+    try:
+        if result is None:
+            raise FileFormatError(path, "a result of copolicy-eval", "no such file")
+        weights = result["policy"]["weights_sha256"]
+        summary = _without(result["summary"], "by_map")
+        episodes = [{key: row[key] for key in _EPISODE if key in row} for row in result.get("episodes", ())]
+        others = [
+            {
+                "name": one["name"],
+                "policy": _without(one["policy"], "checkpoint"),
+                "summary": _without(one["summary"], "by_map"),
+            }
+            for one in result.get("baselines", ())
+        ]
+    except (KeyError, TypeError) as error:
+        raise FileFormatError(path, "a result of copolicy-eval", f"none: {error} is missing") from None
+    if weights not in digests:
+        expected = f"an evaluation of this policy (weights {', '.join(sorted(digest[:12] for digest in digests))})"
+        raise FileFormatError(path, expected, f"one of weights {str(weights)[:12]}")
+    kept = {**result, "policy": _without(result["policy"], "checkpoint"), "summary": summary, "episodes": episodes}
+    return {**kept, "baselines": others} if others else kept
+
+
+def _without(table: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in table.items() if name != key}
+
+
+def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
+    """Name, size, sources and version of the data, as far as its folder is at hand."""
+    facts: dict[str, Any] = {"repo_id": settings.get("repo_id"), "revision": settings.get("revision")}
+    chosen = settings.get("episodes")
+    root = Path(settings.get("root") or "")
+    info = _json(root / "meta" / "info.json") if settings.get("root") else None
+    if info is None:
+        return {**facts, "episodes_used": None if chosen is None else len(chosen)}
+    used = range(info["total_episodes"]) if chosen is None else chosen
+    release = _json(root / _RELEASE) or {}
+    return {
+        **facts,
+        "episodes": info["total_episodes"],
+        "episodes_used": len(used),
+        "frames": info["total_frames"],
+        "fps": info["fps"],
+        **{column: counts for column in _COUNTED if (counts := _counts(root, column, set(used)))},
+        **{key: release[key] for key in ("version", "content_hash") if key in release},
+    }
+
+
+def _counts(root: Path, column: str, used: Collection[int]) -> dict[str, int]:
+    """How many of the used episodes have each value of an episode column."""
+    counts: Counter[str] = Counter()
+    for path in sorted((root / "meta" / "episodes").glob("*/*.parquet")):
+        try:
+            if column not in pq.read_schema(path).names:
+                continue
+            table = pq.read_table(path, columns=["episode_index", column]).to_pylist()
+        except (pa.ArrowInvalid, OSError) as error:
+            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+        counts.update(str(row[column]) for row in table if row["episode_index"] in used)
+    return dict(counts.most_common())
+
+
+def _json(path: Path) -> dict[str, Any] | None:
+    if not path.is_file():
+        return None
+    try:
+        value = json.loads(path.read_text())
+    except ValueError as error:
+        raise FileFormatError(path, "JSON", str(error)) from None
+    if not isinstance(value, dict):
+        raise FileFormatError(path, "a JSON object", type(value).__name__)
+    return value

@@ -1,0 +1,52 @@
+"""Result files of studies: new ones, and there whole or not at all."""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+
+
+def require_new(*paths: Path, overwrite: bool = False) -> None:
+    """
+    Raises:
+        OutputExistsError: one of them exists and must not be overwritten.
+    """
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise OutputExistsError(path)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes beside and renames; makes the folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """`write_text` of a JSON object."""
+    write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def read_json(path: Path, what: str) -> dict[str, Any]:
+    """A JSON object.
+
+    Args:
+        what: it should be, for the error.
+
+    Raises:
+        FileFormatError: no such file, or no JSON object.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileFormatError(path, what, error.strerror or str(error)) from None
+    except ValueError as error:
+        raise FileFormatError(path, what, f"no JSON ({error})") from None
+    if not isinstance(content, dict):
+        raise FileFormatError(path, what, f"a JSON {type(content).__name__}")
+    return content
