@@ -1,6 +1,10 @@
-"""Settings that must hold before any test imports torch, pygame or the Hub client."""
+"""Settings that must hold before any test imports torch, pygame or the Hub client, and fixtures of several files.
+
+Fixtures import their builders when they are asked for: torch, LeRobot and Playwright take seconds.
+"""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -20,9 +24,100 @@ def upstream() -> Path:
     return Path(__file__).parent / "data" / "upstream"
 
 
+@pytest.fixture(scope="session")
+def examples(upstream) -> Path:
+    """Episodes that scripted players recorded with the original program, in its three formats."""
+    return upstream / "examples_scripted"
+
+
 @pytest.fixture(autouse=True, scope="session")
 def _private_home(tmp_path_factory):
     """LeRobot and datasets keep their caches in a folder that goes away with the test run."""
     home = tmp_path_factory.mktemp("home")
     os.environ["HF_HOME"] = str(home / "huggingface")
     os.environ["HF_LEROBOT_HOME"] = str(home / "lerobot")
+
+
+@pytest.fixture(scope="session")
+def sound_recordings(tmp_path_factory) -> Path:
+    """Six recordings of scripted pairs."""
+    from checked_data import make_recordings
+
+    return make_recordings(tmp_path_factory.mktemp("checks") / "recordings")
+
+
+@pytest.fixture(scope="session")
+def recorded(sound_recordings):
+    """Six recordings as the rules of `check` see them."""
+    from copolicy.dataset.checks.checking import read_table
+
+    return read_table(sound_recordings)
+
+
+@pytest.fixture(scope="session")
+def sound(sound_recordings):
+    """The data set of these recordings as the rules of `check` see it."""
+    from checked_data import make_data_set
+
+    from copolicy.dataset.checks.checking import read_table
+
+    return read_table(make_data_set(sound_recordings, sound_recordings.parent / "set"))
+
+
+@pytest.fixture(scope="session")
+def unsharded(tmp_path_factory) -> Path:
+    """Simulated recordings in `recordings`, and the data set that they become in one go in `whole`."""
+    from checked_data import make_data_set, make_recordings
+    from sharded_calls import EPISODES
+
+    folder = tmp_path_factory.mktemp("unsharded")
+    make_data_set(make_recordings(folder / "recordings", EPISODES, seed=3), folder / "whole")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def random_table(tmp_path_factory) -> Path:
+    """A small data set of random frames to train on."""
+    from training_table import write_table
+
+    return write_table(tmp_path_factory.mktemp("data") / "table")
+
+
+@pytest.fixture
+def copied_table(random_table, tmp_path) -> Path:
+    """The same, to be changed."""
+    return Path(shutil.copytree(random_table, tmp_path / "copied_table"))
+
+
+@pytest.fixture(scope="module")
+def report_set(request, tmp_path_factory) -> Path:
+    """A data set of as many simulated episodes as `EPISODES` of the file of tests says."""
+    from report_page import make_data_set
+
+    return make_data_set(tmp_path_factory.mktemp("report"), request.module.EPISODES)
+
+
+@pytest.fixture(scope="module")
+def report(report_set) -> Path:
+    """The page of that data set."""
+    from report_page import make_report
+
+    return make_report(report_set)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """A headless Chromium."""
+    from report_page import chromium
+
+    with chromium(tmp_path_factory.mktemp("profile")) as context:
+        yield context
+
+
+@pytest.fixture
+def visit(browser):
+    """A visit of that browser, see `report_page.visiting`."""
+    from report_page import visiting
+
+    with visiting(browser) as visit:
+        yield visit

@@ -5,27 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from changed_tables import find, of, with_entry, with_frames
-from checked_data import make_data_set, make_recordings
 
-from copolicy.dataset.checks.checking import RULES, check_table, read_table
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.checking import RULES, check_table
 from copolicy.dataset.checks.limits import LIMITS
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
-
-
-@pytest.fixture(scope="module")
-def recordings(tmp_path_factory):
-    return make_recordings(tmp_path_factory.mktemp("checks") / "recordings")
-
-
-@pytest.fixture(scope="module")
-def recorded(recordings) -> EpisodeTable:
-    return read_table(recordings)
-
-
-@pytest.fixture(scope="module")
-def sound(recordings) -> EpisodeTable:
-    return read_table(make_data_set(recordings, recordings.parent / "set"))
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)

@@ -3,21 +3,8 @@
 import numpy as np
 import pytest
 from changed_tables import all_frames, find, of, with_column, with_entry, with_frames
-from checked_data import make_data_set, make_recordings
 
-from copolicy.dataset.checks.checking import read_table
-from copolicy.dataset.checks.episode_table import EpisodeTable
 from copolicy.dataset.features import ACTION, STATE
-
-
-@pytest.fixture(scope="module")
-def recordings(tmp_path_factory):
-    return make_recordings(tmp_path_factory.mktemp("checks") / "recordings")
-
-
-@pytest.fixture(scope="module")
-def sound(recordings) -> EpisodeTable:
-    return read_table(make_data_set(recordings, recordings.parent / "set"))
 
 
 @pytest.mark.parametrize(("share", "severity"), [(0.005, None), (0.05, "warning"), (0.5, "error")])

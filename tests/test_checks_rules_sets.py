@@ -5,28 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from changed_tables import all_frames, find, of, with_column, with_entry, with_frames
-from checked_data import make_data_set, make_recordings
 
-from copolicy.dataset.checks.checking import read_table
 from copolicy.dataset.checks.episode_table import EpisodeTable
 from copolicy.dataset.checks.maps import named_map
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.dataset.task import MAP_SETS, identify, map_set
-
-
-@pytest.fixture(scope="module")
-def recordings(tmp_path_factory):
-    return make_recordings(tmp_path_factory.mktemp("checks") / "recordings")
-
-
-@pytest.fixture(scope="module")
-def recorded(recordings) -> EpisodeTable:
-    return read_table(recordings)
-
-
-@pytest.fixture(scope="module")
-def sound(recordings) -> EpisodeTable:
-    return read_table(make_data_set(recordings, recordings.parent / "set"))
 
 
 def test_maps_by_name():

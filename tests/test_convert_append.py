@@ -4,13 +4,13 @@ import json
 import os
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from checked_data import contents, make_data_set, make_recordings
-from lerobot.datasets import LeRobotDataset
+from disk_order import inodes, record_disk_order
+from loaded_sets import assert_same_frames, assert_same_statistics, load
 
 from copolicy.convert import append
 from copolicy.convert.cli import main
@@ -41,10 +41,6 @@ def add(folder: Path, root: Path, *flags: str) -> int:
     return main([*arguments, "--append", "--json", *flags])
 
 
-def load(root: Path) -> Any:
-    return LeRobotDataset("lab/table", root=root, video_backend="pyav")
-
-
 def test_the_result_is_that_of_one_conversion(made, root, capsys):
     before = contents(root)
     assert add(made / "both", root) == 0
@@ -59,13 +55,8 @@ def test_the_result_is_that_of_one_conversion(made, root, capsys):
             continue
         for ours, theirs in zip(rows[name], expected[name], strict=True):
             np.testing.assert_equal(ours, theirs, err_msg=name)
-    for index in range(0, whole.num_frames, 11):
-        for name, value in whole[index].items():
-            assert np.array_equal(appended[index][name], value), name
-    for feature, kinds in whole.meta.stats.items():
-        for kind, value in kinds.items():
-            if not kind.startswith("q"):  # LeRobot pools quantiles of data sets by their mean
-                np.testing.assert_allclose(appended.meta.stats[feature][kind], value, rtol=1e-6, atol=1e-6)
+    assert_same_frames(appended, whole, every=11)
+    assert_same_statistics(appended, whole)
     assert appended.meta.info.splits == {"train": "0:7"}
     after = contents(root)
     changed = {name for name in before if after[name] != before[name]}
@@ -130,24 +121,12 @@ def test_an_interruption_is_made_good(made, root, monkeypatch, renamed):
 
 
 def test_everything_is_on_the_disk_before_it_takes_the_place(made, root, monkeypatch):
-    happened: list = []
-    fsync, rename = os.fsync, Path.rename
-
-    def synced(descriptor):
-        happened.append(os.fstat(descriptor).st_ino)
-        fsync(descriptor)
-
-    def renamed(self, target):
-        happened.append(Path(target))
-        return rename(self, target)
-
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", synced)
-        patch.setattr(Path, "rename", renamed)
+        happened = record_disk_order(patch)
         assert add(made / "b", root) == 0
     place = happened.index(root)
-    assert {path.stat().st_ino for path in (root, *root.rglob("*"))} <= set(happened[:place])
-    assert happened[place + 1 :] == [root.parent.stat().st_ino]
+    assert inodes(root, *root.rglob("*")) <= set(happened[:place])
+    assert happened[place + 1 :] == [*inodes(root.parent)]
 
 
 def test_a_damaged_recording_changes_nothing(made, root, tmp_path, capsys):

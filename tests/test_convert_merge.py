@@ -4,14 +4,12 @@ import json
 import math
 import shutil
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, contents, make_data_set, make_recordings, set_columns
-from lerobot.datasets import LeRobotDataset
+from loaded_sets import assert_same_frames, assert_same_statistics, load
 
 from copolicy.convert.cli import main
 from copolicy.convert.merge import merging
@@ -54,10 +52,6 @@ def episodes(root: Path) -> pa.Table:
     return pq.ParquetFile(root / EPISODES).read()
 
 
-def load(root: Path) -> Any:
-    return LeRobotDataset("lab/both", root=root, video_backend="pyav")
-
-
 def test_the_result_is_that_of_one_conversion(made, tmp_path, capsys):
     assert merge(tmp_path / "out", made / "a", made / "b") == 0
     captured = capsys.readouterr()
@@ -66,13 +60,8 @@ def test_the_result_is_that_of_one_conversion(made, tmp_path, capsys):
     assert summary["content_hash"] == read_content(made / "both").hash == read_content(tmp_path / "out").hash
     assert (summary["episodes"], summary["excluded"]) == (6, 0)
     merged, whole = load(tmp_path / "out"), load(made / "both")
-    for index in range(0, whole.num_frames, 97):
-        for name, value in whole[index].items():
-            assert np.array_equal(merged[index][name], value), name
-    for feature, kinds in whole.meta.stats.items():
-        for kind, value in kinds.items():
-            if not kind.startswith("q"):  # LeRobot pools quantiles of data sets by their mean
-                np.testing.assert_allclose(merged.meta.stats[feature][kind], value, rtol=1e-6, atol=1e-6)
+    assert_same_frames(merged, whole, every=97)
+    assert_same_statistics(merged, whole)
     ours, theirs = episodes(tmp_path / "out"), episodes(made / "both")
     assert {field.name: field.type for field in ours.schema} == {field.name: field.type for field in theirs.schema}
     assert all(math.isnan(drift) for drift in ours.column("replay_drift_px").to_pylist())

@@ -1,7 +1,5 @@
-import os
-from pathlib import Path
-
 import pytest
+from disk_order import inodes, record_disk_order
 
 from copolicy.convert.staging import new_file, new_folder
 from copolicy.dataset.exceptions import OutputExistsError
@@ -60,40 +58,29 @@ def test_a_broken_link_is_something(tmp_path):
         pytest.fail("not reached")
 
 
-@pytest.fixture
-def order(monkeypatch) -> list:
-    """What is synced, by inode, and what is renamed, in order."""
-    happened: list = []
-    fsync, rename = os.fsync, Path.rename
-
-    def synced(descriptor):
-        happened.append(os.fstat(descriptor).st_ino)
-        fsync(descriptor)
-
-    def renamed(self, target):
-        happened.append("renamed")
-        return rename(self, target)
-
-    monkeypatch.setattr(os, "fsync", synced)
-    monkeypatch.setattr(Path, "rename", renamed)
-    return happened
+def test_what_a_killed_process_left_goes_where_the_name_is_fixed(tmp_path):
+    (tmp_path / ".set.merging").mkdir()
+    (tmp_path / ".set.merging" / "half").write_text("")
+    with new_folder(tmp_path / "set", "merging") as partial:
+        partial.mkdir()
+        assert names(tmp_path) == [".set.merging"]
+    assert names(tmp_path) == ["set"]
+    assert names(tmp_path / "set") == []
 
 
-def inodes(*paths: Path) -> set[int]:
-    return {path.stat().st_ino for path in paths}
-
-
-def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, order):
+def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    order = record_disk_order(monkeypatch)
     with new_folder(tmp_path / "set") as partial:
         (partial / "data").mkdir(parents=True)
         (partial / "data" / "file").write_text("x")
         (partial / "info").write_text("y")
-    place = order.index("renamed")
+    place = order.index(tmp_path / "set")
     assert set(order[:place]) == inodes(tmp_path / "set", *(tmp_path / "set").rglob("*"))
     assert set(order[place + 1 :]) == inodes(tmp_path)
 
 
-def test_so_is_a_single_file(tmp_path, order):
+def test_so_is_a_single_file(tmp_path, monkeypatch):
+    order = record_disk_order(monkeypatch)
     with new_file(tmp_path / "one") as partial:
         partial.write_text("x")
-    assert order == [*inodes(tmp_path / "one"), "renamed", *inodes(tmp_path)]
+    assert order == [*inodes(tmp_path / "one"), tmp_path / "one", *inodes(tmp_path)]

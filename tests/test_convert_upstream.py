@@ -33,11 +33,6 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.task import Physics
 
 
-@pytest.fixture(scope="session")
-def examples(upstream) -> Path:
-    return upstream / "examples_scripted"
-
-
 @pytest.mark.parametrize("number", EPISODES)
 def test_raw_rows_are_moved_to_the_state_before_the_action(examples, number):
     episode = raw(examples, number)

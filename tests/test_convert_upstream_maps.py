@@ -29,11 +29,6 @@ from copolicy.dataset.exclusions import excluded_episodes, include
 from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
 
 
-@pytest.fixture(scope="session")
-def examples(upstream) -> Path:
-    return upstream / "examples_scripted"
-
-
 def test_a_processed_file_with_another_map_is_noticed_and_set_right(examples):
     episode = processed(examples, 1)
     assert episode.meta.quality_flags == "map_mismatch,map_recovered"

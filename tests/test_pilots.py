@@ -174,7 +174,8 @@ def test_a_pilot_depends_on_its_seed_and_the_states_alone():
 def test_a_pilot_reacts_after_its_delay():
     def pushes(jump_at: int) -> np.ndarray:
         pilot = ScriptedPilot(1, ONE_OBSTACLE, Habits(delay_steps=5), seed=0)
-        states = [state_vector((240.0, 300.0 if k < jump_at else 330.0, 3.14), (0.0, 0.0, 0.0)) for k in range(40)]
+        # Not by whole cells of the plan's grid: the way ahead would look the same.
+        states = [state_vector((240.0, 300.0 if k < jump_at else 340.0, 3.14), (0.0, 0.0, 0.0)) for k in range(40)]
         return np.array([pilot.act(state) for state in states])
 
     before, after = pushes(jump_at=99), pushes(jump_at=20)

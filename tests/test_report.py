@@ -7,34 +7,12 @@ from pathlib import Path
 import pyarrow.parquet as parquet
 import pytest
 from playwright.sync_api import expect
-from report_page import chromium, column, make_data_set, make_report, picture, visiting
+from report_page import column, picture
 
 from copolicy.cards.cli import main
 from copolicy.cards.facts import DatasetFacts
 
 EPISODES = 30
-
-
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
-    return make_data_set(tmp_path_factory.mktemp("report"), EPISODES)
-
-
-@pytest.fixture(scope="module")
-def report(dataset) -> Path:
-    return make_report(dataset)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with chromium(tmp_path_factory.mktemp("profile")) as context:
-        yield context
-
-
-@pytest.fixture
-def visit(browser):
-    with visiting(browser) as visit:
-        yield visit
 
 
 def test_the_top_says_that_pairs_are_simulated(visit, report):
@@ -47,9 +25,9 @@ def test_the_top_says_that_pairs_are_simulated(visit, report):
     assert page.locator("#tiles").inner_text().startswith(f"Episodes\n{EPISODES}\n")
 
 
-def test_filters_choose_episodes_for_the_whole_page(visit, report, dataset):
+def test_filters_choose_episodes_for_the_whole_page(visit, report, report_set):
     page = visit.open(report)
-    episodes = DatasetFacts.read(dataset).episodes
+    episodes = DatasetFacts.read(report_set).episodes
     pair = episodes[0]["pair_id"]
     chosen = [episode for episode in episodes if episode["pair_id"] == pair]
     assert 0 < len(chosen) < EPISODES
@@ -66,7 +44,7 @@ def test_filters_choose_episodes_for_the_whole_page(visit, report, dataset):
     expect(page.locator("#filter-count")).to_have_text(f"{EPISODES} of {EPISODES} episodes")
 
 
-def test_the_table_sorts_and_turns_pages(visit, report, dataset):
+def test_the_table_sorts_and_turns_pages(visit, report, report_set):
     page = visit.open(report)
     heading = page.get_by_role("button", name="Duration, s")
     heading.click()
@@ -76,7 +54,7 @@ def test_the_table_sorts_and_turns_pages(visit, report, dataset):
     page.get_by_role("button", name="Duration, s").press("Enter")
     falling = [float(text) for text in column(page, 7)]
     assert falling == sorted(falling, reverse=True)
-    assert falling[0] == pytest.approx(max(e["duration_s"] for e in DatasetFacts.read(dataset).episodes), abs=0.05)
+    assert falling[0] == pytest.approx(max(e["duration_s"] for e in DatasetFacts.read(report_set).episodes), abs=0.05)
     first = set(column(page, 1))
     page.get_by_role("button", name="Next page").click()
     assert first.isdisjoint(column(page, 1))
@@ -118,8 +96,8 @@ def test_every_control_has_a_name(visit, report):
     assert unnamed == []
 
 
-def test_names_in_the_data_stay_text(visit, dataset, tmp_path):
-    root = Path(shutil.copytree(dataset, tmp_path / "table"))
+def test_names_in_the_data_stay_text(visit, report_set, tmp_path):
+    root = Path(shutil.copytree(report_set, tmp_path / "table"))
     (path,) = (root / "meta" / "episodes").glob("*/*.parquet")
     table = parquet.read_table(path)
     names = ["</script><script>document.title='taken'</script>{{style}}"] * EPISODES

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from report_page import make_data_set, make_report
 
 from copolicy.cards.cli import main
 from copolicy.cards.facts import DatasetFacts
@@ -18,18 +17,8 @@ from copolicy.dataset.exceptions import FileFormatError
 EPISODES = 30
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
-    return make_data_set(tmp_path_factory.mktemp("report"), EPISODES)
-
-
-@pytest.fixture(scope="module")
-def report(dataset) -> Path:
-    return make_report(dataset)
-
-
-def test_frames_survive_their_packing(dataset):
-    facts = DatasetFacts.read(dataset)
+def test_frames_survive_their_packing(report_set):
+    facts = DatasetFacts.read(report_set)
     payload = build_payload(facts, "table")
     values = np.frombuffer(base64.b64decode(payload["frames"]), "<i2").reshape(-1, len(FRAME_SCALES))
     table = values / list(FRAME_SCALES.values())
@@ -42,15 +31,15 @@ def test_frames_survive_their_packing(dataset):
         np.testing.assert_allclose(part[:, 7], frames.interaction, atol=3e-5)
 
 
-def test_a_page_of_376_episodes_is_under_10_mb(report, dataset):
-    facts = DatasetFacts.read(dataset)
+def test_a_page_of_376_episodes_is_under_10_mb(report, report_set):
+    facts = DatasetFacts.read(report_set)
     per_episode = report.stat().st_size / len(facts.episodes)  # style and script are counted in, thirty times over
     assert facts.info["total_frames"] / len(facts.episodes) > 140
     assert 376 * per_episode < 10e6
 
 
-def test_a_large_data_set_shows_fewer_frames_and_says_so(dataset):
-    facts = DatasetFacts.read(dataset)
+def test_a_large_data_set_shows_fewer_frames_and_says_so(report_set):
+    facts = DatasetFacts.read(report_set)
     limit = facts.info["total_frames"] * len(FRAME_SCALES) - 1  # a byte less than half of what all take
     payload = build_payload(facts, "table", frame_bytes=limit)
     assert payload["frame_step"] == 3
@@ -58,28 +47,28 @@ def test_a_large_data_set_shows_fewer_frames_and_says_so(dataset):
     assert [row["frames"] for row in payload["episodes"]] == [-(-e["length"] // 3) for e in facts.episodes]
 
 
-def test_a_report_is_not_overwritten_unless_asked(dataset, tmp_path, capsys):
+def test_a_report_is_not_overwritten_unless_asked(report_set, tmp_path, capsys):
     out = tmp_path / "page.html"
     out.write_text("kept")
-    assert main(["report", str(dataset), "--out", str(out)]) == 2
+    assert main(["report", str(report_set), "--out", str(out)]) == 2
     assert out.read_text() == "kept"
-    assert main(["report", str(dataset), "--out", str(out), "--overwrite"]) == 0
+    assert main(["report", str(report_set), "--out", str(out), "--overwrite"]) == 0
     assert out.read_text().startswith("<!doctype html>")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
-def test_findings_that_are_not_there_are_named(dataset, tmp_path, capsys):
+def test_findings_that_are_not_there_are_named(report_set, tmp_path, capsys):
     missing = tmp_path / "check.json"
-    assert main(["report", str(dataset), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
+    assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
     expected = f"{missing}: expected a file with the output of `copolicy-dataset check --json`, found none\n"
     assert capsys.readouterr().err == f"copolicy-cards: {expected}"
     missing.write_text("[]")
-    assert main(["report", str(dataset), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
+    assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
     assert capsys.readouterr().err == f"copolicy-cards: {missing}: expected a JSON object, found list\n"
 
 
-def test_frames_that_contradict_the_metadata_are_refused(dataset, tmp_path):
-    root = Path(shutil.copytree(dataset, tmp_path / "table"))
+def test_frames_that_contradict_the_metadata_are_refused(report_set, tmp_path):
+    root = Path(shutil.copytree(report_set, tmp_path / "table"))
     (path,) = (root / "data").glob("*/*.parquet")
     table = parquet.read_table(path)
     parquet.write_table(table.slice(0, len(table) - 5), path)

@@ -1,12 +1,11 @@
 """The player of episodes in a browser."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from report_page import chromium, make_data_set, make_report, picture, visiting
+from report_page import picture
 
 from copolicy.cards.facts import DatasetFacts
 from copolicy.cards.frames import read_frames
@@ -14,29 +13,7 @@ from copolicy.cards.frames import read_frames
 EPISODES = 5
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
-    return make_data_set(tmp_path_factory.mktemp("report"), EPISODES)
-
-
-@pytest.fixture(scope="module")
-def report(dataset) -> Path:
-    return make_report(dataset)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with chromium(tmp_path_factory.mktemp("profile")) as context:
-        yield context
-
-
-@pytest.fixture
-def visit(browser):
-    with visiting(browser) as visit:
-        yield visit
-
-
-def test_an_episode_plays_by_keyboard_alone(visit, report, dataset):
+def test_an_episode_plays_by_keyboard_alone(visit, report, report_set):
     page = visit.open(report)
     open_first = page.get_by_role("button", name=re.compile(r"^Open Episode 0,"))
     open_first.focus()
@@ -44,7 +21,7 @@ def test_an_episode_plays_by_keyboard_alone(visit, report, dataset):
     player = page.get_by_role("dialog")
     expect(player).to_be_visible()
     expect(page.locator("#player-facts")).to_contain_text("simulated pair · pair ")
-    frames = DatasetFacts.read(dataset).episodes[0]["length"]
+    frames = DatasetFacts.read(report_set).episodes[0]["length"]
     start = picture(page, "#stage")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#player-readout")).to_contain_text(f"0.1 of {(frames - 1) / 10:.1f} s")
@@ -69,10 +46,10 @@ def test_an_episode_plays_by_keyboard_alone(visit, report, dataset):
     expect(open_first).to_be_focused()
 
 
-def test_scrubbing_shows_the_recorded_forces(visit, report, dataset):
+def test_scrubbing_shows_the_recorded_forces(visit, report, report_set):
     page = visit.open(report, fragment="#episode=4")
     expect(page.locator("#player-title")).to_have_text("Episode 4")
-    frames = next(frames for frames in read_frames(DatasetFacts.read(dataset)) if frames.index == 4)
+    frames = next(frames for frames in read_frames(DatasetFacts.read(report_set)) if frames.index == 4)
     page.locator("#scrub").fill("25")
     robot, human = np.hypot(*frames.actions[25, :2]), np.hypot(*frames.actions[25, 2:])
     expect(page.locator("#player-readout")).to_contain_text(
@@ -86,9 +63,9 @@ def test_scrubbing_shows_the_recorded_forces(visit, report, dataset):
     assert middle == pytest.approx((len(frames.actions) - 1) / 2, abs=1)
 
 
-def test_a_line_of_a_trajectory_opens_its_episode(visit, report, dataset):
+def test_a_line_of_a_trajectory_opens_its_episode(visit, report, report_set):
     page = visit.open(report)
-    facts = DatasetFacts.read(dataset)
+    facts = DatasetFacts.read(report_set)
     target = next(iter(read_frames(facts)))
     page.get_by_role("searchbox", name="Find").fill(facts.episodes[0]["episode_uuid"])
     canvas = page.locator("#panels canvas").first

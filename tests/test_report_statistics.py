@@ -6,35 +6,13 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from report_page import chromium, make_data_set, make_report, route_document, visiting
+from report_page import route_document
 
 from copolicy.cards.artefacts import CHECK_FILE, STATISTICS_FILE
 from copolicy.cards.cli import main
 from copolicy.dataset.cli import main as dataset_command
 
 EPISODES = 5
-
-
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Path:
-    return make_data_set(tmp_path_factory.mktemp("report"), EPISODES)
-
-
-@pytest.fixture(scope="module")
-def report(dataset) -> Path:
-    return make_report(dataset)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with chromium(tmp_path_factory.mktemp("profile")) as context:
-        yield context
-
-
-@pytest.fixture
-def visit(browser):
-    with visiting(browser) as visit:
-        yield visit
 
 
 def test_findings_and_statistics_are_shown(visit, report):
@@ -53,9 +31,9 @@ def test_findings_and_statistics_are_shown(visit, report):
     expect(rows.nth(1)).to_contain_text("one split only")
 
 
-def test_what_was_not_run_is_said(visit, dataset, tmp_path, capsys):
+def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
     root = Path(
-        shutil.copytree(dataset, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json", "*.html"))
+        shutil.copytree(report_set, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json", "*.html"))
     )
     assert main(["report", str(root), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
@@ -67,8 +45,8 @@ def test_what_was_not_run_is_said(visit, dataset, tmp_path, capsys):
         expect(page.locator(place)).to_contain_text("copolicy-dataset stats was not run on this data set")
 
 
-def test_routes_are_shown_beside_those_of_people(visit, dataset, tmp_path):
-    root = Path(shutil.copytree(dataset, tmp_path / "table"))
+def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
+    root = Path(shutil.copytree(report_set, tmp_path / "table"))
     document = route_document(["LL", "LR", "RR", "RL"] * 10, EPISODES)
     (root / STATISTICS_FILE).write_text(json.dumps(document))
     assert main(["report", str(root), "--overwrite"]) == 0
@@ -112,8 +90,8 @@ def test_routes_are_shown_beside_those_of_people(visit, dataset, tmp_path):
     expect(section.get_by_role("region", name="Entropy of the routes in each configuration")).to_be_focused()
 
 
-def test_statistics_of_other_episodes_are_called_stale(visit, dataset, tmp_path):
-    root = Path(shutil.copytree(dataset, tmp_path / "table"))
+def test_statistics_of_other_episodes_are_called_stale(visit, report_set, tmp_path):
+    root = Path(shutil.copytree(report_set, tmp_path / "table"))
     (root / STATISTICS_FILE).write_text(json.dumps(route_document(["RL"] * 6, EPISODES - 1)))
     assert main(["report", str(root), "--overwrite"]) == 0
     page = visit.open(root / "report.html")
@@ -122,8 +100,8 @@ def test_statistics_of_other_episodes_are_called_stale(visit, dataset, tmp_path)
         expect(page.locator(place)).to_contain_text(doubt)
 
 
-def test_findings_about_another_content_are_called_stale(visit, dataset, tmp_path, capsys):
-    root = Path(shutil.copytree(dataset, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json")))
+def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_path, capsys):
+    root = Path(shutil.copytree(report_set, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json")))
     assert dataset_command(["check", str(root), "--json"]) == 0
     date = json.loads((root / CHECK_FILE).read_text())["date"][:10]
     capsys.readouterr()

@@ -16,6 +16,7 @@ import pytest
 from copolicy.collect.cli import main
 from copolicy.collect.episode_job import record_episode
 from copolicy.collect.pilots import PAIRS
+from copolicy.collect.recipes import RECIPES, Recipe
 from copolicy.collect.schedule import balanced_schedule
 from copolicy.collect.simulate import simulate
 from copolicy.collect.start_pose import displaced_start
@@ -203,6 +204,71 @@ def test_command_simulates_and_reports(tmp_path, capsys):
         f"copolicy-collect: {out / 'episode_000000.mcap'}: expected a path that does not exist yet, found one; "
         "nothing was overwritten\n"
     )
+
+
+def test_recipes_do_not_change():
+    """A name stands for its episodes: who trained on `pairs-sim-376` must be able to make it again."""
+    assert {
+        "pairs-sim-376": Recipe(376, 0, "paper36", False, 0.0, None),
+        "pairs-sim-376-orientations": Recipe(376, 0, "paper36", True, 0.0, None),
+        "pairs-sim-376-wide": Recipe(376, 0, "paper36", False, 1.0, 2.6),
+        "pairs-sim-3000": Recipe(3000, 1, "paper36", False, 0.0, None),
+    } == RECIPES
+
+
+def test_a_recipe_gives_the_episodes_of_its_flags(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(RECIPES, "two", Recipe(2, 3, "unseen", orientations=True, start_noise=0.5, clearance=2.6))
+    named = ["simulate", "--recipe", "two", "--out", str(tmp_path / "named"), "--workers", "1", "--json"]
+    assert main(named) == 0
+    flags = ["--episodes", "2", "--seed", "3", "--maps", "unseen", "--orientations", "--start-noise", "0.5"]
+    spelt = ["simulate", *flags, "--clearance", "2.6", "--out", str(tmp_path / "spelt"), "--workers", "1"]
+    assert main(spelt) == 0
+    assert json.loads(capsys.readouterr().out.split("\n}")[0] + "}")["episodes"] == 2
+    assert numbers(tmp_path / "named") == numbers(tmp_path / "spelt")
+    without = ["simulate", *flags, "--out", str(tmp_path / "without"), "--workers", "1"]
+    assert main(without) == 0
+    assert not set(numbers(tmp_path / "named").values()) & set(numbers(tmp_path / "without").values())
+
+
+@pytest.mark.parametrize(
+    ("flags", "text"),
+    [
+        (["--recipe", "pairs-sim-376", "--episodes", "5"], "argument --episodes: not allowed with argument --recipe"),
+        (["--episodes", "5", "--recipe", "pairs-sim-376"], "argument --recipe: not allowed with argument --episodes"),
+        ([], "one of the arguments --episodes --recipe is required"),
+    ],
+)
+def test_either_a_recipe_or_a_number_of_episodes(tmp_path, capsys, flags, text):
+    with pytest.raises(SystemExit) as stopped:
+        main(["simulate", "--out", str(tmp_path / "out"), *flags])
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.endswith(f"copolicy-collect simulate: error: {text}\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_recipe_lists_those_there_are(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["simulate", "--out", str(tmp_path / "out"), "--recipe", "pairs-sim-375"])
+    assert stopped.value.code == 2
+    error = capsys.readouterr().err
+    assert "argument --recipe: invalid choice: 'pairs-sim-375' (choose from " in error
+    assert all(name in error for name in RECIPES)
+
+
+@pytest.mark.parametrize(
+    ("flag", "found"),
+    [
+        (["--seed", "0"], "0"), (["--maps", "holdout"], "'holdout'"), (["--orientations"], "True"),
+        (["--start-noise", "1"], "1.0"), (["--clearance", "2"], "2.0"),
+    ],
+)  # fmt: skip
+def test_what_a_recipe_decides_is_not_asked_for_beside_it(tmp_path, capsys, flag, found):
+    assert main(["simulate", "--out", str(tmp_path / "out"), "--recipe", "pairs-sim-376", *flag]) == 2
+    assert capsys.readouterr().err == (
+        f"copolicy-collect: {flag[0]}: expected nothing beside --recipe pairs-sim-376, which decides it, "
+        f"found {found}\n"
+    )
+    assert not (tmp_path / "out").exists()
 
 
 def test_ctrl_c_leaves_whole_episodes_and_one_line(tmp_path):

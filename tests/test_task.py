@@ -1,5 +1,6 @@
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -11,14 +12,25 @@ from copolicy.dataset.task import MAP_SETS, MapConfig, Physics, identify, map_se
 def test_map_sets_have_the_sizes_of_the_paper():
     assert {name: len(maps) for name, maps in MAP_SETS.items()} == {
         "training": 84,
-        "paper36": 36,
+        "paper36": 108,
         "holdout": 84,
         "unseen": 84,
     }
     assert len(set(MAP_SETS["training"])) == 84
     assert {config.obstacle_size for config in MAP_SETS["training"]} == {50}
     assert {config.obstacle_size for config in (*MAP_SETS["holdout"], *MAP_SETS["unseen"])} == {45}
-    assert set(MAP_SETS["paper36"]) <= set(MAP_SETS["training"])
+
+
+def test_paper36_is_36_configurations_with_equal_shares_and_every_set_of_obstacles():
+    maps = MAP_SETS["paper36"]
+    assert set(maps) == set(MAP_SETS["training"])
+    configurations = Counter((config.start, config.goal, len(config.obstacles)) for config in maps)
+    assert len(configurations) == 36
+    assert set(configurations.values()) == {3}
+    # One of three sets where there is a choice, the only one of three obstacles three times.
+    for count, times in ((1, 1), (2, 1), (3, 3)):
+        assert set(Counter(config for config in maps if len(config.obstacles) == count).values()) == {times}
+    assert {identify(config)[1] for config in maps} == {"training"}
 
 
 @pytest.mark.parametrize(("name", "key"), [("holdout", "holdout_84_nominal_seed88"), ("unseen", "unseen_84")])

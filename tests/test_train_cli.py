@@ -15,21 +15,10 @@ from training_table import (
     losses,
     mark_discarded,
     weights,
-    write_table,
 )
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.train.cli import main, with_defaults
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Path:
-    return write_table(tmp_path_factory.mktemp("data") / "table")
-
-
-@pytest.fixture
-def copied(recorded, tmp_path) -> Path:
-    return Path(shutil.copytree(recorded, tmp_path / "copied"))
 
 
 @pytest.fixture(autouse=True)
@@ -41,15 +30,15 @@ def _logging_as_before():
     root.handlers[:], root.level = before
 
 
-def test_training_is_lerobots_step_for_step(recorded, tmp_path, monkeypatch, capsys):
+def test_training_is_lerobots_step_for_step(random_table, tmp_path, monkeypatch, capsys):
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
-    assert main(["--json", *flags(recorded, ours)]) == 0
+    assert main(["--json", *flags(random_table, ours)]) == 0
     captured = capsys.readouterr()
     summary = json.loads(captured.out)
     assert summary["steps"] == 4
     assert Path(summary["checkpoint"]).samefile(ours / "checkpoints" / "000004" / "pretrained_model")
     assert "torchcodec" not in captured.err
-    lerobot_train(monkeypatch, flags(recorded, theirs))
+    lerobot_train(monkeypatch, flags(random_table, theirs))
     curves = [losses(text) for text in (captured.err, capsys.readouterr().err)]
     assert len(curves[0]) == 4
     assert curves[0] == curves[1]
@@ -69,20 +58,20 @@ def test_training_is_lerobots_step_for_step(recorded, tmp_path, monkeypatch, cap
 
 
 @pytest.mark.filterwarnings("ignore:pkg_resources is deprecated")  # from pygame, which draws the videos
-def test_trains_with_evaluations_and_fine_tunes(recorded, tmp_path, capsys):
+def test_trains_with_evaluations_and_fine_tunes(random_table, tmp_path, capsys):
     environment = {"env.type": "table_carrying", "env.step_limit": 9, "env_eval_freq": 2, "eval.n_episodes": 1}
-    assert main(flags(recorded, tmp_path / "first", steps=2, **environment)) == 0
+    assert main(flags(random_table, tmp_path / "first", steps=2, **environment)) == 0
     assert "'pc_success': 0.0" in capsys.readouterr().err
     checkpoint = tmp_path / "first" / "checkpoints" / "last" / "pretrained_model"
-    tuned = [argument for argument in flags(recorded, tmp_path / "tuned", steps=1) if "policy." not in argument]
+    tuned = [argument for argument in flags(random_table, tmp_path / "tuned", steps=1) if "policy." not in argument]
     assert main([f"--policy.path={checkpoint}", "--policy.device=cpu", "--policy.n_action_steps=1", *tuned]) == 0
     config = json.loads((tmp_path / "tuned" / "checkpoints" / "last" / "pretrained_model" / "config.json").read_text())
     assert (config["width"], config["n_action_steps"], config["push_to_hub"]) == (16, 1, False)
 
 
-def test_discarded_episodes_are_left_out_and_recorded(copied, tmp_path, capsys):
-    mark_discarded(copied, (1, 4))
-    assert main(flags(copied, tmp_path / "out", steps=1)) == 0
+def test_discarded_episodes_are_left_out_and_recorded(copied_table, tmp_path, capsys):
+    mark_discarded(copied_table, (1, 4))
+    assert main(flags(copied_table, tmp_path / "out", steps=1)) == 0
     assert "Leaving out 2 discarded of 6 episodes: [1, 4]" in capsys.readouterr().err
     config = json.loads(
         (tmp_path / "out" / "checkpoints" / "last" / "pretrained_model" / "train_config.json").read_text()
@@ -90,10 +79,10 @@ def test_discarded_episodes_are_left_out_and_recorded(copied, tmp_path, capsys):
     assert config["dataset"]["episodes"] == [0, 2, 3, 5]
     assert config["num_workers"] == 0
     assert config["policy"]["push_to_hub"] is False
-    assert config["dataset"]["repo_id"] == "local/copied"
+    assert config["dataset"]["repo_id"] == "local/copied_table"
 
 
-def test_held_out_episodes_are_evaluated_from_memory(recorded, tmp_path, capsys):
+def test_held_out_episodes_are_evaluated_from_memory(random_table, tmp_path, capsys):
     more = {
         "steps": 2,
         "eval_steps": 2,
@@ -101,7 +90,7 @@ def test_held_out_episodes_are_evaluated_from_memory(recorded, tmp_path, capsys)
         "dataset.eval_split": 0.3,
         "dataset.episodes": "[0,2,4]",
     }
-    assert main(flags(recorded, tmp_path / "out", **more)) == 0
+    assert main(flags(random_table, tmp_path / "out", **more)) == 0
     assert "eval_loss=" in capsys.readouterr().err
 
 
@@ -134,8 +123,8 @@ def test_defaults_do_not_override_what_is_given():
         ([], "Missing required field(s) `dataset`"),
     ],
 )
-def test_wrong_calls_end_with_one_line_and_status_2(recorded, tmp_path, capsys, arguments, message):
-    places = {"tmp": tmp_path, "data": recorded}
+def test_wrong_calls_end_with_one_line_and_status_2(random_table, tmp_path, capsys, arguments, message):
+    places = {"tmp": tmp_path, "data": random_table}
     assert main([argument.format(**places) for argument in arguments]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith("copolicy-train: ")
@@ -143,14 +132,14 @@ def test_wrong_calls_end_with_one_line_and_status_2(recorded, tmp_path, capsys, 
     assert not (tmp_path / "nothing").exists()
 
 
-def test_a_failing_run_ends_with_status_1(copied, tmp_path, capsys):
-    mark_discarded(copied, range(len(LENGTHS)))
-    assert main(flags(copied, tmp_path / "out")) == 1
+def test_a_failing_run_ends_with_status_1(copied_table, tmp_path, capsys):
+    mark_discarded(copied_table, range(len(LENGTHS)))
+    assert main(flags(copied_table, tmp_path / "out")) == 1
     assert "all of the 6 episodes to train on are marked as discarded" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_an_error_inside_lerobot_is_one_line_too_unless_debugging(recorded, tmp_path, capsys):
-    arguments = flags(recorded, tmp_path / "out", drop="x")
+def test_an_error_inside_lerobot_is_one_line_too_unless_debugging(random_table, tmp_path, capsys):
+    arguments = flags(random_table, tmp_path / "out", drop="x")
     arguments[-1] = "--policy.drop_n_last_frames=100"
     assert main(arguments) == 1
     line = capsys.readouterr().err.splitlines()[-1]

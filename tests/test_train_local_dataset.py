@@ -4,20 +4,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from training_table import write_table
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.train.local_dataset import check_local_dataset, training_episodes
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Path:
-    return write_table(tmp_path_factory.mktemp("data") / "table")
-
-
-@pytest.fixture
-def copied(recorded, tmp_path) -> Path:
-    return Path(shutil.copytree(recorded, tmp_path / "copied"))
 
 
 @pytest.mark.parametrize(
@@ -81,9 +70,9 @@ def truncate(path: Path) -> None:
         ),
     ],
 )
-def test_a_damaged_data_set_is_named_and_not_looked_for_on_the_hub(copied, damage, message):
-    check_local_dataset(copied)
-    damage(copied)
+def test_a_damaged_data_set_is_named_and_not_looked_for_on_the_hub(copied_table, damage, message):
+    check_local_dataset(copied_table)
+    damage(copied_table)
     with pytest.raises(FileFormatError) as caught:
-        check_local_dataset(copied)
-    assert str(caught.value).startswith(message.format(root=copied))
+        check_local_dataset(copied_table)
+    assert str(caught.value).startswith(message.format(root=copied_table))

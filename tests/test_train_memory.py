@@ -1,8 +1,6 @@
 """The data set in memory yields the stock loader's batches in the stock sampler's order."""
 
-import shutil
 from itertools import chain
-from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -11,7 +9,7 @@ from accelerate import Accelerator
 from accelerate.data_loader import BatchSamplerShard
 from lerobot.datasets import EpisodeAwareSampler
 from torch.utils.data import BatchSampler, DataLoader, Subset, default_collate
-from training_table import LENGTHS, assert_same_batch, windows, write_table
+from training_table import LENGTHS, assert_same_batch, windows
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import STATE, TASK
@@ -19,19 +17,9 @@ from copolicy.train.epoch_order import WholeEpochSampler
 from copolicy.train.memory_dataset import DeferredBatch, MemoryDataset
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Path:
-    return write_table(tmp_path_factory.mktemp("data") / "table")
-
-
-@pytest.fixture
-def copied(recorded, tmp_path) -> Path:
-    return Path(shutil.copytree(recorded, tmp_path / "copied"))
-
-
 @pytest.mark.parametrize("episodes", [None, [4, 1, 2]])
-def test_batches_are_the_stock_loaders(recorded, episodes):
-    stock = windows(recorded, episodes=episodes)
+def test_batches_are_the_stock_loaders(random_table, episodes):
+    stock = windows(random_table, episodes=episodes)
     memory = MemoryDataset(stock)
     assert (len(memory), memory.num_frames, memory.num_episodes) == (len(stock), stock.num_frames, stock.num_episodes)
     indices = torch.randperm(len(stock), generator=torch.Generator().manual_seed(0)).tolist()
@@ -43,8 +31,8 @@ def test_batches_are_the_stock_loaders(recorded, episodes):
     assert_same_batch(memory[3], stock[3])
 
 
-def test_windows_are_padded_at_both_ends_of_an_episode(recorded):
-    memory = MemoryDataset(windows(recorded))
+def test_windows_are_padded_at_both_ends_of_an_episode(random_table):
+    memory = MemoryDataset(windows(random_table))
     first, last = LENGTHS[0], LENGTHS[0] + LENGTHS[1] - 1
     batch = memory.window_batch([first, last])
     assert batch["action_is_pad"][0].tolist() == [True, True] + [False] * 5 + [True] * 5
@@ -55,26 +43,26 @@ def test_windows_are_padded_at_both_ends_of_an_episode(recorded):
 
 
 @pytest.mark.parametrize("workers", [0, 1])
-def test_a_batch_passes_the_loader_in_one_piece(recorded, workers):
-    loader = DataLoader(MemoryDataset(windows(recorded)), batch_size=16, num_workers=workers)
+def test_a_batch_passes_the_loader_in_one_piece(random_table, workers):
+    loader = DataLoader(MemoryDataset(windows(random_table)), batch_size=16, num_workers=workers)
     batch = next(iter(loader))
     assert batch["action"].shape == (16, 12, 4)
     assert batch["task"] == [TASK] * 16
 
 
-def test_rows_out_of_order_are_refused(copied):
-    path = copied / "data" / "chunk-000" / "file-000.parquet"
+def test_rows_out_of_order_are_refused(copied_table):
+    path = copied_table / "data" / "chunk-000" / "file-000.parquet"
     table = pq.read_table(path)
     order = [*range(3), 4, 3, *range(5, len(table))]
     pq.write_table(table.take(order[len(table) // 2 :] + order[: len(table) // 2]), path)
     with pytest.raises(RunError, match="expected the rows of each episode together and in order"):
-        MemoryDataset(windows(copied))
+        MemoryDataset(windows(copied_table))
 
 
 @pytest.mark.parametrize("shuffle", [True, False])
 @pytest.mark.parametrize("episodes", [None, [0, 3]])
-def test_order_is_the_stock_samplers(recorded, shuffle, episodes):
-    dataset = windows(recorded, episodes=episodes)
+def test_order_is_the_stock_samplers(random_table, shuffle, episodes):
+    dataset = windows(random_table, episodes=episodes)
     table = dataset.meta.episodes
     samplers = [
         kind(
@@ -94,9 +82,9 @@ def test_order_is_the_stock_samplers(recorded, shuffle, episodes):
     assert list(samplers[0]) == list(samplers[1])
 
 
-def test_a_batch_for_a_device_is_gathered_there(recorded):
+def test_a_batch_for_a_device_is_gathered_there(random_table):
     """As for a GPU: the loader hands on positions, and what is sent to the device are they alone."""
-    stock = windows(recorded)
+    stock = windows(random_table)
     deferred = MemoryDataset(stock, deferred=True)
     loader = DataLoader(deferred, batch_size=16)
     (first, *_) = list(loader)
@@ -112,9 +100,9 @@ def test_a_batch_for_a_device_is_gathered_there(recorded):
 
 
 @pytest.mark.parametrize("processes", [2, 3])
-def test_processes_share_an_epoch_without_overlap(recorded, processes):
+def test_processes_share_an_epoch_without_overlap(random_table, processes):
     """Side by side, the batches of all processes are those of one process with their batch sizes together."""
-    episodes = windows(recorded).meta.episodes
+    episodes = windows(random_table).meta.episodes
 
     def batches(size: int) -> BatchSampler:
         order = WholeEpochSampler(episodes["dataset_from_index"], episodes["dataset_to_index"], shuffle=True, seed=7)

@@ -5,8 +5,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import MAP_SETS
 
 from .demonstration.command import add_demo_command
@@ -34,13 +36,16 @@ def parser() -> argparse.ArgumentParser:
     amount.add_argument(
         "--recipe", choices=sorted(RECIPES), help="a named set of episodes; decides all but --out and --workers"
     )
-    command.add_argument("--seed", type=int, default=0, help="of the schedule and of the pilots (default 0)")
-    command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")
     command.add_argument("--out", type=Path, required=True, help="folder for the recordings, without any yet")
     command.add_argument("--workers", type=int, help="processes (default: one for each processor)")
-    command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    # None where a flag is not given, so that a recipe can refuse it instead of passing over it.
+    command.add_argument("--seed", type=int, help="of the schedule and of the pilots (default 0)")
+    command.add_argument("--maps", choices=sorted(MAP_SETS), dest="map_set", help="set of maps (default training)")
     command.add_argument(
-        "--start-noise", type=float, default=0.0, metavar="SCALE",
+        "--orientations", action="store_true", default=None, help="each map with four start orientations"
+    )
+    command.add_argument(
+        "--start-noise", type=float, metavar="SCALE",
         help="begin beside the start: up to SCALE times 90 px, 60 px and 0.6 rad away (default 0)",
     )  # fmt: skip
     command.add_argument(
@@ -81,18 +86,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> dict:
-    if arguments.recipe is not None:
-        return simulate(arguments.out, workers=arguments.workers, **asdict(RECIPES[arguments.recipe]))
-    return simulate(
-        arguments.out,
-        arguments.episodes,
-        arguments.seed,
-        arguments.maps,
-        arguments.workers,
-        arguments.orientations,
-        start_noise=arguments.start_noise,
-        clearance=arguments.clearance,
-    )
+    flags = {"--seed": "seed", "--maps": "map_set", "--orientations": "orientations", "--start-noise": "start_noise",
+             "--clearance": "clearance"}  # fmt: skip
+    given = {flag: getattr(arguments, name) for flag, name in flags.items() if getattr(arguments, name) is not None}
+    if arguments.recipe is None:
+        choice: dict[str, Any] = {"seed": 0} | {flags[flag]: value for flag, value in given.items()}
+        return simulate(arguments.out, arguments.episodes, workers=arguments.workers, **choice)
+    for flag, value in given.items():
+        raise InvalidValueError(flag, f"nothing beside --recipe {arguments.recipe}, which decides it", value)
+    return simulate(arguments.out, workers=arguments.workers, **asdict(RECIPES[arguments.recipe]))
 
 
 def _recover(arguments: argparse.Namespace) -> dict:

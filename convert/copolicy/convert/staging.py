@@ -23,15 +23,20 @@ def require_new(path: Path) -> None:
 
 
 @contextmanager
-def new_folder(path: Path) -> Iterator[Path]:
+def new_folder(path: Path, suffix: str | None = None) -> Iterator[Path]:
     """A path beside `path` to build a folder at, renamed to `path` at the end of the block and removed on any error.
+
+    Args:
+        suffix: of its name, where only one process builds this folder: what a killed one left under the same name goes
+            first. By default a name of its own, which no other process uses.
 
     Raises:
         OutputExistsError: there is something at `path`, before the block or after it.
     """
     require_new(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
+    partial = path.parent / f".{path.name}.{suffix or f'{secrets.token_hex(4)}.partial'}"
+    shutil.rmtree(partial, ignore_errors=True)
     try:
         yield partial
         sync_tree(partial)

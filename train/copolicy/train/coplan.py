@@ -62,8 +62,13 @@ class Outcome:
         }
 
 
-class _Table:
-    """One world with the history that the policy sees of it."""
+class PlannedTable:
+    """One world with the history that the policy sees of it.
+
+    Attributes:
+        path: the table's centre, from the start on, px.
+        outcome: how it ended; None while it is carried.
+    """
 
     def __init__(self, map_index: int, config: MapConfig, repeat: int, physics: Physics, length: int):
         self.map_index, self.repeat = map_index, repeat
@@ -76,6 +81,16 @@ class _Table:
         self.interaction: list[float] = []
         self.plans = 0
         self.outcome = None
+
+    def branch(self, repeat: int) -> "PlannedTable":
+        """The same table with the same past, to go on in another way."""
+        table = PlannedTable(self.map_index, self.world.map_config, repeat, self.world.physics, len(self.states))
+        table.world.reset(self.world.pose, self.world.velocity)
+        table.world.step_count = self.world.step_count
+        table.states, table.human = list(self.states), list(self.human)
+        table.path, table.interaction = list(self.path), list(self.interaction)
+        table.plans, table.outcome = self.plans, self.outcome
+        return table
 
     def execute(self, action: np.ndarray, hold: int) -> None:
         """Holds one action, then observes, unless the episode ends on the way."""
@@ -126,10 +141,22 @@ def coplan(
         One outcome for each map and repeat, in that order.
     """
     hold = clock.stride(fps)
-    tables = [_Table(i, m, r, physics, planner.frames) for i, m in enumerate(maps) for r in range(repeats)]
+    tables = [PlannedTable(i, m, r, physics, planner.frames) for i, m in enumerate(maps) for r in range(repeats)]
     planner.seed(seed)
+    carry_on(planner, tables, actions_per_plan, hold, on_plan)
+    return [table.result() for table in tables]
+
+
+def carry_on(
+    planner: Planner,
+    tables: Sequence[PlannedTable],
+    actions_per_plan: int,
+    hold: int,
+    on_plan: Callable[[int], object] = lambda finished: None,
+) -> None:
+    """Plans for all tables at once and executes, until each has come to its end."""
     while running := [table for table in tables if table.outcome is None]:
-        plans = planner.plan(_history(running))
+        plans = planner.plan(histories(running))
         for table, plan in zip(running, plans, strict=True):
             table.plans += 1
             for action in plan[:actions_per_plan]:
@@ -137,10 +164,10 @@ def coplan(
                 if table.outcome is not None:
                     break
         on_plan(sum(table.outcome is not None for table in tables))
-    return [table.result() for table in tables]
 
 
-def _history(tables: Sequence[_Table]) -> dict[str, np.ndarray]:
+def histories(tables: Sequence[PlannedTable]) -> dict[str, np.ndarray]:
+    """What the policy sees of each table: observation keys to `(B, To, n)`."""
     states = np.array([table.states for table in tables])  # (B, To, 7)
     maps = np.array([table.map_vector for table in tables])[:, None]  # (B, 1, 11)
     return {

@@ -4,16 +4,15 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from copolicy.dataset.clock import stride
 from copolicy.dataset.commandline import add_command, command_parser, progress_bar, run
-from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import MAP_SETS, map_set
 
 from .comparison import add_compare_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
+from .plans_command import add_plans_command
 from .result_file import require_new, write_json
-from .study_flags import add_study_flags, physics_of, policy_settings, require_positive
+from .study_flags import add_study_flags, physics_of, planner_of, require_positive, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,6 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_partner_command(commands)
     add_human_command(commands)
     add_compare_command(commands)
+    add_plans_command(commands)
     return run(parser, argv)
 
 
@@ -45,15 +45,10 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     require_positive(arguments, "repeats", "actions_per_plan", "limit")
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .coplan import coplan
-    from .planner import Planner
     from .study import summarise
     from .trajectories_figure import save_trajectories
 
-    planner = Planner(arguments.policy, arguments.device, **policy_settings(arguments))
-    available = planner.checkpoint.planned_frames
-    if arguments.actions_per_plan > available:
-        raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
-    planner.actions = arguments.actions_per_plan
+    planner = planner_of(arguments.policy, arguments)
     maps = map_set(arguments.maps, arguments.orientations)[: arguments.limit]
     physics = physics_of(arguments)
     with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
@@ -78,13 +73,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
             "map_count": len(maps),
             "complete_set": arguments.limit is None,
             "repeats": arguments.repeats,
-            "actions_per_plan": arguments.actions_per_plan,
-            "fps": arguments.fps,
-            "hold": stride(arguments.fps),
-            "step_limit": arguments.step_limit,
-            "angular_acceleration_limit": physics.angular_acceleration_limit,
-            "seed": arguments.seed,
-            "device": arguments.device,
+            **study_settings(arguments),
         },
         "summary": summary,
         "episodes": [outcome.to_json() for outcome in outcomes],

@@ -2,10 +2,15 @@
 
 import argparse
 import math
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import Physics
+
+if TYPE_CHECKING:
+    from .planner import Planner
 
 ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
@@ -45,6 +50,36 @@ def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) 
 def policy_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """Settings of the policy that the flags change."""
     return {name: getattr(arguments, name) for name in _POLICY_SETTINGS if getattr(arguments, name) is not None}
+
+
+def study_settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the flags of `add_study_flags` say, as a result keeps it."""
+    return {
+        "actions_per_plan": arguments.actions_per_plan,
+        "fps": arguments.fps,
+        "hold": stride(arguments.fps),
+        "step_limit": arguments.step_limit,
+        "angular_acceleration_limit": ANGULAR_LIMITS[arguments.angular_limit],
+        "seed": arguments.seed,
+        "device": arguments.device,
+    }
+
+
+def planner_of(path: Path | str, arguments: argparse.Namespace) -> "Planner":
+    """The checkpoint at `path` as the flags want it to plan.
+
+    Raises:
+        FileFormatError: no such checkpoint, or one without a setting that the flags change.
+        InvalidValueError: it plans fewer actions than are to be executed.
+    """
+    from .planner import Planner  # torch
+
+    planner = Planner(path, arguments.device, **policy_settings(arguments))
+    available = planner.checkpoint.planned_frames
+    if arguments.actions_per_plan > available:
+        raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
+    planner.actions = arguments.actions_per_plan
+    return planner
 
 
 def physics_of(arguments: argparse.Namespace) -> Physics:

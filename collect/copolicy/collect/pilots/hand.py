@@ -22,6 +22,10 @@ class UnsteadyHand:
 
     It adds slow noise, pushes in pulses of unequal strength, works now more and now less than its share, rests now
     and then, and slips now and then: pushes for a moment in some other direction, from which both must recover.
+
+    Attributes:
+        pauses: how often it has rested.
+        slips: how often it has slipped.
     """
 
     def __init__(self, habits: Habits, rng: np.random.Generator):
@@ -35,6 +39,7 @@ class UnsteadyHand:
         self._x, self._y = (habits.noise * rng.standard_normal(2)).tolist()
         self._drift = habits.effort_drift * rng.standard_normal()
         self._slip = (0.0, 0.0)
+        self.pauses = self.slips = 0
 
     def push(self, x: float, y: float) -> tuple[float, float]:
         """The force that comes out of the one that was meant, each component in [-1, 1]."""
@@ -57,6 +62,7 @@ class UnsteadyHand:
         if self._pause_left:
             self._pause_left -= 1
         elif self._begins(self._habits.pauses_per_min):
+            self.pauses += 1
             self._pause_left = round(RECORD_HZ * self._rng.uniform(*_PAUSE_S))
         return self._pause_left > 0
 
@@ -64,6 +70,7 @@ class UnsteadyHand:
         if self._slip_left:
             self._slip_left -= 1
         elif self._begins(self._habits.slips_per_min):
+            self.slips += 1
             self._slip_left = round(RECORD_HZ * self._rng.uniform(*_SLIP_S))
             size, angle = self._rng.uniform(*_SLIP), self._rng.uniform(0, 2 * math.pi)
             self._slip = (size * math.cos(angle), size * math.sin(angle))

@@ -45,7 +45,7 @@ class ScriptedPilot:
         self.player = player
         self.habits = habits
         self.intention = Intention(map_config, habits, rng)
-        self._hand = UnsteadyHand(habits, rng)
+        self.hand = UnsteadyHand(habits, rng)
         self._partner = PartnerForce()
         self._seen: deque[list[float]] = deque(maxlen=habits.delay_steps + 1)
         self._pushed: deque[tuple[float, float]] = deque(maxlen=habits.delay_steps + 1)
@@ -70,7 +70,7 @@ class ScriptedPilot:
         if len(self._seen) == self._seen.maxlen and len(self._pushed) == self._pushed.maxlen:
             self._partner.feel((vx, vy), self._pushed[0])
             self.intention.consider(pose, math.hypot(vx, vy), self._partner)
-        force = self._hand.push(*self._meant_force(pose, cos, sin, vx, vy))
+        force = self.hand.push(*self._meant_force(pose, cos, sin, vx, vy))
         self._pushed.append(force)
         return np.array(force)
 

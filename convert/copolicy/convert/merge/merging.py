@@ -1,17 +1,12 @@
 """Merges data sets with LeRobot's aggregation, and puts right what that does to the tables.
 
 LeRobot reads tables with pandas, which writes NaN ("not measured") as null and vectors of a fixed length as lists of
-any, and it leaves the statistics of the running numbers unmoved. Numbers, files and times are taken from what it
-wrote; every other column from the data sets as they were, with its type. The content of every episode is then
-compared with what it was.
+any. Numbers, files and times are taken from what it wrote; every other column from the data sets as they were, with
+its type. The content of every episode is then compared with what it was.
 """
 
-import contextlib
-import io
 import json
-import logging
-import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,8 +14,9 @@ from typing import Any
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
 from copolicy.dataset.versions.content import Content, read_content
 
+from ..joined_sets import join_data_sets
 from ..lerobot_writer import RECORD_FILE
-from ..shifted_tables import Shift, numbered_files, read_table
+from ..shifted_tables import numbered_files, read_table
 from ..staging import new_folder, require_new
 from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
 from .source import MergeSource, require_alike
@@ -28,11 +24,7 @@ from .source import MergeSource, require_alike
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
-    from datasets import config
-    from lerobot.datasets.aggregate import aggregate_datasets
-    from lerobot.datasets.compute_stats import aggregate_stats
     from lerobot.datasets.feature_utils import get_hf_features_from_features
-    from lerobot.datasets.io_utils import load_stats, write_stats
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
@@ -77,10 +69,7 @@ def merge_datasets(
     ]
     expected = _joined(sources, tables)
     with new_folder(root) as partial:
-        with _quiet(partial.with_name(f"{partial.name}.cache")):
-            # Videos stay in the files they are in: joined, their packets would be written in another form.
-            aggregate_datasets([repo_id] * len(roots), repo_id, list(roots), partial, concatenate_videos=False)
-        write_stats(aggregate_stats(list(_moved_statistics(sources))), partial)
+        join_data_sets(roots, repo_id, partial, partial.with_name(f"{partial.name}.cache"))
         _restore_episodes(partial, expected)
         _restore_frames(partial)
         content = read_content(partial)
@@ -97,13 +86,6 @@ def merge_datasets(
         "content_hash": content.hash,
         "left_behind": left_behind,
     }
-
-
-def _moved_statistics(sources: Sequence[MergeSource]) -> Iterator[dict[str, dict[str, Any]]]:
-    episodes = frames = 0
-    for source in sources:
-        yield Shift(episodes, frames).statistics(load_stats(source.root) or {})
-        episodes, frames = episodes + source.info["total_episodes"], frames + source.info["total_frames"]
 
 
 def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa.Table":
@@ -206,20 +188,3 @@ def _record(sources: Sequence[MergeSource], prefixes: Sequence[str] | None) -> d
         "hold": info["features"]["action"].get("hold", ""),
         "notes": notes,
     }
-
-
-@contextlib.contextmanager
-def _quiet(cache: Path) -> Iterator[None]:
-    """LeRobot logs each of its steps, draws progress bars whether or not stderr is a terminal, and leaves a copy of
-    each table of episodes in the user's cache; here in one that goes away."""
-    logger = logging.getLogger("lerobot")
-    level, place = logger.level, config.HF_DATASETS_CACHE
-    logger.setLevel(logging.WARNING)
-    config.HF_DATASETS_CACHE = cache
-    try:
-        with contextlib.redirect_stderr(io.StringIO()):
-            yield
-    finally:
-        config.HF_DATASETS_CACHE = place
-        logger.setLevel(level)
-        shutil.rmtree(cache, ignore_errors=True)

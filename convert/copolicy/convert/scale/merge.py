@@ -1,10 +1,7 @@
 """All shards to the one data set, with what can only be said of all episodes together."""
 
 import json
-import shutil
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,7 +12,7 @@ from copolicy.dataset.exceptions import RunError
 from ..lerobot_writer import RECORD_FILE, WrittenDataset
 from ..prepare import LeftOut
 from ..shifted_tables import numbered_files, read_table
-from ..staging import require_new, sync_folder, sync_tree
+from ..staging import new_folder, require_new
 from .aggregation import aggregate
 from .findings import all_findings
 from .plan import DATA_SET, ShardPlan
@@ -46,7 +43,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         left_out.damaged += record["left_out"]["damaged"]
         left_out.discarded += record["left_out"]["discarded"]
         left_out.messages += record["left_out"]["messages"]
-    with _staging(plan.root) as partial:
+    with new_folder(plan.root, "merging") as partial:
         info = aggregate(roots, plan.repo_id, partial, plan.folder / "cache")
         _write_record(plan, partial, roots, left_out)
         findings = all_findings(partial, records)
@@ -79,24 +76,6 @@ def _require_once(uuids: list[str]) -> None:
         if uuid in seen:
             raise RunError(f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}")
         seen[uuid] = index
-
-
-@contextmanager
-def _staging(root: Path) -> Iterator[Path]:
-    """A folder beside `root` that becomes `root`; unlike `staging.new_folder` with one name, so that the next run
-    finds and removes what a killed one left."""
-    root.parent.mkdir(parents=True, exist_ok=True)
-    partial = root.parent / f".{root.name}.merging"
-    shutil.rmtree(partial, ignore_errors=True)
-    try:
-        yield partial
-        sync_tree(partial)
-        require_new(root)
-        partial.rename(root)
-        sync_folder(root.parent)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
 
 
 def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> None:

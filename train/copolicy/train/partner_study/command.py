@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from copolicy.collect.pilots.partners import PARTNERS
-from copolicy.dataset.clock import stride
 from copolicy.dataset.commandline import add_command, progress_bar
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import require_new, write_json
-from ..study_flags import add_study_flags, physics_of, policy_settings, require_positive
+from ..study_flags import add_study_flags, physics_of, planner_of, require_positive, study_settings
 
 if TYPE_CHECKING:
     from .robots import Robot
@@ -122,13 +121,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
             "partners": {kind: asdict(PARTNERS[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
-            "actions_per_plan": arguments.actions_per_plan,
-            "fps": arguments.fps,
-            "hold": stride(arguments.fps),
-            "step_limit": arguments.step_limit,
-            "angular_acceleration_limit": physics.angular_acceleration_limit,
-            "seed": arguments.seed,
-            "device": arguments.device,
+            **study_settings(arguments),
         },
         "definitions": DEFINITIONS,
         "baselines": described[1:],
@@ -158,17 +151,12 @@ def make_robot(text: str, arguments: argparse.Namespace) -> "Robot":
         FileFormatError: no such checkpoint.
         InvalidValueError: it plans fewer actions than are to be executed.
     """
-    from ..planner import Planner
     from .robots import SCRIPTED_ROBOTS, PolicyRobot
 
     if text in SCRIPTED_ROBOTS:
         return SCRIPTED_ROBOTS[text]()
     name, path = split_name(text)
-    planner = Planner(path, arguments.device, **policy_settings(arguments))
-    available = planner.checkpoint.planned_frames
-    if arguments.actions_per_plan > available:
-        raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
-    planner.actions = arguments.actions_per_plan
+    planner = planner_of(path, arguments)
     return PolicyRobot(name or planner.checkpoint.name, planner, arguments.actions_per_plan)
 
 

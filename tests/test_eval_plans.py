@@ -1,0 +1,240 @@
+"""Plans from one state: each goes on from there as co-planning would, and is told by the way that it took."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from matplotlib import image
+from matplotlib.colors import to_rgb
+from untrained_policy import save_untrained_policy
+
+from copolicy.collect.pilots import simulated_pair
+from copolicy.collect.world import TableWorld
+from copolicy.dataset import clock
+from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.features import STATE
+from copolicy.dataset.routes import route_class
+from copolicy.dataset.task import MapConfig, Physics
+from copolicy.train.coplan import PlannedTable
+from copolicy.train.eval_cli import main
+from copolicy.train.planner import Planner
+from copolicy.train.plans import sample_plans
+from copolicy.train.plans_figure import save_plans
+
+MAP = MapConfig((240.0, 300.0, 3.14), (960.0, 300.0), ((600.0, 300.0),))
+BLUE, VERMILION = "#0072B2", "#D55E00"
+
+
+def carried(word: str) -> tuple[np.ndarray, np.ndarray]:
+    """The 10 Hz actions of a simulated pair that took a route, and its path."""
+    for seed in range(40):
+        world, pilots = TableWorld(MAP), simulated_pair(MAP, "S01", seed)
+        actions, path, outcome = [], [world.pose[:2]], None
+        while outcome is None or not outcome.done:
+            actions.append(np.concatenate([pilot.act(world.observation) for pilot in pilots]))
+            outcome = world.step(actions[-1])
+            path.append(world.pose[:2])
+        if outcome.success and route_class(np.array(path), MAP) == word:
+            return clock.frame_actions(np.array(actions), 10), np.array(path)
+    raise AssertionError(f"no pair of forty took {word}")
+
+
+@pytest.fixture(scope="module")
+def left() -> tuple[np.ndarray, np.ndarray]:
+    return carried("L")
+
+
+@pytest.fixture(scope="module")
+def right() -> tuple[np.ndarray, np.ndarray]:
+    return carried("R")
+
+
+class Replayed:
+    """Plans what was demonstrated: asked for whole plans, each demonstration in turn; else the one that is near."""
+
+    def __init__(self, *demonstrations: tuple[np.ndarray, np.ndarray]):
+        self.frames = 3
+        self.actions: int | None = 8
+        self.demonstrations = demonstrations
+        self.frame = 0
+        self.lengths = []
+
+    def seed(self, seed: int) -> None:
+        """A replay has no noise."""
+
+    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        length = 10 if self.actions is None else self.actions
+        self.lengths.append(length)
+        places = history[STATE][:, -1, :2]
+        plans = [self._rest(k if self.actions is None else self._near(place), length) for k, place in enumerate(places)]
+        self.frame += 8
+        return np.array(plans)
+
+    def _near(self, place: np.ndarray) -> int:
+        paths = (path for _, path in self.demonstrations)
+        return int(np.argmin([np.hypot(*(path[min(3 * self.frame, len(path) - 1)] - place)) for path in paths]))
+
+    def _rest(self, which: int, length: int) -> np.ndarray:
+        actions, _ = self.demonstrations[which % len(self.demonstrations)]
+        # The goal may be a step further away than for the pair itself: go on pushing.
+        return np.vstack((actions[self.frame :], np.tile(actions[-1], (length, 1))))[:length]
+
+
+def decide(planner: Replayed, **settings):
+    return sample_plans(planner, MAP, Physics(), **{"samples": 4, **settings})  # pyright: ignore[reportArgumentType]
+
+
+def test_each_plan_goes_its_way(left, right):
+    planner = Replayed(left, right)
+    decision = decide(planner)
+    assert [sample.route for sample in decision.samples] == ["L", "R", "L", "R"]
+    assert decision.pose == MAP.start
+    np.testing.assert_array_equal(decision.way, [MAP.start[:2]])
+    for sample, (actions, path) in zip(decision.samples, (left, right) * 2, strict=True):
+        np.testing.assert_array_equal(sample.plan, actions[:10])  # whole, whatever is executed of it
+        assert sample.planned_path.shape == (31, 2)
+        assert np.abs(sample.planned_path - path[:31]).max() < 1.0
+        steps = min(len(path), len(sample.outcome.path))
+        assert np.abs(sample.outcome.path[:steps] - path[:steps]).max() < 2.0
+        assert sample.outcome.plans == -(-sample.outcome.steps // 24)
+    # Whole plans at the state in question, only what is executed elsewhere.
+    assert planner.lengths[0] == 10
+    assert set(planner.lengths[1:]) == {8}
+
+
+def test_plans_are_sampled_some_way_into_an_episode(left):
+    decision = decide(Replayed(left), samples=2, seconds=1.6)
+    assert decision.way.shape == (49, 2)
+    assert np.abs(decision.way - left[1][:49]).max() < 2.0
+    assert decision.pose[:2] == tuple(decision.way[-1])
+    for sample in decision.samples:
+        np.testing.assert_array_equal(sample.outcome.path[:49], decision.way)
+        np.testing.assert_array_equal(sample.planned_path[0], decision.way[-1])
+        np.testing.assert_array_equal(sample.plan, left[0][16:26])
+        assert sample.route == "L"
+
+
+def test_a_moment_within_a_plan_is_reached_by_a_shorter_plan(left):
+    decision = decide(Replayed(left), samples=1, seconds=0.5)
+    assert decision.way.shape == (16, 2)
+    assert np.abs(decision.way - left[1][:16]).max() < 2.0
+
+
+def test_a_moment_after_the_end_is_refused(left):
+    with pytest.raises(RunError, match=r"^--seconds: expected a moment before the end, found one at 1\d\.\d s$"):
+        decide(Replayed(left), seconds=60.0)
+
+
+def test_the_route_of_an_unfinished_path_is_not_decided():
+    upwards = np.tile([0.0, -1.0, 0.0, -1.0], (60, 1))
+    decision = decide(Replayed((upwards, np.tile(MAP.start[:2], (181, 1)))))
+    assert {sample.outcome.reason for sample in decision.samples} == {"collision_wall"}
+    assert {sample.route for sample in decision.samples} == {None}
+
+
+def test_a_branch_goes_on_as_the_table_itself():
+    table = PlannedTable(0, MAP, 0, Physics(step_limit=40), 3)
+    rng = np.random.default_rng(0)
+    for action in rng.uniform(-1, 1, (5, 4)):
+        table.execute(action, 3)
+    branch = table.branch(7)
+    rest = rng.uniform(-1, 1, (9, 4))
+    for number, action in enumerate(rest):
+        branch.execute(action, 3)
+        assert len(table.path) == 16 + 3 * number  # the one leaves the other alone
+        table.execute(action, 3)
+        if branch.outcome is not None:
+            break
+    one, other = table.result(), branch.result()
+    assert (one.reason, one.steps, other.repeat) == (other.reason, other.steps, 7)
+    assert one.reason == "timeout"
+    np.testing.assert_array_equal(one.path, other.path)
+    np.testing.assert_array_equal(one.interaction, other.interaction)
+    np.testing.assert_array_equal(table.states, branch.states)
+    np.testing.assert_array_equal(table.human, branch.human)
+
+
+def drawn(path: Path, colour: str) -> int:
+    """Pixels of about a colour."""
+    return int((np.abs(image.imread(path)[..., :3] - to_rgb(colour)).max(axis=-1) < 0.06).sum())
+
+
+def test_the_picture_has_a_colour_for_each_route(left, right, tmp_path):
+    save_plans(decide(Replayed(left, right)), tmp_path / "both.png", "both")
+    save_plans(decide(Replayed(left)), tmp_path / "one.png", "one")
+    both, one = ([drawn(tmp_path / name, colour) for colour in (BLUE, VERMILION)] for name in ("both.png", "one.png"))
+    assert min(both) > 100
+    assert one[0] > 100
+    assert one[1] < 20
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory) -> Path:
+    """An untrained co-policy as a checkpoint folder."""
+    return save_untrained_policy(tmp_path_factory.mktemp("checkpoint"))
+
+
+def test_the_same_seed_gives_the_same_plans_and_no_two_are_alike(checkpoint):
+    planner = Planner(checkpoint)
+    # The untrained head is zero and would plan rest from any noise.
+    torch.manual_seed(0)
+    for parameter in planner.checkpoint.policy.parameters():
+        torch.nn.init.normal_(parameter, std=0.1)
+    first, second, other = (
+        np.array([s.plan for s in sample_plans(planner, MAP, Physics(step_limit=30), samples=3, seed=seed).samples])
+        for seed in (4, 4, 5)
+    )
+    assert first.shape == (3, planner.checkpoint.planned_frames, 4)
+    np.testing.assert_array_equal(first, second)
+    assert np.abs(first - other).max() > 1e-4
+    assert np.abs(first[0] - first[1]).max() > 1e-4
+
+
+def command(checkpoint: Path, out: Path, *flags: str) -> int:
+    settings = ("--policy", str(checkpoint), "--map", "7", "--samples", "3", "--step-limit", "60")
+    return main(["plans", *settings, "--out", str(out), *flags])
+
+
+def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
+    out = tmp_path / "made" / "plans.png"
+    assert command(checkpoint, out, "--json", "--seconds", "0.5") == 0
+    # An untrained network plans rest: nothing gets anywhere, so no route is decided.
+    assert json.loads(capsys.readouterr().out) == {
+        "map": "unseen-07",
+        "seconds": 0.5,
+        "samples": 3,
+        "routes": {},
+        "ended_by": {"timeout": 3},
+        "picture": str(out),
+    }
+    assert out.read_bytes().startswith(b"\x89PNG")
+    assert command(checkpoint, out) == 2
+    assert capsys.readouterr().err == (
+        f"copolicy-eval: {out}: expected a path that does not exist yet, found one; nothing was overwritten\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("flags", "status", "text"),
+    [
+        (["--map", "84"], 2, "--map: expected 0 to 83, found 84"),
+        (["--map", "-1"], 2, "--map: expected 0 to 83, found -1"),
+        (["--samples", "0"], 2, "--samples: expected at least 1, found 0"),
+        (["--seconds", "-1"], 2, "--seconds: expected a number of at least 0, found -1.0"),
+        (["--seconds", "nan"], 2, "--seconds: expected a number of at least 0, found nan"),
+        (["--seconds", "5"], 1, "--seconds: expected a moment before the end, found one at 2.0 s"),
+        (["--actions-per-plan", "11"], 2, "--actions-per-plan: expected at most the plan's 10, found 11"),
+    ],
+)
+def test_wrong_calls_say_what_is_wrong(checkpoint, tmp_path, capsys, flags, status, text):
+    assert command(checkpoint, tmp_path / "plans.png", *flags) == status
+    assert capsys.readouterr().err == f"copolicy-eval: {text}\n"
+    assert not (tmp_path / "plans.png").exists()
+
+
+def test_a_picture_is_a_png(checkpoint, tmp_path, capsys):
+    out = tmp_path / "plans.jpg"
+    assert command(checkpoint, out) == 2
+    assert capsys.readouterr().err == f"copolicy-eval: {out}: expected a name that ends with .png, found '.jpg'\n"
