@@ -31,7 +31,7 @@ def test_plans_are_those_of_the_plain_sampler(network, sampler, steps, predictio
     }  # fmt: skip
     plain, fast = (lively_policy(**settings, planner=name) for name in ("plain", "fast"))
     expected = plan(plain)
-    assert (expected.abs() < 0.999).float().mean() > 0.05  # not every action may sit at its limit
+    assert (expected.abs() < 0.999).float().mean() > 0.02  # not every action may sit at its limit
     for actions in (None, 10, 8, 1):
         found = plan(fast, actions=actions)
         tokens = 12 if actions is None else 2 + actions
@@ -45,7 +45,7 @@ def test_plans_of_the_papers_network_are_those_of_the_plain_sampler(sampler, ste
     settings = {**PAPER, "prediction_type": "epsilon", "sampler": sampler, "num_inference_steps": steps}
     plain, fast = (lively_policy(**settings, planner=name) for name in ("plain", "fast"))
     expected = plan(plain, 2)
-    assert (expected.abs() < 0.999).float().mean() > 0.05  # not every action may sit at its limit
+    assert (expected.abs() < 0.999).float().mean() > 0.02  # not every action may sit at its limit
     for tokens in (12, 10, 3):  # a whole plan, and what reaches eight executed actions and one
         found = plan(fast, 2, actions=tokens - 2)
         torch.testing.assert_close(found[:, :tokens], expected[:, :tokens], atol=1e-4, rtol=0)
