@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ..exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from ..exceptions import FileFormatError, InvalidValueError
 
 _HUB_ID = re.compile(r"[A-Za-z0-9][\w.-]*/[A-Za-z0-9][\w.-]*")
 
@@ -14,7 +14,8 @@ def locate(path: str, revision: str | None = None) -> Path:
     Raises:
         FileFormatError: nothing there, and no name of the Hub either.
         InvalidValueError: a revision of a folder.
-        RunError: the Hub has no such data set or cannot be reached.
+        HubError: the Hub does not answer, or has no such revision.
+        RunError: the Hub has no such data set.
         MissingExtraError: huggingface_hub is not installed.
     """
     folder = Path(path)
@@ -28,16 +29,14 @@ def locate(path: str, revision: str | None = None) -> Path:
 
 
 def _download(repo_id: str, revision: str | None) -> Path:
-    try:
-        from huggingface_hub import snapshot_download
-        from huggingface_hub.errors import HfHubHTTPError, LocalEntryNotFoundError
-    except ModuleNotFoundError:
-        raise MissingExtraError("huggingface_hub") from None
-    try:
+    # Heavy packages, which a folder here need not wait for.
+    from ..hub.client import hub_errors, snapshot_download
+    from ..hub.download import resolve
+    from ..hub.raw_recordings import RAW_FOLDER
+
+    # By its commit: asked for a branch or tag while the Hub is away, the client takes an older copy and says nothing.
+    commit = resolve(repo_id, revision or "main")[1]
+    with hub_errors(repo_id, "downloading"):
         # The checks read tables and metadata; a copy of the recordings beside them can be large.
-        return Path(snapshot_download(repo_id, repo_type="dataset", revision=revision, ignore_patterns=["raw/*"]))
-    except (HfHubHTTPError, LocalEntryNotFoundError) as error:
-        found = str(error).strip().splitlines()[0]
-        raise RunError(f"{repo_id}: expected a folder or a data set on the Hub, found neither: {found}") from None
-    except OSError as error:
-        raise RunError(f"{repo_id}: expected a data set on the Hub, could not reach it: {error}") from None
+        skipped = f"{RAW_FOLDER}/*"
+        return Path(snapshot_download(repo_id, repo_type="dataset", revision=commit, ignore_patterns=skipped))

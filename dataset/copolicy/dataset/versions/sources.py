@@ -44,9 +44,10 @@ def read_side(text: str) -> Side:
         return Side(text, read_release(Path(name), revision).content, None)
     if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
         from ..hub.download import download, resolve
+        from ..hub.raw_recordings import RAW_FOLDER
 
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder) / "data_set"
-            download(name, root, resolve(name, revision or None)[1], skip="raw/*")
+            download(name, root, resolve(name, revision or None)[1], skip=f"{RAW_FOLDER}/*")
             return Side(text, read_content(root), read_statistics(root))
     raise FileFormatError(text, f"a folder, FOLDER@{TAG_PREFIX}x.y.z, or U/N[@REVISION] on the Hub", "none of them")
