@@ -129,10 +129,10 @@ def test_the_same_seed_gives_the_same_plans(checkpoint):
         torch.nn.init.normal_(parameter, std=0.1)
     paths = []
     for seed in (0, 0, 1):
-        outcomes = coplan(planner, MAP_SETS["unseen"][:2], Physics(step_limit=30), seed=seed)
+        outcomes = coplan(planner, MAP_SETS["unseen"][:2], Physics(step_limit=90), seed=seed)
         paths.append(np.array([outcome.path for outcome in outcomes]))
     np.testing.assert_array_equal(paths[0], paths[1])
-    assert np.abs(paths[0] - paths[2]).max() > 0.01
+    assert np.abs(paths[0] - paths[2]).max() > 0.1
 
 
 def test_an_existing_result_is_not_replaced(checkpoint, tmp_path, capsys):

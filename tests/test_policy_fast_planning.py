@@ -29,9 +29,9 @@ def test_plans_are_those_of_the_plain_sampler(network, sampler, steps, predictio
         **network, "sampler": sampler, "num_inference_steps": steps, "prediction_type": prediction_type,
         "initial_noise_scale": 0.8,
     }  # fmt: skip
-    plain, fast = (lively_policy(**settings, planner=name) for name in ("plain", "fast"))
+    plain, fast = (lively_policy(1, **settings, planner=name) for name in ("plain", "fast"))
     expected = plan(plain)
-    assert (expected.abs() < 0.999).float().mean() > 0.02  # not every action may sit at its limit
+    assert (expected.abs() < 0.999).float().mean() > 0.1  # not every action may sit at its limit
     for actions in (None, 10, 8, 1):
         found = plan(fast, actions=actions)
         tokens = 12 if actions is None else 2 + actions
