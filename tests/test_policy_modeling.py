@@ -1,11 +1,13 @@
 """The policy as LeRobot uses it: training loss, plans, queues, checkpoints."""
 
+from functools import partial
 from typing import Any
 
 import pytest
 import torch
 from lerobot.policies import get_policy_class
 from small_policies import MLP, OBSERVATIONS, TRANSFORMER, columns, policy
+from torch._dynamo.utils import counters
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
@@ -129,6 +131,28 @@ def test_weight_decay_spares_biases_norms_and_positions():
     assert "weight_decay" not in decayed  # the optimizer's
     assert {"action_position", "condition_position", "head.bias", "norm.weight"} <= spared
     assert not spared & {"head.weight", "layers.0.self_attn.in_proj_weight", "condition_encoder.0.weight"}
+
+
+@pytest.mark.filterwarnings("ignore:The .grad attribute of a Tensor that is not a leaf")  # torch's own, while tracing
+@pytest.mark.parametrize("network", [TRANSFORMER, MLP])
+def test_one_compiled_layer_serves_all_and_learns_the_same(monkeypatch, network):
+    # The "eager" backend traces and guards as the usual one does, and needs no compiler.
+    monkeypatch.setattr(torch, "compile", partial(torch.compile, backend="eager"))
+    torch.compiler.reset()
+    counters.clear()
+    settings = {**network, "n_layers": 3, "attention_dropout": 0.0} if network is TRANSFORMER else network
+    plain, compiled = (policy(**settings, compile_model=on).train() for on in (False, True))
+    assert compiled.state_dict().keys() == plain.state_dict().keys()
+    losses = []
+    for learner in (plain, compiled):
+        torch.manual_seed(0)
+        loss, _ = learner(training_batch())
+        loss.backward()
+        losses.append(loss.item())
+    assert counters["stats"]["unique_graphs"] == 1
+    assert losses[1] == pytest.approx(losses[0], rel=1e-5)
+    for one, other in zip(plain.denoiser.parameters(), compiled.denoiser.parameters(), strict=True):
+        torch.testing.assert_close(one.grad, other.grad)
 
 
 def test_augmentation_is_for_training_only():

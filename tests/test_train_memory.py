@@ -1,6 +1,8 @@
 """The data set in memory yields the stock loader's batches in the stock sampler's order."""
 
 from itertools import chain
+from types import SimpleNamespace
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -15,6 +17,7 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import STATE, TASK
 from copolicy.train.epoch_order import WholeEpochSampler
 from copolicy.train.memory_dataset import DeferredBatch, MemoryDataset
+from copolicy.train.memory_training import _make_datasets
 
 
 @pytest.mark.parametrize("episodes", [None, [4, 1, 2]])
@@ -97,6 +100,18 @@ def test_a_batch_for_a_device_is_gathered_there(random_table):
     prepared = Accelerator(cpu=True).prepare(DataLoader(deferred, batch_size=16))
     for batch, expected in zip(prepared, DataLoader(MemoryDataset(stock), batch_size=16), strict=True):
         assert_same_batch(batch, expected)
+
+
+@pytest.mark.parametrize(("device", "deferred"), [("cpu", False), ("cuda", True)])
+def test_training_on_a_device_gathers_there(random_table, device, deferred):
+    policy = SimpleNamespace(device=device, observation_keys=[STATE])
+    config: Any = SimpleNamespace(resume=True, policy=policy, trainable_config=policy)
+    training, evaluation = _make_datasets(config, lambda _: (windows(random_table), None))
+    assert evaluation is None
+    (batch,) = training.__getitems__([0, 3])
+    assert isinstance(batch, DeferredBatch) == deferred
+    expected = MemoryDataset(windows(random_table)).window_batch([0, 3])
+    assert_same_batch(batch.to("cpu") if deferred else batch, expected)
 
 
 @pytest.mark.parametrize("processes", [2, 3])

@@ -39,7 +39,7 @@ def _policy(**settings: object) -> tuple[str, ...]:
 
 _PAPER = {
     "observation_features": "absolute", "prediction_type": "epsilon", "mirror": False, "permute_obstacles": False,
-    "sampler": "ddpm", "num_inference_steps": 100, "initial_noise_scale": 1.0,
+    "sampler": "ddpm", "num_inference_steps": 100,
 }  # fmt: skip
 _TRANSFORMER = {
     "network": "transformer", "n_layers": 2, "width": 64, "n_heads": 4, "feedforward_width": 256,
@@ -53,7 +53,7 @@ ROWS = {
     "relative": Row(_policy(observation_features="relative")),
     "absolute": Row(_policy(observation_features="absolute")),
     "epsilon": Row(_policy(prediction_type="epsilon")),
-    "full-noise": Row(_policy(initial_noise_scale=1.0)),
+    "cold-noise": Row(_policy(initial_noise_scale=0.7)),
     "paper-settings": Row(_policy(**_PAPER)),
     "paper-settings-long": Row(_policy(**_PAPER), steps=20000),
     "wide-pairs": Row(recipe="pairs-sim-376-wide"),

@@ -42,7 +42,10 @@ def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:
         _leave_out_discarded(config)
     # The co-policy says what it reads; any other policy takes what it finds.
     read = getattr(config.policy, "observation_keys", None)
-    return tuple(None if dataset is None else _in_memory(dataset, read) for dataset in original(config))
+    on_host = config.trainable_config.device == "cpu"
+    return tuple(
+        None if dataset is None else _in_memory(dataset, read, deferred=not on_host) for dataset in original(config)
+    )
 
 
 def _leave_out_discarded(config: TrainPipelineConfig) -> None:
@@ -56,11 +59,11 @@ def _leave_out_discarded(config: TrainPipelineConfig) -> None:
     source.episodes = training_episodes(source.episodes, meta.total_episodes, [bool(mark) for mark in marked])
 
 
-def _in_memory(dataset, read: Collection[str] | None):
+def _in_memory(dataset, read: Collection[str] | None, deferred: bool):
     if MemoryDataset.can_hold(dataset, read):
         if dataset.meta.video_keys:
             logging.info("The policy does not look at %s: no video is decoded", ", ".join(dataset.meta.video_keys))
-        return MemoryDataset(dataset)
+        return MemoryDataset(dataset, deferred)
     logging.warning(
         "The policy may look at images of the data set, or it is streamed: frames come through LeRobot's own loader"
     )

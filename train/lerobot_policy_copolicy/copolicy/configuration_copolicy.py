@@ -72,6 +72,7 @@ class CopolicyConfig(PreTrainedConfig):
     num_inference_steps: int | None = None  # sampling steps of a plan
     initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
     planner: str = "fast"  # "fast", or "plain": the same plans without its savings, to compare with
+    compile_model: bool = False  # train the network's layers through torch.compile, for long runs on a GPU
     backend: str = "torch"  # what runs the network of a plan: "torch", or "onnx" (ONNX Runtime, on a CPU)
 
     ema: bool = True  # plan with an exponential moving average of the weights

@@ -44,6 +44,11 @@ class MlpDenoiser(nn.Module):
         nn.init.zeros_(self.head.weight)
         nn.init.zeros_(self.head.bias)
 
+    @property
+    def layers(self) -> nn.ModuleList:
+        """What repeats in depth, as the transformer's layers do."""
+        return self.blocks
+
     def forward(self, noisy_actions: Tensor, steps: Tensor, condition: Tensor) -> Tensor:
         """One evaluation.
 

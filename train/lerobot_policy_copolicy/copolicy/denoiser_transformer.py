@@ -1,7 +1,10 @@
 """The paper's network: a transformer decoder over the noisy actions, conditioned on the step and the history."""
 
+from contextlib import nullcontext
+
 import torch
 from torch import Tensor, nn
+from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from .step_embedding import SinusoidalEmbedding
 
@@ -48,7 +51,7 @@ class TransformerDenoiser(nn.Module):
         self.embedding_dropout = nn.Dropout(embedding_dropout)
         self.condition_encoder = nn.Sequential(nn.Linear(width, 4 * width), nn.Mish(), nn.Linear(4 * width, width))
         self.layers = nn.ModuleList(
-            nn.TransformerDecoderLayer(
+            _DecoderLayer(
                 width, n_heads, feedforward_width, attention_dropout, "gelu", batch_first=True, norm_first=True
             )
             for _ in range(n_layers)
@@ -79,9 +82,22 @@ class TransformerDenoiser(nn.Module):
         memory = torch.cat((step, self.condition_embedding(condition)), dim=1)  # (B, 1 + To, width)
         memory = self.condition_encoder(self.embedding_dropout(memory + self.condition_position))
         tokens = self.embedding_dropout(self.action_embedding(noisy_actions) + self.action_position)  # (B, T, width)
+        # Attention among a dozen tokens: fused kernels, made for long sequences, take several times as long on a GPU.
+        with sdpa_kernel(SDPBackend.MATH) if self.training else nullcontext():
+            tokens = self._decoded(tokens, memory)
+        return self.head(self.norm(tokens))
+
+    def _decoded(self, tokens: Tensor, memory: Tensor) -> Tensor:
         for layer in self.layers:
             tokens = layer(tokens, memory, tgt_mask=self.causal_mask, memory_mask=self.memory_mask)
-        return self.head(self.norm(tokens))
+        return tokens
+
+
+class _DecoderLayer(nn.TransformerDecoderLayer):
+    """torch's layer as a class of our own, because `Module.compile` silently leaves torch's classes as they are."""
+
+    def forward(self, tgt: Tensor, memory: Tensor, **masks: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return super().forward(tgt, memory, **masks)
 
 
 def _initialize(module: nn.Module) -> None:

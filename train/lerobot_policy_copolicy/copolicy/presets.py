@@ -48,8 +48,6 @@ PRESETS["small"] = {
     "n_layers": 3,
     "width": 384,
     "attention_dropout": 0.0,
-    # Colder noise gives up some of the diversity of routes for success: 0.7 keeps three quarters of the entropy.
-    "initial_noise_scale": 0.7,
     "optimizer_lr": 1e-3,
     "optimizer_betas": (0.9, 0.999),
     "scheduler_warmup_steps": 200,
