@@ -192,7 +192,7 @@ def test_a_discarded_configuration_comes_back_after_the_others():
         ({"pair": "Ann & Bob"}, f"pair: expected {_AN_ID}, found 'Ann & Bob'"),
         ({"consents": ("", "a b")}, f"consent-1: expected {_AN_ID}, found 'a b'"),
         ({"episodes": 0}, "episodes: expected at least 1, found 0"),
-        ({"maps": "mine"}, "unknown map set 'mine'; available: holdout, paper36, training, unseen"),
+        ({"maps": "mine"}, "unknown map set 'mine'; available: holdout, paper36, training, unseen, varied"),
         ({"window": (10, 10)}, "window: expected WxH of at least 320x320, found '10x10'"),
     ],
 )

@@ -212,7 +212,7 @@ def test_recipes_do_not_change():
         "pairs-sim-376": Recipe(376, 0, "paper36", False, 0.0, None),
         "pairs-sim-376-orientations": Recipe(376, 0, "paper36", True, 0.0, None),
         "pairs-sim-376-wide": Recipe(376, 0, "paper36", False, 1.0, 2.6),
-        "pairs-sim-3000": Recipe(3000, 1, "paper36", False, 0.0, None),
+        "pairs-sim-3000": Recipe(3000, 1, "varied", True, 1.0, None),
     } == RECIPES
 
 

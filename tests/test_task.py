@@ -2,6 +2,7 @@ import json
 import math
 from collections import Counter
 from dataclasses import replace
+from itertools import combinations
 
 import pytest
 
@@ -15,6 +16,7 @@ def test_map_sets_have_the_sizes_of_the_paper():
         "paper36": 108,
         "holdout": 84,
         "unseen": 84,
+        "varied": 1080,
     }
     assert len(set(MAP_SETS["training"])) == 84
     assert {config.obstacle_size for config in MAP_SETS["training"]} == {50}
@@ -31,6 +33,25 @@ def test_paper36_is_36_configurations_with_equal_shares_and_every_set_of_obstacl
     for count, times in ((1, 1), (2, 1), (3, 3)):
         assert set(Counter(config for config in maps if len(config.obstacles) == count).values()) == {times}
     assert {identify(config)[1] for config in maps} == {"training"}
+
+
+def test_varied_maps_are_half_the_papers_and_half_random_layouts_that_nothing_is_judged_on():
+    maps = MAP_SETS["varied"]
+    assert set(maps[:540]) == set(MAP_SETS["paper36"])
+    layouts = maps[540:]
+    assert len({(config.start, config.goal, config.obstacles) for config in layouts}) == 540
+    judged = {frozenset(config.obstacles) for name in ("holdout", "unseen") for config in MAP_SETS[name]}
+    assert not judged & {frozenset(config.obstacles) for config in layouts}
+    assert {len(config.obstacles) for config in layouts} == {1, 2, 3}
+    for config in layouts:
+        assert all(400 <= x <= 800 and 50 <= y <= 550 for x, y in config.obstacles)
+        for one, other in combinations(config.obstacles, 2):
+            assert max(abs(one[0] - other[0]), abs(one[1] - other[1])) >= 49.8, "they overlap"
+    # Frozen: a recipe's name stands for the same episodes in every version.
+    assert layouts[0] == MapConfig(
+        (240.0, 231.5, 3.14), (960.0, 445.0), ((767.3, 445.0), (750.0, 50.2), (650.8, 173.8)), 50
+    )
+    assert identify(layouts[0])[0] == "varied-540"
 
 
 @pytest.mark.parametrize(("name", "key"), [("holdout", "holdout_84_nominal_seed88"), ("unseen", "unseen_84")])
@@ -53,7 +74,7 @@ def test_orientations_give_four_starts_a_map():
 def test_an_unknown_set_lists_what_is_available():
     with pytest.raises(UnknownNameError) as error:
         map_set("validation")
-    assert str(error.value) == "unknown map set 'validation'; available: holdout, paper36, training, unseen"
+    assert str(error.value) == "unknown map set 'validation'; available: holdout, paper36, training, unseen, varied"
 
 
 def test_identify_ignores_the_order_of_obstacles():

@@ -9,7 +9,7 @@ import numpy as np
 
 from copolicy.collect.reward import reward
 from copolicy.collect.world import TableWorld
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.dataset.task import ORIGINAL_MAPS, MapConfig, Physics
 
 from .upstream_episode import outcome, start_pose
 
@@ -99,7 +99,7 @@ def _other_goals(
     config: MapConfig, physics: Physics, final_state: np.ndarray, last_action: np.ndarray
 ) -> list[MapConfig]:
     """The map with each other known goal that the table ended at."""
-    goals = {known.goal for configs in MAP_SETS.values() for known in configs} - {config.goal}
+    goals = {known.goal for known in ORIGINAL_MAPS} - {config.goal}
     others = [replace(config, goal=goal) for goal in sorted(goals)]
     return [other for other in others if outcome(other, physics, final_state, last_action) == "goal"]
 
@@ -110,9 +110,7 @@ def _reward_error(config: MapConfig, after: np.ndarray, rewards: np.ndarray) -> 
 
 
 def _candidates(moved: MapConfig) -> list[MapConfig]:
-    known = {
-        (config.goal, tuple(sorted(config.obstacles))): None for configs in MAP_SETS.values() for config in configs
-    }
+    known = {(config.goal, tuple(sorted(config.obstacles))): None for config in ORIGINAL_MAPS}
     return [moved, *(replace(moved, goal=goal, obstacles=obstacles) for goal, obstacles in known)]
 
 

@@ -1,11 +1,12 @@
-"""The map sets: the training family, the paper's 36 configurations, and the two evaluation lists.
+"""The map sets: the training family, the paper's 36 configurations, the two evaluation lists, and varied layouts.
 
 Sources: `rnd_obstacle_v2.yml`, `varied_maps_test_holdout.yml` and `varied_maps_unseen_map.yml` of the
-original program, as positions in fractions of the window.
+original program, as positions in fractions of the window; the varied layouts are ours.
 """
 
 import functools
 import math
+import random
 from dataclasses import replace
 from itertools import combinations
 
@@ -51,6 +52,21 @@ def _family(indices) -> tuple[tuple[float, float], ...]:
     return tuple(_FAMILY[int(index)] for index in indices)
 
 
+def _random_layouts(count: int, seed: int) -> tuple[MapConfig, ...]:
+    """Layouts with start, goal and one to three obstacles of 50 px anywhere between them, none over another."""
+    draw = random.Random(seed)  # its sequence is the same in every version of Python
+    layouts = []
+    for _ in range(count):
+        start, goal = draw.uniform(100, 500), draw.uniform(150, 450)
+        wanted, obstacles = 1 + int(3 * draw.random()), []
+        while len(obstacles) < wanted:
+            x, y = draw.uniform(400, 800), draw.uniform(50, 550)
+            if all(max(abs(x - other[0]), abs(y - other[1])) > 50 for other in obstacles):
+                obstacles.append((round(x, 1), round(y, 1)))
+        layouts.append(MapConfig((240.0, round(start, 1), _START_THETA), (960.0, round(goal, 1)), tuple(obstacles), 50))
+    return tuple(layouts)
+
+
 _PLACES = tuple((start, goal) for start in range(4) for goal in range(3))
 
 MAP_SETS: dict[str, tuple[MapConfig, ...]] = {
@@ -68,6 +84,11 @@ MAP_SETS: dict[str, tuple[MapConfig, ...]] = {
     "holdout": tuple(_map(*_PLACES[i // 7], _family(draw), 45) for i, draw in enumerate(_HOLDOUT)),
     "unseen": tuple(_map(s, g, layout, 45) for s, g in _PLACES for layout in _UNSEEN),
 }
+# For demonstrations of which a policy shall learn any layout: the paper's configurations and as many random layouts.
+MAP_SETS["varied"] = (*MAP_SETS["paper36"] * 5, *_random_layouts(540, seed=36))
+
+ORIGINAL_MAPS = tuple(config for name in ("training", "holdout", "unseen") for config in MAP_SETS[name])
+"""Maps of the original program."""
 
 
 def map_set(name: str, orientations: bool = False) -> tuple[MapConfig, ...]:

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 from .exceptions import InvalidValueError
 from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
-from .maps import MAP_SETS, identify, map_set
+from .maps import MAP_SETS, ORIGINAL_MAPS, identify, map_set
 
 __all__ = [
     "ACTION_NAMES",
     "GOAL_SIZE",
     "MAP_SETS",
     "MAX_OBSTACLES",
+    "ORIGINAL_MAPS",
     "PLAYERS",
     "RECORD_HZ",
     "STATE_NAMES",
