@@ -124,6 +124,16 @@ def test_balance_of_maps(sound):
     assert [f.severity for f in find(episodes_of(sound, names, ["a"] * len(names)), "balance")] == ["info"]
 
 
+@pytest.mark.parametrize("recorded", ["training", "paper36", "varied"])
+def test_every_set_is_balanced_by_its_own_shares(sound, recorded):
+    """Maps of several sets carry the names of one; each is held against the set that was recorded."""
+    named = [identify(config) for config in map_set(recorded)] * 10
+    names, families = map(list, zip(*named, strict=True))
+    episodes = episodes_of(sound, names, ["a"] * len(names))
+    episodes.columns["map_set"] = np.array(families)
+    assert find(episodes, "balance") == []
+
+
 def test_balance_of_pairs(sound):
     maps = ["training-00", "training-01"] * 40
     mixed = ["a", "a", "b", "b"] * 20

@@ -91,6 +91,7 @@ ORIGINAL_MAPS = tuple(config for name in ("training", "holdout", "unseen") for c
 """Maps of the original program."""
 
 
+@functools.cache
 def map_set(name: str, orientations: bool = False) -> tuple[MapConfig, ...]:
     """The maps of a set; with `orientations`, each with the four start orientations 0, pi/2, pi and 3 pi/2.
 

@@ -74,13 +74,23 @@ def _base_maps(table: EpisodeTable) -> np.ndarray:
 
 
 def _weights(name: str, counts: Counter[str]) -> dict[str, int]:
-    """How often each map should be there: as often as its set repeats it; of the sets that hold all the maps that
-    are there, the smallest, because the paper's 36 carry the names of the training maps."""
+    """How often each map of a family should be there: as often as the set that was recorded repeats it.
+
+    Several sets have maps of one family (the paper's 36 carry the names of the training maps): of those with all the
+    maps that are there, the one with the fewest others, and of these the one that fits best.
+    """
     if name not in MAP_SETS:
         return dict.fromkeys(counts, 1)
-    sets = [Counter(identify(config)[0] for config in maps) for maps in MAP_SETS.values()]
+    named = [[identify(config) for config in maps] for maps in MAP_SETS.values()]
+    sets = [Counter(map_id for map_id, family in maps if family == name) for maps in named]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
-    return min(fitting, key=len) if fitting else dict.fromkeys(counts, 1)
+    return min(fitting, key=lambda weights: (len(weights), _misfit(weights, counts)), default=dict.fromkeys(counts, 1))
+
+
+def _misfit(weights: Counter[str], counts: Counter[str]) -> float:
+    """Pearson's statistic of the episodes against the shares of a set."""
+    share = counts.total() / weights.total()
+    return sum((counts[one] - weight * share) ** 2 / (weight * share) for one, weight in weights.items())
 
 
 RULES = (
