@@ -65,6 +65,7 @@ ROWS = {
     "cold-noise": Row(_policy(initial_noise_scale=0.7)),
     "paper-settings": Row(_policy(**_PAPER)),
     "paper-settings-long": Row(_policy(**_PAPER), steps=20000),
+    "larger": Row(recipe="pairs-sim-3000", steps=12000),
     "wide-pairs": Row(recipe="pairs-sim-376-wide"),
     "orientations": Row(recipe="pairs-sim-376-orientations", evaluation=("--orientations",)),
     "turned": Row(evaluation=("--orientations",)),

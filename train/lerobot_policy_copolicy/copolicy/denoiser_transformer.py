@@ -1,6 +1,7 @@
 """The paper's network: a transformer decoder over the noisy actions, conditioned on the step and the history."""
 
 from contextlib import nullcontext
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -96,7 +97,7 @@ class TransformerDenoiser(nn.Module):
 class _DecoderLayer(nn.TransformerDecoderLayer):
     """torch's layer as a class of our own, because `Module.compile` silently leaves torch's classes as they are."""
 
-    def forward(self, tgt: Tensor, memory: Tensor, **masks: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def forward(self, tgt: Tensor, memory: Tensor, **masks: Any) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
         return super().forward(tgt, memory, **masks)
 
 

@@ -66,7 +66,7 @@ class CopolicyPolicy(PreTrainedPolicy):
             logging.info("the co-policy does not read %s", ", ".join(unused))
         self.config = config
         self.features = _FEATURES[config.filled.observation_features](config.past_human_action)
-        self.denoiser = _make_denoiser(config, self.features.size)
+        self.denoiser: TransformerDenoiser | MlpDenoiser = _make_denoiser(config, self.features.size)
         self.diffusion = PlanDiffusion(config)
         if config.backend == "onnx":
             require_onnx()
@@ -235,7 +235,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         return sample
 
 
-def _make_denoiser(config: CopolicyConfig, condition_size: int) -> nn.Module:
+def _make_denoiser(config: CopolicyConfig, condition_size: int) -> TransformerDenoiser | MlpDenoiser:
     network, names = _NETWORKS[config.filled.network]
     return network(_ACTION_SIZE, condition_size, **{name: getattr(config, name) for name in names})
 

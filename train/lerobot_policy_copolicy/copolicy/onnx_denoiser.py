@@ -18,8 +18,6 @@ from .fast_transformer import Affine, FastTransformer
 
 _PACKAGES = ("onnxruntime", "onnx")
 _OPSET, _IR_VERSION = 20, 10
-_RUNTIME_DOMAIN = "com.microsoft"
-_EPSILON = 1e-5  # of torch's layer norms
 
 
 def require_onnx() -> None:
@@ -92,31 +90,16 @@ class _Graph:
         self._nodes.append(self._helper.make_node(operator, inputs, [name], **attributes))
         return name
 
-    def fused(self, operator: str, *inputs: str, **attributes: Any) -> str:
-        """One of ONNX Runtime's own operators."""
-        return self.add(operator, *inputs, domain=_RUNTIME_DOMAIN, **attributes)
-
-    def product(self, value: str, layer: Any) -> str:
-        return self.add("MatMul", value, self.constant(layer.weight.T))
-
     def linear(self, value: str, layer: Any) -> str:
-        return self.add("Add", self.product(value, layer), self.constant(layer.bias))
-
-    def add_and_norm(self, update: str, value: str, bias: Tensor, norm: Affine) -> tuple[str, str]:
-        """Of `value + update + bias`: its norm, and itself."""
-        constants = (self.constant(part) for part in (norm.weight, norm.bias, bias))
-        normed = self.fused("SkipLayerNormalization", update, value, *constants, epsilon=_EPSILON)
-        total = f"{normed}_total"
-        self._nodes[-1].output.extend(["", "", total])
-        return normed, total
+        return self.add("Add", self.add("MatMul", value, self.constant(layer.weight.T)), self.constant(layer.bias))
 
     def norm(self, value: str, layer: Any) -> str:
         weight, bias = self.constant(layer.weight), self.constant(layer.bias)
-        return self.add("LayerNormalization", value, weight, bias, axis=-1, epsilon=_EPSILON)
+        return self.add("LayerNormalization", value, weight, bias, axis=-1, epsilon=1e-5)
 
     def serialized(self) -> bytes:
         graph = self._helper.make_graph(self._nodes, "denoiser", self._inputs, self._outputs, self._constants)
-        opset = [self._helper.make_opsetid("", _OPSET), self._helper.make_opsetid(_RUNTIME_DOMAIN, 1)]
+        opset = [self._helper.make_opsetid("", _OPSET)]
         return self._helper.make_model(graph, opset_imports=opset, ir_version=_IR_VERSION).SerializeToString()
 
     def _tensor(self, name: str, shape: tuple[int | str, ...]):
@@ -124,8 +107,6 @@ class _Graph:
 
 
 def _transformer(denoiser: FastTransformer) -> _Graph:
-    # With three tokens the matrix products are so short that starting an operator costs as much as many of them take;
-    # ONNX Runtime's own fused operators need 13 a layer where the standard ones need 33.
     graph, tokens, heads = _Graph(), denoiser.tokens, denoiser.n_heads
     width, size = denoiser.embedding.weight.shape
     rows = denoiser.rows
@@ -138,25 +119,39 @@ def _transformer(denoiser: FastTransformer) -> _Graph:
         )
         for index in range(len(denoiser.layers))
     ]
-    by_row, rows_merged = (graph.constant([0, 0, *rest]) for rest in ([heads, -1], [rows]))
+    causal = graph.constant(denoiser.causal_mask)
+    by_head = graph.constant([0, 0, 3, heads, width // heads])
+    merged, by_row, rows_merged = (graph.constant([0, 0, *rest]) for rest in ([width], [heads, -1], [rows]))
+    first, second, third = (graph.constant(index) for index in range(3))
 
-    embedded = graph.product(noisy, denoiser.embedding)
-    value = graph.add("Add", embedded, graph.constant(denoiser.position + denoiser.embedding.bias))
-    normed = graph.norm(value, denoiser.layers[0].norm1)
-    following = [*(layer.norm1 for layer in denoiser.layers[1:]), denoiser.norm]
-    for layer, norm, (keys, scores, values) in zip(denoiser.layers, following, memory, strict=True):
-        weights = graph.constant(layer.self_in.weight.T), graph.constant(layer.self_in.bias)
-        attended = graph.fused("Attention", normed, *weights, num_heads=heads, unidirectional=1)
-        attended = graph.product(attended, layer.self_out)
-        normed, value = graph.add_and_norm(attended, value, layer.self_out.bias, layer.norm2)
-        seen = graph.add("Add", graph.fused("FusedMatMul", normed, keys, transB=1), scores)
-        shares = graph.add("Softmax", graph.add("Reshape", seen, by_row), axis=-1)
-        crossed = graph.add("MatMul", graph.add("Reshape", shares, rows_merged), values)
-        normed, value = graph.add_and_norm(crossed, value, layer.cross_bias, layer.norm3)
-        hidden = graph.fused("BiasGelu", graph.product(normed, layer.inner), graph.constant(layer.inner.bias))
-        normed, value = graph.add_and_norm(graph.product(hidden, layer.outer), value, layer.outer.bias, norm)
-    graph.output(graph.linear(normed, denoiser.head), "batch", tokens, size)
+    def attended(projected: str) -> str:
+        split = graph.add("Transpose", graph.add("Reshape", projected, by_head), perm=[2, 0, 3, 1, 4])
+        query, key, value = (graph.add("Gather", split, index, axis=0) for index in (first, second, third))
+        scores = graph.add("MatMul", query, graph.add("Transpose", key, perm=[0, 1, 3, 2]))
+        shares = graph.add("Softmax", graph.add("Add", scores, causal), axis=-1)
+        heads_first = graph.add("MatMul", shares, value)
+        return graph.add("Reshape", graph.add("Transpose", heads_first, perm=[0, 2, 1, 3]), merged)
+
+    value = graph.add("Add", graph.linear(noisy, denoiser.embedding), graph.constant(denoiser.position))
+    for layer, (keys, scores, values) in zip(denoiser.layers, memory, strict=True):
+        projected = graph.linear(graph.norm(value, layer.norm1), _scaled_queries(layer.self_in, width // heads))
+        value = graph.add("Add", value, graph.linear(attended(projected), layer.self_out))
+        seen = graph.add("MatMul", graph.norm(value, layer.norm2), graph.add("Transpose", keys, perm=[0, 2, 1]))
+        seen = graph.add("Reshape", graph.add("Add", seen, scores), by_row)
+        shares = graph.add("Reshape", graph.add("Softmax", seen, axis=-1), rows_merged)
+        crossed = graph.add("Add", graph.add("MatMul", shares, values), graph.constant(layer.cross_bias))
+        value = graph.add("Add", value, crossed)
+        hidden = graph.add("Gelu", graph.linear(graph.norm(value, layer.norm3), layer.inner))
+        value = graph.add("Add", value, graph.linear(hidden, layer.outer))
+    graph.output(graph.linear(graph.norm(value, denoiser.norm), denoiser.head), "batch", tokens, size)
     return graph
+
+
+def _scaled_queries(projection: Affine, head_size: int) -> Affine:
+    """The self-attention's projection with the scale of its scores, which torch's attention applies by itself."""
+    scale = torch.ones(len(projection.bias))
+    scale[: len(scale) // 3] = head_size**-0.5
+    return Affine(projection.weight * scale[:, None], projection.bias * scale)
 
 
 def _mlp(denoiser: FastMlp) -> _Graph:
