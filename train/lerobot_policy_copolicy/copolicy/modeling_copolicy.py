@@ -10,7 +10,7 @@ from typing import Unpack
 import torch
 from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.pretrained import ActionSelectKwargs
-from torch import Tensor, nn
+from torch import Tensor
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import ACTION, FEATURES
