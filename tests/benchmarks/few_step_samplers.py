@@ -120,14 +120,16 @@ def main() -> None:
     parser.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run")
     parser.add_argument("--maps", nargs="+", default=["holdout", "unseen"], choices=sorted(MAP_SETS))
     parser.add_argument("--limit", type=int, help="only the first N maps of each set, for a quick look")
+    parser.add_argument("--every", type=int, default=1, help="only every Nth map, where plans are slow (default: 1)")
     parser.add_argument("--repeats", type=int, default=8, help="episodes a map (default: 8)")
-    parser.add_argument("--backend", default="torch", choices=("torch", "onnx"), help="default: torch")
+    parser.add_argument("--backend", default="torch", choices=("torch", "onnx", "numba"), help="default: torch")
     parser.add_argument("--initial-noise-scale", type=float, help="default: the checkpoint's")
     parser.add_argument("--step-limit", type=int, default=2000, help="30 Hz steps until a time-out (default: 2000)")
     parser.add_argument("--seed", type=int, default=0, help="of the noise (default: 0)")
     parser.add_argument("--out", type=Path, help="where the figures go, as JSON")
     arguments = parser.parse_args()
-    maps = [config for name in arguments.maps for config in MAP_SETS[name][: arguments.limit]]
+    chosen = {name: MAP_SETS[name][: arguments.limit : arguments.every] for name in arguments.maps}
+    maps = [config for configs in chosen.values() for config in configs]
     noise = arguments.initial_noise_scale
     settings = {} if noise is None else {"initial_noise_scale": noise}
     results, reference, described = {}, [], {}
@@ -157,7 +159,7 @@ def main() -> None:
         document = {
             "label": "co-planning in simulation: no person took part",
             "policy": {k: v for k, v in described.items() if k not in ("sampler", "num_inference_steps")},
-            "maps": {name: len(MAP_SETS[name][: arguments.limit]) for name in arguments.maps},
+            "maps": {name: len(configs) for name, configs in chosen.items()},
             "settings": {name: getattr(arguments, name) for name in ("repeats", "seed", "step_limit", "backend")},
             "margins": {"success": SUCCESS_MARGIN, "route_entropy_bits": ENTROPY_MARGIN},
             "samplers": results,

@@ -37,7 +37,7 @@ def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) 
         "--sampler", choices=("ddpm", "ddim", "dpmsolver++"), help="denoising (default: the checkpoint's)"
     )
     command.add_argument(
-        "--backend", choices=("torch", "onnx"), help="what runs the network (default: the checkpoint's)"
+        "--backend", choices=("torch", "onnx", "numba"), help="what runs the network (default: the checkpoint's)"
     )
     command.add_argument("--num-inference-steps", type=int, help="denoising steps (default: the checkpoint's)")
     command.add_argument(

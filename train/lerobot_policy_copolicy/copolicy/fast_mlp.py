@@ -32,21 +32,23 @@ class FastMlp:
     def begin(self, condition: Tensor) -> Callable[[int], tuple[Tensor, ...]]:
         """What `denoise` reads at each index of a plan with this history, `(B, To, condition_size)`."""
         history = nn.functional.linear(condition.flatten(1), self._history, self._bias)
-        return lambda index: (history, *self._steps[index])
+        return lambda index: (history, self._steps[index])
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
         """One evaluation.
 
         Args:
             noisy_actions: `(B, T, action_size)`.
-            inputs: what the first layer makes of the history, `(B, width)`; and a bias `(width,)` for each block.
+            inputs: what the first layer makes of the history, `(B, width)`; and the bias of each block,
+                `(n_layers, width)`.
 
         Returns:
             `(B, T, action_size)`, the prediction.
         """
         linear = nn.functional.linear
-        hidden = linear(noisy_actions.flatten(1), self.actions) + inputs[0]
-        for block, bias in zip(self.blocks, inputs[1:], strict=True):
+        history, biases = inputs
+        hidden = linear(noisy_actions.flatten(1), self.actions) + history
+        for block, bias in zip(self.blocks, biases, strict=True):
             inner = linear(block.norm(hidden), block.inner.weight, bias)  # pyright: ignore
             hidden = hidden + block.outer(nn.functional.silu(inner))  # pyright: ignore
         return self.head(self.norm(hidden)).view_as(noisy_actions)

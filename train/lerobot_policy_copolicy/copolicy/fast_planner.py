@@ -12,7 +12,6 @@ from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
 from .fast_mlp import FastMlp
 from .fast_transformer import FastTransformer
-from .onnx_denoiser import OnnxDenoiser
 from .sampler_table import SamplerTable
 
 
@@ -36,7 +35,7 @@ class FastPlanner:
 
     Args:
         table: the sampler.
-        backend: "torch", or "onnx" for ONNX Runtime.
+        backend: "torch", or on a CPU "onnx" (ONNX Runtime) or "numba".
     """
 
     def __init__(self, table: SamplerTable, backend: str):
@@ -64,10 +63,10 @@ class FastPlanner:
             `(B, tokens, action_size)` in [-1, 1].
 
         Raises:
-            InvalidValueError: ONNX Runtime was asked to plan on another device than the CPU.
+            InvalidValueError: a backend other than torch was asked to plan on another device than the CPU.
         """
-        if self._backend == "onnx" and condition.device.type != "cpu":
-            raise InvalidValueError("policy.device, for policy.backend=onnx", "cpu", condition.device.type)
+        if self._backend != "torch" and condition.device.type != "cpu":
+            raise InvalidValueError(f"policy.device, for policy.backend={self._backend}", "cpu", condition.device.type)
         ready = self._ready(network, condition.device, tokens)
         at = ready.network.begin(condition)
 
@@ -84,9 +83,20 @@ class FastPlanner:
             # Tables keep full precision, also where the plan itself is made under automatic mixed precision.
             with torch.autocast(device.type, enabled=False):
                 fast = _fast(network)(network, timesteps, tokens)
-                denoiser = OnnxDenoiser(fast) if self._backend == "onnx" else fast
+                denoiser = self._denoiser(fast)
             ready = self._prepared[tokens] = _Prepared(weights, fast, denoiser)
         return ready
+
+    def _denoiser(self, network: FastTransformer | FastMlp) -> _Denoiser:
+        if self._backend == "onnx":
+            from .onnx_denoiser import OnnxDenoiser
+
+            return OnnxDenoiser(network)
+        if self._backend == "numba":
+            from .numba_denoiser import NumbaDenoiser
+
+            return NumbaDenoiser(network)
+        return network
 
     def __getstate__(self) -> dict:
         """Without what was prepared: a session of ONNX Runtime can be neither copied nor pickled."""

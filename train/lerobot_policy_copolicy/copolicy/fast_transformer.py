@@ -77,8 +77,7 @@ class FastTransformer:
         )
         scores = bias.flatten(2)[:, :, None] + self._hidden  # (n_layers, B, tokens, heads * memory)
         places = keys[:, :, :, 0], scores.unflatten(-1, (self.n_heads, -1))[..., 0], values[:, :, :, 0]
-        stacked = zip(keys.flatten(2, 3), scores, values.flatten(2, 3), strict=True)
-        inputs = tuple(part for layer in stacked for part in layer)
+        inputs = keys.flatten(2, 3), scores, values.flatten(2, 3)
 
         def at(index: int) -> tuple[Tensor, ...]:
             key, score, value = (part[:, index, :, 0] for part in self._steps)
@@ -93,17 +92,16 @@ class FastTransformer:
 
         Args:
             noisy_actions: `(B, tokens, action_size)`.
-            inputs: three for each layer, with one row for each head and memory token: what to multiply a token with
-                for its score, `(B, rows, width)`; the rest of the score, `(B, tokens, rows)`; and what the row adds
-                to the output of the attention, `(B, rows, width)`.
+            inputs: of each layer, with one row for each head and memory token: what to multiply a token with for its
+                score, `(n_layers, B, rows, width)`; the rest of the score, `(n_layers, B, tokens, rows)`; and what
+                the row adds to the output of the attention, `(n_layers, B, rows, width)`.
 
         Returns:
             `(B, tokens, action_size)`, the prediction.
         """
         linear = nn.functional.linear
         tokens = linear(noisy_actions, *self.embedding) + self.position
-        for index, layer in enumerate(self.layers):
-            keys, scores, values = inputs[3 * index : 3 * index + 3]
+        for layer, keys, scores, values in zip(self.layers, *inputs, strict=True):
             tokens = tokens + linear(
                 self._attended(linear(_norm(tokens, layer.norm1), *layer.self_in)), *layer.self_out
             )

@@ -16,6 +16,7 @@ from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import ACTION, FEATURES
 
 from .augmentation import mirror, permute_obstacles
+from .backend import require_backend
 from .configuration_copolicy import CopolicyConfig
 from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
@@ -23,7 +24,6 @@ from .diffusion import PlanDiffusion
 from .ema import ExponentialMovingAverage
 from .fast_planner import FastPlanner
 from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
-from .onnx_denoiser import require_onnx
 
 _ACTION_SIZE = FEATURES[ACTION]["shape"][0]
 _PADDING = f"{ACTION}_is_pad"
@@ -68,8 +68,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         self.features = _FEATURES[config.filled.observation_features](config.past_human_action)
         self.denoiser: TransformerDenoiser | MlpDenoiser = _make_denoiser(config, self.features.size)
         self.diffusion = PlanDiffusion(config)
-        if config.backend == "onnx":
-            require_onnx()
+        require_backend(config.backend)
         self._fast = FastPlanner(self.diffusion.table, config.backend) if config.planner == "fast" else None
         self.ema = (
             ExponentialMovingAverage(self.denoiser, config.ema_power, config.ema_inv_gamma, config.ema_max_decay)

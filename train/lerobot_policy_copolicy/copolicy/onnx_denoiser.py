@@ -4,31 +4,16 @@ The graphs are written down here operator by operator: exporting the torch modul
 seconds, where this takes a tenth of one.
 """
 
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from copolicy.dataset.exceptions import MissingExtraError
-
 from .fast_mlp import FastMlp
 from .fast_transformer import Affine, FastTransformer
 
-_PACKAGES = ("onnxruntime", "onnx")
 _OPSET, _IR_VERSION = 20, 10
-
-
-def require_onnx() -> None:
-    """Checks that the packages of this backend are installed.
-
-    Raises:
-        MissingExtraError: one is not.
-    """
-    for package in _PACKAGES:
-        if find_spec(package) is None:
-            raise MissingExtraError(package, "onnx")
 
 
 class OnnxDenoiser:
@@ -38,7 +23,6 @@ class OnnxDenoiser:
     """
 
     def __init__(self, denoiser: FastTransformer | FastMlp):
-        require_onnx()
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
@@ -51,9 +35,14 @@ class OnnxDenoiser:
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
         """One evaluation, see `FastTransformer.denoise` and `FastMlp.denoise`."""
-        tensors = zip(self._names, (noisy_actions, *inputs), strict=True)
+        tensors = zip(self._names, (noisy_actions, *_by_layer(inputs)), strict=True)
         (prediction,) = self._session.run(None, {name: tensor.numpy() for name, tensor in tensors})
         return torch.from_numpy(prediction)
+
+
+def _by_layer(inputs: tuple[Tensor, ...]) -> list[Tensor]:
+    """Each layer's parts of a transformer's memory: cutting them out in the graph would copy them."""
+    return [part for stacked in inputs for part in (stacked.unbind() if stacked.ndim == 4 else [stacked])]
 
 
 def denoiser_graph(denoiser: FastTransformer | FastMlp) -> bytes:
@@ -111,13 +100,10 @@ def _transformer(denoiser: FastTransformer) -> _Graph:
     width, size = denoiser.embedding.weight.shape
     rows = denoiser.rows
     noisy = graph.input("noisy_actions", "batch", tokens, size)
+    shapes = {"keys": (rows, width), "scores": (tokens, rows), "values": (rows, width)}
     memory = [
-        (
-            graph.input(f"keys_{index}", "batch", rows, width),
-            graph.input(f"scores_{index}", "batch", tokens, rows),
-            graph.input(f"values_{index}", "batch", rows, width),
-        )
-        for index in range(len(denoiser.layers))
+        [graph.input(f"{name}_{index}", "batch", *shape) for index in range(len(denoiser.layers))]
+        for name, shape in shapes.items()
     ]
     causal = graph.constant(denoiser.causal_mask)
     by_head = graph.constant([0, 0, 3, heads, width // heads])
@@ -133,7 +119,7 @@ def _transformer(denoiser: FastTransformer) -> _Graph:
         return graph.add("Reshape", graph.add("Transpose", heads_first, perm=[0, 2, 1, 3]), merged)
 
     value = graph.add("Add", graph.linear(noisy, denoiser.embedding), graph.constant(denoiser.position))
-    for layer, (keys, scores, values) in zip(denoiser.layers, memory, strict=True):
+    for layer, keys, scores, values in zip(denoiser.layers, *memory, strict=True):
         projected = graph.linear(graph.norm(value, layer.norm1), _scaled_queries(layer.self_in, width // heads))
         value = graph.add("Add", value, graph.linear(attended(projected), layer.self_out))
         seen = graph.add("MatMul", graph.norm(value, layer.norm2), graph.add("Transpose", keys, perm=[0, 2, 1]))
@@ -159,11 +145,12 @@ def _mlp(denoiser: FastMlp) -> _Graph:
     width, size = denoiser.actions.shape
     noisy = graph.input("noisy_actions", "batch", denoiser.tokens, size // denoiser.tokens)
     history = graph.input("history", "batch", width)
-    biases = [graph.input(f"bias_{index}", width) for index in range(len(denoiser.blocks))]
+    biases = graph.input("biases", len(denoiser.blocks), width)
     flat = graph.add("Flatten", noisy, axis=1)
     hidden = graph.add("Add", graph.add("MatMul", flat, graph.constant(denoiser.actions.T)), history)
-    for block, bias in zip(denoiser.blocks, biases, strict=True):
+    for index, block in enumerate(denoiser.blocks):
         normed = graph.norm(hidden, block.norm)
+        bias = graph.add("Gather", biases, graph.constant(index), axis=0)
         inner = graph.add("Add", graph.add("MatMul", normed, graph.constant(block.inner.weight.T)), bias)  # pyright: ignore
         inner = graph.add("Mul", inner, graph.add("Sigmoid", inner))
         hidden = graph.add("Add", hidden, graph.linear(inner, block.outer))

@@ -1,9 +1,10 @@
-"""Plans through ONNX Runtime, against those through torch; and what happens where it is not installed."""
+"""Plans through ONNX Runtime and numba, against those through torch; and what happens where they are not installed."""
 
 import copy
 import sys
 from typing import Any
 
+import numpy as np
 import onnx
 import pytest
 import torch
@@ -18,41 +19,44 @@ from lerobot_policy_copolicy.copolicy.fast_mlp import FastMlp
 from lerobot_policy_copolicy.copolicy.fast_planner import FastPlanner
 from lerobot_policy_copolicy.copolicy.fast_transformer import FastTransformer
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
+from lerobot_policy_copolicy.copolicy.numba_kernels import LANES, OUTPUTS, gelu, pack, transformer
 from lerobot_policy_copolicy.copolicy.onnx_denoiser import OnnxDenoiser, denoiser_graph
 
 NETWORKS = {"transformer": {**TRANSFORMER, "n_layers": 3}, "mlp": MLP}
 
 
 PLAIN: dict[str, Any] = {"planner": "plain"}
-ONNX: dict[str, Any] = {"backend": "onnx"}
+BACKENDS = ("onnx", "numba")
 
 
 def plan(planner, batch: int = 3, actions: int | None = None) -> torch.Tensor:
     return planner.plan(columns(batch, 3), torch.Generator().manual_seed(0), actions=actions)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("network", NETWORKS)
 @pytest.mark.parametrize(("sampler", "steps"), [("ddpm", 100), ("ddpm", 34), ("ddim", 10), ("dpmsolver++", 5)])
 @pytest.mark.parametrize("prediction_type", ["epsilon", "sample"])
-def test_plans_are_those_of_torch(network, sampler, steps, prediction_type):
+def test_plans_are_those_of_torch(backend, network, sampler, steps, prediction_type):
     settings = {
         **NETWORKS[network], "sampler": sampler, "num_inference_steps": steps, "prediction_type": prediction_type,
     }  # fmt: skip
-    plain, onnx_backend = (lively_policy(**settings, **choice) for choice in (PLAIN, ONNX))
+    plain, quick = (lively_policy(**settings, **choice) for choice in (PLAIN, {"backend": backend}))
     for batch in (1, 5):
         expected = plan(plain, batch)
         for actions in (None, 8, 1):
-            found = plan(onnx_backend, batch, actions)
+            found = plan(quick, batch, actions)
             torch.testing.assert_close(found, expected[:, : found.shape[1]], atol=1e-4, rtol=0)
 
 
-def test_plans_of_the_papers_network_are_those_of_torch():
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_plans_of_the_papers_network_are_those_of_torch(backend):
     settings = {
         "n_layers": 8, "width": 256, "n_heads": 4, "feedforward_width": 1024,
         "prediction_type": "epsilon", "sampler": "ddpm", "num_inference_steps": 34,
     }  # fmt: skip
-    plain, onnx_backend = (lively_policy(**settings, **choice) for choice in (PLAIN, ONNX))
-    torch.testing.assert_close(plan(onnx_backend, 2, 1), plan(plain, 2)[:, :3], atol=1e-4, rtol=0)
+    plain, quick = (lively_policy(**settings, **choice) for choice in (PLAIN, {"backend": backend}))
+    torch.testing.assert_close(plan(quick, 2, 1), plan(plain, 2)[:, :3], atol=1e-4, rtol=0)
 
 
 @pytest.mark.parametrize(
@@ -84,9 +88,10 @@ def test_it_runs_on_one_thread_that_does_not_spin():
     assert options.get_session_config_entry("session.intra_op.allow_spinning") == "0"
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("network", NETWORKS)
-def test_changed_weights_are_noticed(network):
-    planner = lively_policy(**NETWORKS[network], backend="onnx")
+def test_changed_weights_are_noticed(backend, network):
+    planner = lively_policy(**NETWORKS[network], backend=backend)
     before = plan(planner)
     torch.nn.init.normal_(planner.ema.model.head.weight, std=0.5)
     moved = plan(planner)
@@ -94,22 +99,23 @@ def test_changed_weights_are_noticed(network):
     torch.testing.assert_close(plan(copy.deepcopy(planner)), moved)  # a session cannot be copied, the policy can
 
 
-def test_the_backend_is_saved_with_the_policy(tmp_path):
-    saved = lively_policy(backend="onnx")
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_the_backend_is_saved_with_the_policy(backend, tmp_path):
+    saved = lively_policy(backend=backend)
     saved.save_pretrained(tmp_path)
     loaded = CopolicyPolicy.from_pretrained(tmp_path, strict=True)
-    assert loaded.config.backend == "onnx"
+    assert loaded.config.backend == backend
     torch.testing.assert_close(plan(loaded.eval()), plan(saved))
 
 
-@pytest.mark.parametrize("package", ["onnxruntime", "onnx"])
-def test_without_the_extra_it_is_one_clear_line(tmp_path, monkeypatch, package):
-    lively_policy(backend="onnx").save_pretrained(tmp_path)
+@pytest.mark.parametrize(("extra", "package"), [("onnx", "onnxruntime"), ("onnx", "onnx"), ("numba", "numba")])
+def test_without_the_extra_it_is_one_clear_line(tmp_path, monkeypatch, extra, package):
+    lively_policy(backend=extra).save_pretrained(tmp_path)
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MissingExtraError) as caught:
         Checkpoint(tmp_path)
     assert str(caught.value) == (
-        f"{package} is not installed: this command needs the extra, pip install 'lerobot_policy_copolicy[onnx]'"
+        f"{package} is not installed: this command needs the extra, pip install 'lerobot_policy_copolicy[{extra}]'"
     )
 
 
@@ -122,8 +128,43 @@ def test_torch_plans_where_the_extra_is_missing(tmp_path, monkeypatch):
     torch.testing.assert_close(plan(planner.eval()), plan(lively_policy()))
 
 
-def test_another_device_is_refused():
-    planner = FastPlanner(lively_policy().diffusion.table, "onnx")
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_another_device_is_refused(backend):
+    planner = FastPlanner(lively_policy().diffusion.table, backend)
     condition, noise = torch.empty(1, 3, 20, device="meta"), torch.empty(1, 12, 4, device="meta")
-    with pytest.raises(InvalidValueError, match=r"^policy.device, for policy.backend=onnx: expected cpu, found 'meta'"):
+    message = f"^policy.device, for policy.backend={backend}: expected cpu, found 'meta'"
+    with pytest.raises(InvalidValueError, match=message):
         planner.plan(MlpDenoiser(4, 20, 12, 3), condition, noise, 12)
+
+
+@pytest.mark.parametrize(
+    "sizes", [{**TRANSFORMER, "width": 12, "n_heads": 2, "feedforward_width": 30}, {**MLP, "width": 21}]
+)
+def test_numba_takes_networks_of_any_size(sizes):
+    plain, quick = (lively_policy(**{**sizes, **choice}) for choice in (PLAIN, {"backend": "numba"}))
+    for batch in (1, 2):
+        torch.testing.assert_close(plan(quick, batch, 1)[:, :3], plan(plain, batch)[:, :3], atol=1e-4, rtol=0)
+
+
+def test_numba_compiles_once_for_all_plans():
+    quick = lively_policy(**NETWORKS["transformer"], backend="numba")
+    for batch in (1, 2, 3):
+        for actions in (None, 8, 1):
+            plan(quick, batch, actions)
+    assert len(transformer.signatures) == 1
+
+
+def test_gelu_of_numba_is_the_exact_one():
+    values = np.linspace(-9, 9, 20001, dtype=np.float32)[None]
+    expected = torch.nn.functional.gelu(torch.from_numpy(values).double())
+    gelu(values)
+    torch.testing.assert_close(torch.from_numpy(values).double(), expected, atol=1e-6, rtol=0)
+
+
+def test_packed_weights_hold_each_weight_where_it_is_read():
+    weight = np.arange(6 * 20, dtype=np.float32).reshape(6, 20) + 1
+    packed = pack(weight)
+    for output, value in np.ndindex(6, 20):
+        block, chunk = output // OUTPUTS, value // LANES
+        assert packed[block, chunk, output % OUTPUTS, value % LANES] == weight[output, value]
+    assert (packed != 0).sum() == weight.size
