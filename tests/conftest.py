@@ -18,6 +18,15 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
 
 
+# Minutes in a few tests: first, so that no core waits for another at the end.
+_LONG_FILES = ("test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_train_distributed.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts the tests of the long files first."""
+    items.sort(key=lambda item: item.path.name not in _LONG_FILES)
+
+
 @pytest.fixture(scope="session")
 def upstream() -> Path:
     """Files that the original program wrote, and traces of running it."""
