@@ -74,7 +74,7 @@ ROWS = {
     "transformer": Row(_policy(**_TRANSFORMER), steps=12000, batch=256),
     "transformer-codp": Row(_policy(**_TRANSFORMER, past_human_action=False), steps=12000, batch=256),
     "transformer-dropout": Row(_policy(**_TRANSFORMER, attention_dropout=0.3), steps=12000, batch=256),
-    "transformer-long": Row(_policy(**_TRANSFORMER), steps=36000, batch=256),
+    "transformer-long": Row(_policy(**_TRANSFORMER), steps=24000, batch=256),
     "long": Row(steps=20000),
     # 1057 divides the frames of the data set, so that no batch is smaller and compiled anew.
     "paper-size": Row(_PAPER_SIZE, preset="default", steps=3527, batch=1057),

@@ -9,6 +9,7 @@ All functions that numba caches are in this file, because it looks for changes i
 """
 
 import math
+from contextlib import suppress
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -25,7 +26,14 @@ _ROWS = 3  # multiplied at once: with four outputs, twelve sums, three inputs an
 _BYTES = 4  # of a float32
 
 # Sums in any order and fused products; but infinities stay, because the masks are made of them.
-_jit = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp", "afn"})
+_FASTMATH = {"reassoc", "contract", "nsz", "arcp", "afn"}
+
+
+def _jit(function: Any) -> Any:
+    compiled = njit(nogil=True, error_model="numpy", fastmath=_FASTMATH)(function)
+    with suppress(RuntimeError):  # there is no folder to write to: it compiles in each process
+        compiled.enable_caching()  # pyright: ignore[reportAttributeAccessIssue]
+    return compiled
 
 
 class PackedLinear(NamedTuple):
