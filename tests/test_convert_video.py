@@ -173,7 +173,9 @@ def test_appending_adds_a_file_with_the_same_size(made, root, capsys):
     assert dataset.meta.episodes[f"videos/{SCENE}/file_index"] == [0, 0, 1, 1]
     assert_pictures(dataset, drawn(made / "raw"))
     found, expected = read_content(root), read_content(made / "both")
-    assert [episode.features for episode in found.episodes] == [episode.features for episode in expected.episodes]
+    for episode, other in zip(found.episodes, expected.episodes, strict=True):
+        assert (episode.features, episode.columns) == (other.features, other.columns)
+    assert found.features == expected.features
     assert found.hash == expected.hash
     first = f"videos/{SCENE}/chunk-000/file-000.mp4"
     assert contents(root)[first] == before[first]
