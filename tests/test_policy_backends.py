@@ -19,8 +19,9 @@ from lerobot_policy_copolicy.copolicy.fast_mlp import FastMlp
 from lerobot_policy_copolicy.copolicy.fast_planner import FastPlanner
 from lerobot_policy_copolicy.copolicy.fast_transformer import FastTransformer
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-from lerobot_policy_copolicy.copolicy.numba_kernels import LANES, OUTPUTS, gelu, pack, transformer
+from lerobot_policy_copolicy.copolicy.numba_kernels import gelu, transformer
 from lerobot_policy_copolicy.copolicy.onnx_denoiser import OnnxDenoiser, denoiser_graph
+from lerobot_policy_copolicy.copolicy.packed_weights import LANES, OUTPUTS, pack
 
 NETWORKS = {"transformer": {**TRANSFORMER, "n_layers": 3}, "mlp": MLP}
 

@@ -9,6 +9,7 @@ from torch import Tensor
 from . import numba_kernels as kernels
 from .fast_mlp import FastMlp
 from .fast_transformer import FastTransformer
+from .packed_weights import Norm, PackedBlocks, PackedLayers, PackedLinear, pack
 
 
 class NumbaDenoiser:
@@ -32,12 +33,12 @@ class NumbaDenoiser:
 def _transformer(denoiser: FastTransformer) -> Any:
     parts = list(zip(*denoiser.layers, strict=True))
     norm1, self_in, self_out, norm2, cross_bias, norm3, inner, outer = parts
-    layers = kernels.PackedLayers(
+    layers = PackedLayers(
         _norm(norm1), _linear(self_in), _linear(self_out), _norm(norm2), _stacked(cross_bias), _norm(norm3),
         _linear(inner), _linear(outer),
     )  # fmt: skip
     embedding, head = _single(denoiser.embedding), _single(denoiser.head)
-    position, norm = _array(denoiser.position), kernels.Norm(*map(_array, denoiser.norm))
+    position, norm = _array(denoiser.position), Norm(*map(_array, denoiser.norm))
     heads = denoiser.n_heads
 
     def evaluate(noisy: np.ndarray, keys: np.ndarray, scores: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -48,13 +49,13 @@ def _transformer(denoiser: FastTransformer) -> Any:
 
 def _perceptron(denoiser: FastMlp) -> Any:
     blocks: list[Any] = list(denoiser.blocks)
-    packed = kernels.PackedBlocks(
+    packed = PackedBlocks(
         _norm([block.norm for block in blocks]),
         _packed([block.inner.weight for block in blocks]),
         _linear([block.outer for block in blocks]),
     )
-    actions, head = kernels.pack(_array(denoiser.actions)), _single(denoiser.head)
-    norm = kernels.Norm(_array(denoiser.norm.weight), _array(denoiser.norm.bias))
+    actions, head = pack(_array(denoiser.actions)), _single(denoiser.head)
+    norm = Norm(_array(denoiser.norm.weight), _array(denoiser.norm.bias))
 
     def evaluate(noisy: np.ndarray, history: np.ndarray, biases: np.ndarray) -> np.ndarray:
         return kernels.perceptron(noisy.reshape(len(noisy), -1), actions, packed, norm, head, history, biases).reshape(
@@ -64,20 +65,20 @@ def _perceptron(denoiser: FastMlp) -> Any:
     return evaluate
 
 
-def _linear(layers: Any) -> kernels.PackedLinear:
-    return kernels.PackedLinear(_packed([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
+def _linear(layers: Any) -> PackedLinear:
+    return PackedLinear(_packed([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
 def _packed(weights: list[Tensor]) -> np.ndarray:
-    return np.stack([kernels.pack(_array(weight)) for weight in weights])
+    return np.stack([pack(_array(weight)) for weight in weights])
 
 
-def _single(layer: Any) -> kernels.PackedLinear:
-    return kernels.PackedLinear(kernels.pack(_array(layer.weight)), _array(layer.bias))
+def _single(layer: Any) -> PackedLinear:
+    return PackedLinear(pack(_array(layer.weight)), _array(layer.bias))
 
 
-def _norm(layers: Any) -> kernels.Norm:
-    return kernels.Norm(_stacked([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
+def _norm(layers: Any) -> Norm:
+    return Norm(_stacked([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
 def _stacked(tensors: Any) -> np.ndarray:

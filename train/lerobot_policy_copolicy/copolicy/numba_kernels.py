@@ -5,23 +5,23 @@ matrix products are slow there (ONNX Runtime reads them at 13 GB/s where the cac
 rows. Here the weights lie in the order in which they are read, four outputs side by side, and each is multiplied with
 three rows as it comes by; and a whole step is one call, where ONNX Runtime starts two hundred operators.
 
-All functions that numba caches are in this file, because it looks for changes in no other.
+All functions that numba caches are in this file, because it looks for changes in no other: who changes the layout in
+`packed_weights` changes this file with it.
 """
 
 import math
 from contextlib import suppress
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from llvmlite import binding, ir
+from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-# Values of a vector register: sixteen in AVX-512; elsewhere eight, which fit in two of NEON's.
-LANES = 16 if binding.get_host_cpu_features().get("avx512f") else 8
-OUTPUTS = 4  # side by side in packed weights
+from .packed_weights import LANES, OUTPUTS, padded_size
+
 _ROWS = 3  # multiplied at once: with four outputs, twelve sums, three inputs and a weight fill AVX2's registers
 _BYTES = 4  # of a float32
 
@@ -34,64 +34,6 @@ def _jit(function: Any) -> Any:
     with suppress(RuntimeError):  # there is no folder to write to: it compiles in each process
         compiled.enable_caching()  # pyright: ignore[reportAttributeAccessIssue]
     return compiled
-
-
-class PackedLinear(NamedTuple):
-    """A layer `x -> W x + b`, see `pack`.
-
-    Attributes:
-        weight: `(blocks, chunks, OUTPUTS, LANES)` float32.
-        bias: `(blocks * OUTPUTS,)` float32.
-    """
-
-    weight: np.ndarray
-    bias: np.ndarray
-
-
-class Norm(NamedTuple):
-    """Weight and bias of a layer normalisation, `(size,)` float32 each."""
-
-    weight: np.ndarray
-    bias: np.ndarray
-
-
-class PackedLayers(NamedTuple):
-    """The decoder layers of a `FastTransformer`, stacked: the parts in the order in which they act."""
-
-    norm1: Norm
-    self_in: PackedLinear
-    self_out: PackedLinear
-    norm2: Norm
-    cross_bias: np.ndarray
-    norm3: Norm
-    inner: PackedLinear
-    outer: PackedLinear
-
-
-class PackedBlocks(NamedTuple):
-    """The residual blocks of a `FastMlp`, stacked; the bias of `inner` depends on the step and is an input."""
-
-    norm: Norm
-    inner: np.ndarray
-    outer: PackedLinear
-
-
-def pack(weight: np.ndarray) -> np.ndarray:
-    """A weight matrix `(outputs, inputs)` in the order in which the kernels read it, padded with zeros.
-
-    Returns:
-        `(blocks, chunks, OUTPUTS, LANES)` float32: element `[b, c, o, l]` is `weight[b * OUTPUTS + o, c * LANES + l]`.
-    """
-    outputs, inputs = weight.shape
-    padded = np.zeros((padded_size(outputs, OUTPUTS), padded_size(inputs, LANES)), np.float32)
-    padded[:outputs, :inputs] = weight
-    blocks = padded.reshape(len(padded) // OUTPUTS, OUTPUTS, -1, LANES)
-    return np.ascontiguousarray(blocks.transpose(0, 2, 1, 3))
-
-
-def padded_size(size: int, multiple: int) -> int:
-    """`size` rounded up to a multiple."""
-    return -(-size // multiple) * multiple
 
 
 def _block(rows: int) -> Any:
@@ -128,7 +70,7 @@ def _block(rows: int) -> Any:
             multiply_add = function(vector, "fmuladd", vector, vector, vector)
             total = function(number, "vector.reduce.fadd", number, vector)
             zero = ir.Constant(vector, [0.0] * LANES)
-            sums = [[cgutils.alloca_once_value(builder, zero) for _ in range(rows)] for _ in range(OUTPUTS)]
+            sums = [[cgutils.alloca_once(builder, vector) for _ in range(rows)] for _ in range(OUTPUTS)]
             for place in chain(*sums):
                 builder.store(zero, place)
             with cgutils.for_range(builder, chunks) as loop:
@@ -157,10 +99,13 @@ def _block(rows: int) -> Any:
 _three_rows, _one_row = _block(_ROWS), _block(1)
 
 
+_padded_size = _jit(padded_size)
+
+
 @_jit
 def _room(rows, size):
     """Zeros for rows of a size, padded to whole chunks."""
-    return np.zeros((rows, (size + LANES - 1) // LANES * LANES), np.float32)
+    return np.zeros((rows, _padded_size(size, LANES)), np.float32)
 
 
 @_jit
@@ -212,31 +157,34 @@ def _normalise(values, weight, bias, out):
             out[row, index] = (values[row, index] - mean) * scale * weight[index] + bias[index]
 
 
+def _float32(*values: float) -> tuple:
+    return tuple(np.float32(value) for value in values)
+
+
+# Of erf(x) / x in x squared, from the highest power down; fitted to within 1.5e-8 on [0, 3.9] by least squares,
+# reweighted towards the largest error.
+_ERF_ABOVE = _float32(2.05038518e-06, 2.87457968e-04, 3.83689993e-03, 5.29669905e-02, 1.91941539e-01, 1.12837903e00)
+_ERF_BELOW = _float32(3.82307582e-05, 1.18174059e-03, 1.51092511e-02, 1.14758423e-01, 5.03435538e-01, 1.0)
+
+
+@_jit
+def _polynomial(y, a, b, c, d, e, f):
+    return ((((a * y + b) * y + c) * y + d) * y + e) * y + f
+
+
 @_jit
 def gelu(values):
     """The exact GELU, in place.
 
-    `erf` is a quotient of polynomials, fitted to within 1.5e-8 on [0, 3.9] (by least squares, reweighted towards the
-    largest error): the library's takes as long as the products.
+    `erf` is a quotient of polynomials: the library's takes as long as the products.
     """
     for row in range(values.shape[0]):
         for index in range(values.shape[1]):
             value = values[row, index]
             x = min(max(value * np.float32(0.70710678), np.float32(-3.9)), np.float32(3.9))
             y = x * x
-            above = np.float32(2.05038518e-06)
-            above = above * y + np.float32(2.87457968e-04)
-            above = above * y + np.float32(3.83689993e-03)
-            above = above * y + np.float32(5.29669905e-02)
-            above = above * y + np.float32(1.91941539e-01)
-            above = above * y + np.float32(1.12837903e00)
-            below = np.float32(3.82307582e-05)
-            below = below * y + np.float32(1.18174059e-03)
-            below = below * y + np.float32(1.51092511e-02)
-            below = below * y + np.float32(1.14758423e-01)
-            below = below * y + np.float32(5.03435538e-01)
-            below = below * y + np.float32(1)
-            values[row, index] = np.float32(0.5) * value * (np.float32(1) + x * above / below)
+            erf = x * _polynomial(y, *_ERF_ABOVE) / _polynomial(y, *_ERF_BELOW)
+            values[row, index] = np.float32(0.5) * value * (np.float32(1) + erf)
 
 
 @_jit

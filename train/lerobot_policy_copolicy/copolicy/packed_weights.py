@@ -1,0 +1,68 @@
+"""Weights in the order in which the kernels of `numba_kernels` read them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import binding
+
+# Values of a vector register: sixteen in AVX-512; elsewhere eight, which fit in two of NEON's.
+LANES = 16 if binding.get_host_cpu_features().get("avx512f") else 8
+OUTPUTS = 4  # side by side in packed weights
+
+
+class PackedLinear(NamedTuple):
+    """A layer `x -> W x + b`, see `pack`.
+
+    Attributes:
+        weight: `(blocks, chunks, OUTPUTS, LANES)` float32.
+        bias: `(blocks * OUTPUTS,)` float32.
+    """
+
+    weight: np.ndarray
+    bias: np.ndarray
+
+
+class Norm(NamedTuple):
+    """Weight and bias of a layer normalisation, `(size,)` float32 each."""
+
+    weight: np.ndarray
+    bias: np.ndarray
+
+
+class PackedLayers(NamedTuple):
+    """The decoder layers of a `FastTransformer`, stacked: the parts in the order in which they act."""
+
+    norm1: Norm
+    self_in: PackedLinear
+    self_out: PackedLinear
+    norm2: Norm
+    cross_bias: np.ndarray
+    norm3: Norm
+    inner: PackedLinear
+    outer: PackedLinear
+
+
+class PackedBlocks(NamedTuple):
+    """The residual blocks of a `FastMlp`, stacked; the bias of `inner` depends on the step and is an input."""
+
+    norm: Norm
+    inner: np.ndarray
+    outer: PackedLinear
+
+
+def pack(weight: np.ndarray) -> np.ndarray:
+    """A weight matrix `(outputs, inputs)` in the order in which the kernels read it, padded with zeros.
+
+    Returns:
+        `(blocks, chunks, OUTPUTS, LANES)` float32: element `[b, c, o, l]` is `weight[b * OUTPUTS + o, c * LANES + l]`.
+    """
+    outputs, inputs = weight.shape
+    padded = np.zeros((padded_size(outputs, OUTPUTS), padded_size(inputs, LANES)), np.float32)
+    padded[:outputs, :inputs] = weight
+    blocks = padded.reshape(len(padded) // OUTPUTS, OUTPUTS, -1, LANES)
+    return np.ascontiguousarray(blocks.transpose(0, 2, 1, 3))
+
+
+def padded_size(size: int, multiple: int) -> int:
+    """`size` rounded up to a multiple."""
+    return -(-size // multiple) * multiple
