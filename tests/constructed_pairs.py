@@ -74,7 +74,7 @@ def write_folder(data: Trajectories, root: Path, **columns) -> Path:
     episodes, frames = len(data.rows), len(data.states)
     info = {"codebase_version": "v3.0", "fps": data.fps, "total_episodes": episodes, "total_frames": frames}
     info["splits"] = {"train": f"0:{episodes}"}
-    (root / "meta/info.json").write_text(json.dumps(info))
+    (root / "meta/info.json").write_text(json.dumps(info), encoding="utf-8")
     table = []
     for index, entry in enumerate(data.rows):
         names = ("episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class")

@@ -57,7 +57,7 @@ class HubUser:
 
     def __enter__(self) -> "HubUser":
         environment = {name: value for name, value in os.environ.items() if not name.startswith("HF_")}
-        self._stderr = (self.home / "stderr.txt").open("w+")
+        self._stderr = (self.home / "stderr.txt").open("w+", encoding="utf-8")
         self._worker = subprocess.Popen(
             [sys.executable, "-c", _WORKER],
             env={**environment, **self.hub.environment(self.home, token=None)},
@@ -78,5 +78,7 @@ class HubUser:
         assert self._worker.stdout is not None
         print(json.dumps({"arguments": list(map(str, arguments)), "token": token}), file=self._worker.stdin, flush=True)
         done = Done(*json.loads(self._worker.stdout.readline()))
-        assert token is None or token not in done.out + done.err + (self.home / "stderr.txt").read_text()
+        assert token is None or token not in done.out + done.err + (self.home / "stderr.txt").read_text(
+            encoding="utf-8"
+        )
         return done

@@ -71,8 +71,8 @@ def make_data_set(folder: Path, episodes: int) -> Path:
 
 def make_report(root: Path) -> Path:
     """The page of a data set, with findings and statistics."""
-    (root / CHECK_FILE).write_text(json.dumps(FINDINGS))
-    (root / STATISTICS_FILE).write_text(json.dumps(STATISTICS))
+    (root / CHECK_FILE).write_text(json.dumps(FINDINGS), encoding="utf-8")
+    (root / STATISTICS_FILE).write_text(json.dumps(STATISTICS), encoding="utf-8")
     assert main(["report", str(root), "--title", "Simulated <i>pairs</i>"]) == 0
     return root / "report.html"
 

@@ -19,7 +19,7 @@ HEAVY = {"torch", "torchvision", "lerobot", "datasets", "matplotlib", "pandas", 
 def _imports(path: Path) -> set[str]:
     """Absolute names that a file imports, at its top or inside a function."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -51,9 +51,41 @@ def test_collecting_needs_no_heavy_package(room):
     assert not {path: names for path, names in found.items() if names}
 
 
+def _text_calls_without_encoding(path: Path) -> list[int]:
+    """Lines on which a file is read or written as text in whatever encoding the locale has."""
+    lines = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call) or any(keyword.arg == "encoding" for keyword in node.keywords):
+            continue
+        name = ast.unparse(node.func)
+        method = name.rpartition(".")[2]
+        modes = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
+        modes += [keyword.value.value for keyword in node.keywords if isinstance(keyword.value, ast.Constant)]
+        texts = {"r", "w", "a", "x", "r+", "w+"}.intersection(mode for mode in modes if isinstance(mode, str))
+        if name.endswith((".read_text", ".write_text")) or (
+            method in ("open", "fdopen") and texts and name != "av.open"
+        ):
+            lines.append(node.lineno)
+    return lines
+
+
+def test_text_is_utf8_whatever_the_locale():
+    files = [path for folder in (*ROOMS, "tests") for path in (ROOT / folder).rglob("*.py")]
+    found = {str(path.relative_to(ROOT)): _text_calls_without_encoding(path) for path in files}
+    assert not {path: lines for path, lines in found.items() if lines}
+
+
+def test_the_walk_sees_text_in_the_encoding_of_the_locale(tmp_path):
+    path = tmp_path / "file.py"
+    path.write_text("path.read_text()\npath.open('w')\npath.open('wb')\n", encoding="utf-8")
+    assert _text_calls_without_encoding(path) == [1, 2]
+
+
 def test_the_walk_sees_a_forbidden_import(tmp_path):
     path = tmp_path / "file.py"
-    path.write_text("def f():\n    from copolicy.train.coplan import coplan\n    import lerobot_policy_copolicy\n")
+    path.write_text(
+        "def f():\n    from copolicy.train.coplan import coplan\n    import lerobot_policy_copolicy\n", encoding="utf-8"
+    )
     assert _rooms_imported(path) == {"train"}
 
 

@@ -43,7 +43,7 @@ def offline(monkeypatch):
 
 
 def metadata(root: Path) -> dict:
-    return json.loads((root / "meta" / "croissant.json").read_text())
+    return json.loads((root / "meta" / "croissant.json").read_text(encoding="utf-8"))
 
 
 def test_the_validator_finds_nothing(dataset, offline, caplog):

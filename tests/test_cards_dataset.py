@@ -47,7 +47,7 @@ def test_a_card_states_what_the_metadata_holds(dataset):
     assert metadata["size_categories"] == ["n<1K"]
     assert metadata["configs"] == [{"config_name": "default", "data_files": "data/*/*.parquet"}]
     assert {"LeRobot", "upstream"} <= set(metadata["tags"])
-    info = json.loads((dataset / "meta" / "info.json").read_text())
+    info = json.loads((dataset / "meta" / "info.json").read_text(encoding="utf-8"))
     text = card.text
     assert f"| episodes | {info['total_episodes']} |" in text
     assert f"| frames | {info['total_frames']:,} |" in text
@@ -61,7 +61,7 @@ def test_a_card_states_what_the_metadata_holds(dataset):
 
 def test_a_card_is_a_datasheet_with_figures(dataset):
     assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
-    text = (dataset / "README.md").read_text()
+    text = (dataset / "README.md").read_text(encoding="utf-8")
     headings = [line[3:] for line in text.splitlines() if line.startswith("## ")]
     assert headings[5:] == [
         "Motivation", "Composition", "Collection: who played, and how it was recorded", "Preprocessing", "Uses",
@@ -79,7 +79,7 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
 
 def test_figures_can_be_left_out(dataset):
     assert main(["dataset", str(dataset), "--no-figures"]) == 0
-    assert "](figures/" not in (dataset / "README.md").read_text()
+    assert "](figures/" not in (dataset / "README.md").read_text(encoding="utf-8")
     assert not (dataset / "figures").exists()
 
 
@@ -99,12 +99,12 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
             }
         },
     }  # fmt: skip
-    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(stored))
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(stored), encoding="utf-8")
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "| route entropy: one obstacle | 0.9877 | bits | 0.8 to 1 | 0.1 (0 to 0.25) | 6 |" in text
     assert "| route entropy: two | - | bits | - | - | 0 |" in text
     assert "- **route entropy: two**: of routes (too few)" in text
-    (dataset / "meta" / "copolicy_stats.json").write_text("{")
+    (dataset / "meta" / "copolicy_stats.json").write_text("{", encoding="utf-8")
     with pytest.raises(FileFormatError, match=r"copolicy_stats.json: expected JSON, found"):
         render(DatasetFacts.read(dataset), "lab/table")
 
@@ -113,7 +113,7 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
     assert dataset_command(["check", str(dataset)]) == 0
-    kept = json.loads((dataset / "meta" / "copolicy_check.json").read_text())
+    kept = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
     text = render(DatasetFacts.read(dataset), "lab/table")
     counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
     assert (
@@ -127,7 +127,7 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     # What `check --json > meta/copolicy_check.json` kept before it named the content.
     entry = {"episode": "2", "rule": "idle_run", "figure": 5.25, "limit": 5, "severity": "warning", "message": "a|b"}
     old = {"rules": 37, "findings": [entry, {**entry, "episode": "", "figure": None}]}
-    (dataset / "meta" / "copolicy_check.json").write_text(json.dumps(old))
+    (dataset / "meta" / "copolicy_check.json").write_text(json.dumps(old), encoding="utf-8")
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "**Unknown.** They do not say which content was checked: the data may have changed since." in text
     assert "Checked (`meta/copolicy_check.json`): 0 errors, 2 warnings, 0 remarks." in text
@@ -137,9 +137,9 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
 def test_routes_are_set_beside_those_of_people(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
     document = route_document(["LL", "LR", "RR", "RL"] * 10, 6)
-    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document))
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
     assert main(["dataset", str(dataset), "--repo-id", "lab/table"]) == 0
-    text = (dataset / "README.md").read_text()
+    text = (dataset / "README.md").read_text(encoding="utf-8")
     assert (dataset / "figures" / "human_routes.png").read_bytes().startswith(b"\x89PNG")
     routes = document["statistics"]["routes"]
     distance = routes["human_distance_2_obstacles"]
@@ -155,14 +155,14 @@ def test_routes_are_set_beside_those_of_people(dataset):
     assert "by version 2.0.0 of the definitions" in text
     assert "**Stale.**" not in text.partition("## Multimodality")[2].partition("## Checks")[0]
     document["dataset"]["episodes"] = 7
-    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document))
+    (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "**Stale.** They were computed when the data set had 7 episodes; it has 6 now." in text
 
 
 def test_a_release_is_named(dataset):
     release = {"version": "1.2.0", "date": "2026-01-02", "content_hash": "abc"}
-    (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release))
+    (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release), encoding="utf-8")
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert 'LeRobotDataset("lab/table", revision="data-1.2.0")' in text
     assert "- Version 1.2.0 of 2026-01-02; changes are in `CHANGELOG.md`." in text
@@ -199,12 +199,12 @@ def test_what_is_no_licence_identifier_is_refused(dataset):
 
 
 def test_a_card_is_not_overwritten_unless_asked(dataset, capsys):
-    (dataset / "README.md").write_text("written by hand")
+    (dataset / "README.md").write_text("written by hand", encoding="utf-8")
     assert main(["dataset", str(dataset)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
-    assert (dataset / "README.md").read_text() == "written by hand"
+    assert (dataset / "README.md").read_text(encoding="utf-8") == "written by hand"
     assert main(["dataset", str(dataset), "--overwrite"]) == 0
-    assert (dataset / "README.md").read_text().startswith("---\n")
+    assert (dataset / "README.md").read_text(encoding="utf-8").startswith("---\n")
     assert not list(dataset.glob("*.part"))
 
 
@@ -217,7 +217,9 @@ def test_a_folder_that_is_no_data_set_is_named(tmp_path, capsys):
 
 def test_a_data_set_that_contradicts_itself_is_refused(dataset):
     path = dataset / "meta" / "info.json"
-    path.write_text(path.read_text().replace('"total_episodes": 6', '"total_episodes": 7'))
+    path.write_text(
+        path.read_text(encoding="utf-8").replace('"total_episodes": 6', '"total_episodes": 7'), encoding="utf-8"
+    )
     with pytest.raises(FileFormatError, match=r"expected 7 episodes with .* found 6 episodes"):
         DatasetFacts.read(dataset)
 

@@ -41,12 +41,14 @@ def run(tmp_path) -> Path:
     folder = tmp_path / "training" / "checkpoints" / "last" / "pretrained_model"
     folder.mkdir(parents=True)
     (folder / "model.safetensors").write_bytes(WEIGHTS)
-    (folder / "config.json").write_text(json.dumps({"type": "copolicy", "preset": "small", "horizon": 12}))
+    (folder / "config.json").write_text(
+        json.dumps({"type": "copolicy", "preset": "small", "horizon": 12}), encoding="utf-8"
+    )
     training = {
         "dataset": {"repo_id": "lab/table", "root": str(tmp_path / "gone"), "episodes": [0, 2]},
         "steps": 2500, "batch_size": 512, "seed": 7, "optimizer": {"type": "adamw", "lr": 0.001},
     }  # fmt: skip
-    (folder / "train_config.json").write_text(json.dumps(training))
+    (folder / "train_config.json").write_text(json.dumps(training), encoding="utf-8")
     return tmp_path / "training"
 
 
@@ -62,7 +64,7 @@ def dataset(tmp_path_factory) -> Path:
 
 
 def _write(path: Path, value: dict) -> str:
-    path.write_text(json.dumps(value))
+    path.write_text(json.dumps(value), encoding="utf-8")
     return str(path)
 
 
@@ -117,7 +119,7 @@ def exported(run) -> Path:
     folder = run / "checkpoints" / "last" / "pretrained_model"
     (folder / "train_config.json").unlink()
     config = {"type": "copolicy", "n_obs_steps": 3, "horizon": 12, "n_action_steps": 8, "past_human_action": True}
-    (folder / "config.json").write_text(json.dumps(config | {"ema": False}))
+    (folder / "config.json").write_text(json.dumps(config | {"ema": False}), encoding="utf-8")
     recipe = {
         "weights": {"exported_from": "f" * 64, "averaged": True},
         "training": {"steps": 900, "batch_size": 64, "seed": 3, "samples": 57_600},
@@ -128,7 +130,7 @@ def exported(run) -> Path:
         },
         "commands": ["copolicy-collect simulate --episodes 20", "copolicy-train --steps=900"],
     }  # fmt: skip
-    (folder / "recipe.json").write_text(json.dumps(recipe))
+    (folder / "recipe.json").write_text(json.dumps(recipe), encoding="utf-8")
     holdout = _evaluation()
     holdout["policy"]["weights_sha256"] = "f" * 64  # of the checkpoint that it was exported from
     partner = _evaluation("unseen", 0.9)
@@ -136,7 +138,7 @@ def exported(run) -> Path:
     partner["settings"] |= {"configurations": 60, "actions_per_plan": 1}
     partner["summary"] |= {"robot_share": 0.48, "by_partner": {"slow": {"success": {"mean": 0.95}}}}
     partner["baselines"] = [{"name": "passive", "summary": {**_evaluation()["summary"], "robot_share": 0.0}}]
-    (folder / "eval.json").write_text(json.dumps({"evaluations": [holdout, partner]}))
+    (folder / "eval.json").write_text(json.dumps({"evaluations": [holdout, partner]}), encoding="utf-8")
     return folder
 
 
@@ -144,7 +146,7 @@ def test_the_card_of_an_exported_policy_comes_from_its_own_files(exported, capsy
     assert main(["model", str(exported), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["evaluations"], said["trained_on"]) == (2, {"simulated": 18})
-    text = (exported / "README.md").read_text()
+    text = (exported / "README.md").read_text(encoding="utf-8")
     assert "In: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
     assert "Training data: **No person took part.**" in text
     assert "- Data set: `local/pairs` (a local name, not one on the Hub)" in text
@@ -159,7 +161,7 @@ def test_the_card_of_an_exported_policy_comes_from_its_own_files(exported, capsy
 
 def test_a_study_with_partners_has_a_table_of_its_own(exported):
     assert main(["model", str(exported)]) == 0
-    text = (exported / "README.md").read_text()
+    text = (exported / "README.md").read_text(encoding="utf-8")
     assert "**With SIMULATED partners, no person took part.**" in text
     assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) a plan, ddim, 10 steps" in text
     assert "| CoDP-H | 90.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0.48 | 95.0 |" in text
@@ -170,7 +172,7 @@ def test_a_study_with_partners_has_a_table_of_its_own(exported):
 def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
     folder = exported.rename(tmp_path / "pretrained")
     assert main(["model", str(folder)]) == 0
-    text = (folder / "README.md").read_text()
+    text = (folder / "README.md").read_text(encoding="utf-8")
     assert "copolicy-collect play --pilots keyboard policy:pretrained\n" in text
     assert "copolicy-eval coplan --policy pretrained --maps holdout --out eval.json\n" in text
     assert "`copolicy-train pretrained` says where it is" in text
@@ -178,7 +180,7 @@ def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
 
 def test_what_is_not_at_hand_is_not_stated(run):
     assert main(["model", str(run)]) == 0
-    text = _card(run).read_text()
+    text = _card(run).read_text(encoding="utf-8")
     assert "**Source of the training data: not stated.**" in text
     assert "- Source: not stated\n- Episodes used: 2\n" in text
     assert "Not evaluated: no `eval.json` was given." in text
@@ -209,7 +211,7 @@ def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
 def test_what_is_no_evaluation_is_named(run, tmp_path, capsys, content, found):
     path = tmp_path / "eval.json"
     if content is not None:
-        path.write_text(json.dumps(content))
+        path.write_text(json.dumps(content), encoding="utf-8")
     assert main(["model", str(run), "--eval", str(path)]) == 2
     assert capsys.readouterr().err == f"copolicy-cards: {path}: {found}\n"
 
@@ -222,9 +224,9 @@ def test_a_folder_that_is_no_checkpoint_is_named(tmp_path, capsys):
 
 
 def test_a_card_is_not_overwritten_unless_asked(run, capsys):
-    _card(run).write_text("written by hand")
+    _card(run).write_text("written by hand", encoding="utf-8")
     assert main(["model", str(run)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
-    assert _card(run).read_text() == "written by hand"
+    assert _card(run).read_text(encoding="utf-8") == "written by hand"
     assert main(["model", str(run), "--overwrite"]) == 0
-    assert _card(run).read_text().startswith("---\n")
+    assert _card(run).read_text(encoding="utf-8").startswith("---\n")

@@ -139,16 +139,16 @@ def test_a_broken_table_of_episodes_is_no_data_set(root, capsys):
 def test_a_released_file_that_changed(root, check):
     release(root, "minor", "the first")
     assert check(root)[0] == 0
-    (root / "README.md").write_text("not released")
+    (root / "README.md").write_text("not released", encoding="utf-8")
     stats = root / "meta" / "stats.json"
-    stats.write_text(stats.read_text() + "\n")
+    stats.write_text(stats.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     status, lines = check(root)
     assert status == 1
     assert [line.split(";")[0] for line in serious(lines)] == [
         "error check_sum [] README.md is not in the manifest",
         "error check_sum [] meta/stats.json has other content",
     ]
-    (root / "meta" / "manifest.json").write_text("[]")
+    (root / "meta" / "manifest.json").write_text("[]", encoding="utf-8")
     assert serious(check(root)[1])[0].startswith("error check_sum [] meta/manifest.json: expected a manifest")
 
 

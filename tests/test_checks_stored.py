@@ -33,7 +33,7 @@ def root(converted, tmp_path):
 
 
 def stored(root) -> dict:
-    return json.loads((root / CHECK_FILE).read_text())
+    return json.loads((root / CHECK_FILE).read_text(encoding="utf-8"))
 
 
 def test_findings_are_kept_with_rules_limits_date_and_content(root, capsys):
@@ -49,7 +49,7 @@ def test_findings_are_kept_with_rules_limits_date_and_content(root, capsys):
     assert document["limits"]["jump"] == {"value": 52.0, "unit": "px/s", "reason": LIMITS["jump"].reason}
     moment = datetime.datetime.fromisoformat(document["date"])
     assert abs(datetime.datetime.now(datetime.UTC) - moment) < datetime.timedelta(minutes=10)
-    assert str(root) not in (root / CHECK_FILE).read_text()
+    assert str(root) not in (root / CHECK_FILE).read_text(encoding="utf-8")
     assert document["counts"]["warning"] == 1
     assert [entry["rule"] for entry in document["findings"] if entry["severity"] == "warning"] == ["license"]
     # Neither the findings nor their renewal are part of the content.
@@ -144,13 +144,13 @@ def test_checking_again_is_no_change_to_a_release(root, capsys):
         assert main(["check", str(root), "--strict"]) == 0
     with pytest.raises(RunError, match=r"expected a change since release 0.1.0, found none"):
         release(root, "patch", "nothing new")
-    (root / "README.md").write_text("---\nlicense: cc-by-4.0\n---\n")
+    (root / "README.md").write_text("---\nlicense: cc-by-4.0\n---\n", encoding="utf-8")
     record, manifest = verify_release(root)
     assert record.version == "0.1.0"
     # What goes up holds the findings, so that a manifest without them would be refused after a pull.
     assert CHECK_FILE.as_posix() in manifest.files
     assert main(["diff", f"{root}@0.1.0", str(root)]) == 0
-    (root / "meta" / "stats.json").write_text("{}")
+    (root / "meta" / "stats.json").write_text("{}", encoding="utf-8")
     assert main(["check", str(root)]) == 1
     assert "error: check_sum: meta/stats.json has other content" in capsys.readouterr().out
 

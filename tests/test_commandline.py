@@ -37,7 +37,7 @@ def test_an_error_is_one_line_and_decides_the_status(capsys, error, status):
 
 def test_a_missing_file_is_one_line(capsys):
     def handler(arguments):
-        open("no-such-file")  # noqa: SIM115
+        open("no-such-file", encoding="utf-8")  # noqa: SIM115
 
     assert run(_parser(handler), ["do"]) == 1
     assert capsys.readouterr().err == "tool: no-such-file: No such file or directory\n"

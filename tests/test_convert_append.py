@@ -82,7 +82,7 @@ def test_exclusions_stay_and_nothing_is_added_twice(made, root, capsys):
         (1, "stick unplugged"),
         (6, "withdrawn"),
     ]
-    record = json.loads((root / "meta" / "copolicy.json").read_text())
+    record = json.loads((root / "meta" / "copolicy.json").read_text(encoding="utf-8"))
     assert [part["files"] for part in record["appended"]] == [3]
 
 

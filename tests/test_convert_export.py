@@ -67,9 +67,9 @@ def test_a_store_pairs_a_state_with_the_action_taken_in_it(data_set, tmp_path):
         np.testing.assert_array_equal(action[rows], episode.actions)
         np.testing.assert_array_equal(past[rows][1:], episode.actions[:-1])
         np.testing.assert_array_equal(past[rows, 2:], episode.human_actions)
-    metadata = json.loads((store / "data/obs/.zarray").read_text())
+    metadata = json.loads((store / "data/obs/.zarray").read_text(encoding="utf-8"))
     assert metadata["compressor"] == {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 0, "blocksize": 0}
-    attributes = json.loads((store / ".zattrs").read_text())
+    attributes = json.loads((store / ".zattrs").read_text(encoding="utf-8"))
     assert (attributes["alignment"], attributes["fps"], attributes["sources"]) == ("ours", 10, {"simulated": 3})
     assert attributes["simulated"] is True
     assert [row["episode_uuid"] for row in attributes["episodes"]] == [e.meta["episode_uuid"] for e in expected]
@@ -94,7 +94,9 @@ def test_the_originals_raw_files_at_30_hz_give_the_originals_store(upstream, tmp
     run("upstream", examples / "raw", "--fps", 30, "--root", tmp_path / "raw", "--repo-id", "lab/raw")
     ours = arrays(export(tmp_path / "raw", "zarr", tmp_path / "table.zarr", "--alignment", "upstream"))
     theirs = arrays(examples / "table_10Hz.zarr")
-    places = {entry["raw"]: entry for entry in json.loads((examples / "zarr_episode_index.json").read_text())}
+    places = {
+        entry["raw"]: entry for entry in json.loads((examples / "zarr_episode_index.json").read_text(encoding="utf-8"))
+    }
     for number, episode in enumerate((1, 2, 3, 4, 8, 11)):
         entry = places[f"ep_{episode}"]
         mine, original = rows_of(ours[3], number), rows_of(theirs[3], entry["zarr_episode"])
@@ -140,7 +142,7 @@ def test_robomimic_gets_transitions_masks_and_the_episode_columns(data_set, tmp_
 def test_minari_gets_one_more_observation_than_actions_within_its_spaces(data_set, tmp_path):
     folder = export(data_set, "minari", tmp_path / "table-v0") / "data"
     expected = episodes(data_set)
-    metadata = json.loads((folder / "metadata.json").read_text())
+    metadata = json.loads((folder / "metadata.json").read_text(encoding="utf-8"))
     assert (metadata["dataset_id"], metadata["data_format"], metadata["total_episodes"]) == ("table-v0", "hdf5", 3)
     assert metadata["total_steps"] == sum(map(len, expected))
     assert metadata["copolicy"]["sources"] == {"simulated": 3}
@@ -210,7 +212,7 @@ def test_the_originals_alignment_needs_its_rate(recordings, tmp_path, capsys):
 @pytest.mark.parametrize("format", ["zarr", "robomimic", "minari"])
 def test_what_is_there_is_not_overwritten(data_set, tmp_path, capsys, format):
     out = tmp_path / "table-v0"
-    out.write_text("mine")
+    out.write_text("mine", encoding="utf-8")
     assert main(["export", str(data_set), "--format", format, "--out", str(out)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert contents(tmp_path) == {"table-v0": b"mine"}

@@ -39,7 +39,7 @@ def store(root, tmp_path, request, monkeypatch, capsys) -> Path:
 
 
 def metadata(array: Path) -> dict[str, Any]:
-    return json.loads((array / ".zarray").read_text())
+    return json.loads((array / ".zarray").read_text(encoding="utf-8"))
 
 
 def arrays(store: Path) -> dict[str, Path]:
@@ -64,7 +64,7 @@ def read(array: Path) -> np.ndarray:
 
 def test_groups_hold_arrays_and_nothing_else(store):
     for group in (store, store / "data", store / "meta"):
-        assert json.loads((group / ".zgroup").read_text()) == {"zarr_format": 2}
+        assert json.loads((group / ".zgroup").read_text(encoding="utf-8")) == {"zarr_format": 2}
     assert {path.name for path in store.iterdir()} == {".zgroup", ".zattrs", "data", "meta"}
     assert set(arrays(store)) == {"data/obs", "data/action", "data/past_action", "meta/episode_ends"}
     assert {path.name for group in ("data", "meta") for path in (store / group).iterdir() if path.is_file()} == {
@@ -126,5 +126,5 @@ def test_an_episode_appended_by_resizing_leaves_the_rest_alone(store):
     chunk[CHUNK - free :] = added
     last.write_bytes(codec.encode(chunk))
     about["shape"][0] += free
-    (array / ".zarray").write_text(json.dumps(about))
+    (array / ".zarray").write_text(json.dumps(about), encoding="utf-8")
     np.testing.assert_array_equal(read(array), np.vstack((before, added)))

@@ -73,7 +73,7 @@ def test_rows_are_those_of_add_frame(written):
 
 
 def test_the_information_is_that_of_add_frame(written):
-    ours, theirs = (json.loads((root / "meta/info.json").read_text()) for root in written[:2])
+    ours, theirs = (json.loads((root / "meta/info.json").read_text(encoding="utf-8")) for root in written[:2])
     assert ours["features"]["action"].pop("hold") == "mean"
     assert ours["features"]["action"].pop("record_hz") == 30
     assert ours == theirs
@@ -91,7 +91,7 @@ def test_the_episode_table_is_that_of_add_frame_and_our_columns(written):
 
 
 def test_statistics_are_those_of_lerobot_where_it_is_precise(written):
-    ours, theirs = (json.loads((root / "meta/stats.json").read_text()) for root in written[:2])
+    ours, theirs = (json.loads((root / "meta/stats.json").read_text(encoding="utf-8")) for root in written[:2])
     assert set(ours) == set(theirs)
     for name, expected in theirs.items():
         assert set(ours[name]) == set(expected)
@@ -123,7 +123,7 @@ def test_it_loads_with_time_offsets_and_our_columns(written):
 
 
 def test_the_record_of_the_conversion(written):
-    record = json.loads((written[0] / "meta/copolicy.json").read_text())
+    record = json.loads((written[0] / "meta/copolicy.json").read_text(encoding="utf-8"))
     notes = {f"uuid-{index}": [f"note {index}"] for index in range(5)}
     assert record == {"converter": "test", "fps": 10, "hold": "mean", "notes": notes}
 

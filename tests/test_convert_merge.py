@@ -75,8 +75,8 @@ def test_exclusions_and_records_are_kept_and_what_is_about_one_part_stays_behind
     one, other = roots
     exclude(one, ["1"], "stick unplugged")
     exclude(other, ["2"], "withdrawn")
-    (one / "meta" / "copolicy_stats.json").write_text("{}")
-    (other / "README.md").write_text("card")
+    (one / "meta" / "copolicy_stats.json").write_text("{}", encoding="utf-8")
+    (other / "README.md").write_text("card", encoding="utf-8")
     hashes = [read_content(root).hash for root in roots]
     assert merge(tmp_path / "out", *roots) == 0
     summary = json.loads(capsys.readouterr().out)
@@ -87,7 +87,7 @@ def test_exclusions_and_records_are_kept_and_what_is_about_one_part_stays_behind
         (1, "stick unplugged"),
         (5, "withdrawn"),
     ]
-    record = json.loads((out / "meta" / "copolicy.json").read_text())
+    record = json.loads((out / "meta" / "copolicy.json").read_text(encoding="utf-8"))
     assert [part["content_hash"] for part in record["merged"]] == hashes
     assert [part["record"]["files"] for part in record["merged"]] == [3, 3]
     assert record["hold"] == "mean"
@@ -137,7 +137,7 @@ def test_one_name_in_two_labs_is_refused_until_somebody_says_who_it_is(roots, tm
     assert rows["player_0_id"][:4] == ["kth-P01-a", "kth-P01-b", "kth-P02-a", "delft-P01-a"]
     assert rows["consent_id"] == ["kth-C1", "kth-C1", "", "", "", ""]
     assert rows["session_id"][3:] == ["delft-s1", "delft-s1", "s2"]
-    record = json.loads((out / "meta" / "copolicy.json").read_text())
+    record = json.loads((out / "meta" / "copolicy.json").read_text(encoding="utf-8"))
     assert [part["prefix"] for part in record["merged"]] == ["kth", "delft"]
 
 
@@ -167,9 +167,9 @@ def test_a_call_that_cannot_be_met_says_why(made, tmp_path, capsys, flags, messa
 
 def change_info(root: Path, change) -> None:
     path = root / "meta" / "info.json"
-    info = json.loads(path.read_text())
+    info = json.loads(path.read_text(encoding="utf-8"))
     change(info)
-    path.write_text(json.dumps(info))
+    path.write_text(json.dumps(info), encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_what_comes_out_changed_is_not_written(roots, tmp_path, capsys, monkeypa
 
 
 def test_an_output_that_is_there_is_left_alone(made, tmp_path, capsys):
-    (tmp_path / "out").write_text("mine")
+    (tmp_path / "out").write_text("mine", encoding="utf-8")
     assert merge(tmp_path / "out", made / "a", made / "b") == 2
     assert "nothing was overwritten" in capsys.readouterr().err
-    assert (tmp_path / "out").read_text() == "mine"
+    assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"

@@ -81,7 +81,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
     for name in EPISODE_COLUMNS:
         if name not in ("license", "replay_drift_px", "achieved_hz"):
             assert rows[1][name] == getattr(episode.meta, name)
-    record = json.loads((tmp_path / "set/meta/copolicy.json").read_text())
+    record = json.loads((tmp_path / "set/meta/copolicy.json").read_text(encoding="utf-8"))
     assert record["converter"] == "copolicy-convert mcap"
     assert record["left_out"] == {"damaged": [], "discarded": ["episode_2.mcap"]}
     assert str(tmp_path) not in json.dumps(record)
@@ -125,7 +125,7 @@ def test_damaged_files_are_left_out_on_demand(recordings, tmp_path, capsys, work
     (message,) = summary["damaged_left_out"]
     assert message.startswith(f"{path}: expected an intact and complete MCAP file, found ")
     assert summary["unfinished_recordings"] == ["episode_9.mcap.part"]
-    left_out = json.loads((tmp_path / "set/meta/copolicy.json").read_text())["left_out"]
+    left_out = json.loads((tmp_path / "set/meta/copolicy.json").read_text(encoding="utf-8"))["left_out"]
     assert left_out == {"damaged": ["episode_1.mcap"], "discarded": ["episode_2.mcap"]}
 
 

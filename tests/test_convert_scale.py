@@ -26,7 +26,9 @@ def test_shards_of_any_size_have_the_content_of_one_conversion(unsharded, tmp_pa
     assert (summary["episodes"], summary["shards"], summary["finished_before"]) == (EPISODES, shards, 0)
     assert content(tmp_path / "set") == content(unsharded / "whole")
     for name in ("meta/info.json", "meta/copolicy.json"):
-        assert json.loads((tmp_path / "set" / name).read_text()) == json.loads((unsharded / "whole" / name).read_text())
+        assert json.loads((tmp_path / "set" / name).read_text(encoding="utf-8")) == json.loads(
+            (unsharded / "whole" / name).read_text(encoding="utf-8")
+        )
     assert list(tmp_path.iterdir()) == [tmp_path / "set"]
 
 
@@ -35,7 +37,7 @@ def test_what_lerobot_loads_is_the_same(unsharded, tmp_path):
     merged, whole = load(tmp_path / "set"), load(unsharded / "whole")
     assert_same_frames(merged, whole, every=37)
     assert_same_statistics(merged, whole)
-    statistics = json.loads((tmp_path / "set/meta/copolicy_stats.json").read_text())
+    statistics = json.loads((tmp_path / "set/meta/copolicy_stats.json").read_text(encoding="utf-8"))
     assert statistics["dataset"]["episodes"] == EPISODES
     assert [finding for finding in check_dataset(tmp_path / "set").findings if finding.severity == "error"] == []
 
@@ -53,9 +55,9 @@ def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_pa
     (recordings / "episode_000009.mcap").unlink()
     record_rest(recordings / "episode_000004b.mcap")
     assert main(call(recordings, tmp_path / "set", "--shard-episodes", "3", "--shards", str(tmp_path / "shards"))) == 0
-    kept = json.loads((tmp_path / "shards/findings.json").read_text())
+    kept = json.loads((tmp_path / "shards/findings.json").read_text(encoding="utf-8"))
     names = {rule.name for rule in RECORDING_RULES}
-    applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text())["applied"]
+    applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text(encoding="utf-8"))["applied"]
     assert set(applied) == names
     # The recordings' own rules find in shards what they find in all at once, episodes named by their index.
     labels = {path.name: str(place) for place, path in enumerate(sorted(recordings.glob("*.mcap")))}

@@ -42,7 +42,7 @@ def test_a_finished_shard_is_not_made_again(unsharded, tmp_path, capsys):
     assert [message.split(":")[0] for message in summary["damaged_left_out"]] == [
         str(broken), str(recordings / "episode_000003.mcap"),
     ]  # fmt: skip
-    left_out = json.loads((tmp_path / "without/meta/copolicy.json").read_text())["left_out"]
+    left_out = json.loads((tmp_path / "without/meta/copolicy.json").read_text(encoding="utf-8"))["left_out"]
     assert left_out == {"damaged": ["episode_000002.mcap", "episode_000003.mcap"], "discarded": []}
     assert before.items() <= times_of(shards).items()
 
@@ -130,7 +130,7 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
 def test_what_a_killed_merge_left_goes_away(unsharded, tmp_path):
     left = tmp_path / ".set.merging"
     left.mkdir()
-    (left / "half").write_text("")
+    (left / "half").write_text("", encoding="utf-8")
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "4")) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
@@ -143,7 +143,7 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
     assert main(call(unsharded / "recordings", tmp_path / "other", *flags, "--fps", "30")) == 2
     other = tmp_path / "photographs"
     other.mkdir()
-    (other / "one.jpg").write_text("")
+    (other / "one.jpg").write_text("", encoding="utf-8")
     assert main(call(unsharded / "recordings", tmp_path / "other", "--shards", str(other))) == 2
     assert capsys.readouterr().err.splitlines() == [
         f"copolicy-convert: fps of the shards in {shards}: expected 30 (finish that call first, or give another "

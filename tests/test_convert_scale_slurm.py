@@ -33,7 +33,7 @@ echo "Submitted batch job $number"
         "scontrol": '#!/bin/bash\necho "${@: -1}"\n',
     }
     for name, text in programs.items():
-        (folder / name).write_text(text)
+        (folder / name).write_text(text, encoding="utf-8")
         (folder / name).chmod((folder / name).stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("CLUSTER", str(folder))
@@ -53,20 +53,20 @@ def test_slurm_jobs_make_the_shards_and_merge_them(unsharded, tmp_path, cluster,
     captured = capsys.readouterr()
     assert captured.err == ""
     summary = json.loads(captured.out)
-    logs = {path.name: path.read_text() for path in sorted(cluster.glob("*.log"))}
+    logs = {path.name: path.read_text(encoding="utf-8") for path in sorted(cluster.glob("*.log"))}
     assert root.is_dir(), logs
     assert (summary["shards"], summary["finished_before"]) == (2, 0)
-    script = (cluster / f"{summary['jobs']['shards']}.job").read_text().splitlines()
+    script = (cluster / f"{summary['jobs']['shards']}.job").read_text(encoding="utf-8").splitlines()
     assert script[0] == "#!/bin/bash"
     for option in ("array=0-1%2", "partition=cpu", "time=00:20:00", "account=lab", "mem-per-cpu=4G"):
         assert f"#SBATCH --{option}" in script
     assert not any(line.startswith("#SBATCH --qos") for line in script)
-    merge = (cluster / f"{summary['jobs']['merge']}.job").read_text().splitlines()
+    merge = (cluster / f"{summary['jobs']['merge']}.job").read_text(encoding="utf-8").splitlines()
     assert "#SBATCH --kill-on-invalid-dep=yes" in merge
-    arguments = (cluster / f"{summary['jobs']['merge']}.arguments").read_text()
+    arguments = (cluster / f"{summary['jobs']['merge']}.arguments").read_text(encoding="utf-8")
     assert f"--dependency=afterok:{summary['jobs']['shards']}" in arguments
     assert content(root) == content(tmp_path / "whole")
-    assert json.loads((shards / "summary.json").read_text())["episodes"] == 3
+    assert json.loads((shards / "summary.json").read_text(encoding="utf-8"))["episodes"] == 3
 
 
 def test_slurm_needs_a_partition(unsharded, tmp_path, cluster, capsys):

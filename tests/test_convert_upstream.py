@@ -93,9 +93,9 @@ def test_the_zarr_store_agrees_with_raw_files(examples, number):
 def test_a_store_with_a_reward_column_reads_the_same(examples, tmp_path):
     shutil.copytree(examples / "table_10Hz.zarr", tmp_path / "store")
     before = ZarrStore(tmp_path / "store")
-    metadata = json.loads((tmp_path / "store/data/obs/.zarray").read_text())
+    metadata = json.loads((tmp_path / "store/data/obs/.zarray").read_text(encoding="utf-8"))
     metadata |= {"shape": [1933, 19], "chunks": [1933, 19], "compressor": None}
-    (tmp_path / "store/data/obs/.zarray").write_text(json.dumps(metadata))
+    (tmp_path / "store/data/obs/.zarray").write_text(json.dumps(metadata), encoding="utf-8")
     (tmp_path / "store/data/obs/0.0").write_bytes(np.column_stack((before.obs, np.zeros(1933))).tobytes())
     after = ZarrStore(tmp_path / "store")
     assert repr(after.read(0, OPTIONS).meta) == repr(before.read(0, OPTIONS).meta)
@@ -213,7 +213,7 @@ def test_each_format_becomes_a_data_set(examples, tmp_path, capsys, name, form, 
     assert len(set(rows["episode_uuid"])) == episodes
     successes = [bool(dataset[end - 1]["next.success"]) for end in rows["dataset_to_index"]]
     assert successes == rows["success"]
-    notes = json.loads((tmp_path / "set/meta/copolicy.json").read_text())["notes"]
+    notes = json.loads((tmp_path / "set/meta/copolicy.json").read_text(encoding="utf-8"))["notes"]
     assert set(notes) == set(rows["episode_uuid"])
 
 
@@ -248,7 +248,7 @@ def test_damaged_files_stop_the_conversion_or_are_left_out(examples, tmp_path, c
     summary = json.loads(capsys.readouterr().out)
     assert summary["episodes"] == 5
     assert len(summary["damaged_left_out"]) == 1
-    record = json.loads((tmp_path / "set/meta/copolicy.json").read_text())
+    record = json.loads((tmp_path / "set/meta/copolicy.json").read_text(encoding="utf-8"))
     assert record["left_out"]["damaged"] == ["trajectories/ep_3.pkl"]
 
 

@@ -245,4 +245,9 @@ def test_training_opens_no_video(made, tmp_path, monkeypatch, capsys):
     assert (out / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
     with pytest.raises(AssertionError, match="a video was decoded"):  # what the check would have seen
         load(made / "a")[0]
-    assert STATE in json.loads((out / "checkpoints/last/pretrained_model/config.json").read_text())["input_features"]
+    assert (
+        STATE
+        in json.loads((out / "checkpoints/last/pretrained_model/config.json").read_text(encoding="utf-8"))[
+            "input_features"
+        ]
+    )

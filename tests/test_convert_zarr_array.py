@@ -27,7 +27,7 @@ def write_zarr(folder: Path, array: np.ndarray, chunks, compressor=None, order="
         "order": order,
         "dimension_separator": separator,
     }
-    (folder / ".zarray").write_text(json.dumps({**metadata, **changes}))
+    (folder / ".zarray").write_text(json.dumps({**metadata, **changes}), encoding="utf-8")
     for place in itertools.product(*(range(math.ceil(s / c)) for s, c in zip(array.shape, chunks, strict=True))):
         if place in skip:
             continue

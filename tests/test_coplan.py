@@ -104,7 +104,7 @@ def _command(checkpoint, out, *flags):
 def test_the_command_writes_a_result_and_a_picture(checkpoint, tmp_path, capsys):
     out = tmp_path / "results" / "eval.json"
     assert _command(checkpoint, out) == 0
-    result = json.loads(out.read_text())
+    result = json.loads(out.read_text(encoding="utf-8"))
     assert result["study"] == "coplan"
     assert "no person took part" in result["label"]
     assert result["settings"]["complete_set"] is False
@@ -137,16 +137,16 @@ def test_the_same_seed_gives_the_same_plans(checkpoint):
 
 def test_an_existing_result_is_not_replaced(checkpoint, tmp_path, capsys):
     out = tmp_path / "eval.json"
-    out.write_text("{}")
+    out.write_text("{}", encoding="utf-8")
     assert _command(checkpoint, out) == 2
     assert (
         capsys.readouterr()
         .err.strip()
         .endswith("eval.json: expected a path that does not exist yet, found one; nothing was overwritten")
     )
-    assert out.read_text() == "{}"
+    assert out.read_text(encoding="utf-8") == "{}"
     assert _command(checkpoint, out, "--overwrite") == 0
-    assert json.loads(out.read_text())["study"] == "coplan"
+    assert json.loads(out.read_text(encoding="utf-8"))["study"] == "coplan"
 
 
 def test_a_folder_without_a_checkpoint_is_named(tmp_path, capsys):

@@ -29,7 +29,7 @@ def _write(path, successes, *, weights="", seconds=20.0, force=0.1, study="copla
         "settings": {"maps": "holdout", "actions_per_plan": 8, "hold": 3, "step_limit": 2000, "seed": 0, **settings},
         "episodes": rows,
     }
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps(content), encoding="utf-8")
     return str(path)
 
 
@@ -85,7 +85,7 @@ def test_the_table_is_markdown(tmp_path, capsys):
     table = tmp_path / "table.md"
     assert main(["compare", one, other, "--out", str(table)]) == 0
     text = capsys.readouterr().out
-    assert table.read_text() == text
+    assert table.read_text(encoding="utf-8") == text
     assert "| a | 1 | 75.0 ± 21.7 (75.0) | 21.00 |" in text
     assert "| a - b | +25.0 (" in text
     assert "in simulation" in text
@@ -160,7 +160,7 @@ def test_the_same_training_twice_is_no_second_seed(tmp_path, capsys):
 def test_what_is_no_result_is_refused(tmp_path, capsys, text, found):
     one = _write(tmp_path / "a.json", [1, 0])
     other = tmp_path / "b.json"
-    other.write_text(text)
+    other.write_text(text, encoding="utf-8")
     what = "a result of copolicy-eval coplan or partner" if found else "at least one episode, and each once"
     expected = f"copolicy-eval: {other}: expected {what}, found {found or '0, 0 distinct'}"
     assert _compare(capsys, one, str(other)) == (2, expected)

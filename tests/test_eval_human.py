@@ -77,17 +77,17 @@ def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):
     path = tmp_path / "plan.json"
     write_json(path, plan.to_json())
     assert StudyPlan.read(path) == plan
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text(encoding="utf-8"))
     content["trials"]["P01"][0]["robot"] = "CoDP"
     content["trials"]["P01"][1]["robot"] = "CoDP"
     content["trials"]["P01"][2]["robot"] = "CoDP-H"
     content["trials"]["P01"][3]["robot"] = "CoDP-H"
     content["seed"] = 4
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(FileFormatError) as error:
         StudyPlan.read(path)
     assert f"{path}: expected the plan {plan.plan_id} as it was made, found a changed one, " in str(error.value)
-    path.write_text('{"study_plan": 1}')
+    path.write_text('{"study_plan": 1}', encoding="utf-8")
     with pytest.raises(FileFormatError, match="expected a plan of copolicy-eval human plan, found none: KeyError"):
         StudyPlan.read(path)
 
@@ -176,7 +176,7 @@ def test_people_and_simulated_players_are_not_mixed():
 def test_ratings_get_their_robot_from_the_plan(tmp_path):
     plan = make_plan(ROBOTS, "custom", SHORT, 2, 1, 0)
     path = tmp_path / "ratings.csv"
-    path.write_text("participant,block,fluent,trust\nP01,1,6,5\nP01,2,4,\nP02,1,3,4\nP02,2,7,4\n")
+    path.write_text("participant,block,fluent,trust\nP01,1,6,5\nP01,2,4,\nP02,1,3,4\nP02,2,7,4\n", encoding="utf-8")
     ratings = read_ratings(path, plan)
     assert [row["robot"] for row in ratings] == [
         next(t.robot for t in plan.of(row["participant"]) if t.block == row["block"]) for row in ratings
@@ -186,11 +186,11 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
     assert list(summary) == ["fluent", "trust"]
     assert {robot["participants"] for robot in summary["fluent"]["robots"].values()} == {2}
     assert sum(robot["mean"] for robot in summary["fluent"]["robots"].values()) == pytest.approx(10.0)
-    path.write_text("participant,block,fluent\nP01,1,good\n")
+    path.write_text("participant,block,fluent\nP01,1,good\n", encoding="utf-8")
     with pytest.raises(FileFormatError) as error:
         read_ratings(path, plan)
     assert str(error.value) == f"{path}: expected a number for 'fluent' in row 1, found 'good'"
-    path.write_text("participant,block,fluent\nP01,3,1\n")
+    path.write_text("participant,block,fluent\nP01,3,1\n", encoding="utf-8")
     with pytest.raises(FileFormatError) as error:
         read_ratings(path, plan)
     assert str(error.value) == f"{path}: expected blocks of plan {plan.plan_id}, found P01 block 3 in row 1"
@@ -268,7 +268,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     assert summary["robots"]["first"]["success"]["mean"] == 1.0
     assert summary["robots"]["first"]["planning_ms"]["mean"] is not None
     assert summary["tests"]["time_s"]["anova"] is None  # one person
-    result = json.loads((tmp_path / "result.json").read_text())
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert (result["study"], len(result["rows"])) == ("human", 4)
     assert [row["robot"] for row in result["rows"]] == [trial.robot for trial in plan.of("P01")]
     assert all(row["interaction_mean"] > 0 for row in result["rows"])

@@ -205,7 +205,7 @@ def test_the_command_writes_every_robots_episodes_and_the_card_reads_them(checkp
                  *flags]) == 0  # fmt: skip
     told = json.loads(capsys.readouterr().out)
     assert list(told["robots"]) == ["ours", "passive", "never-yields"]
-    result = json.loads(out.read_text())
+    result = json.loads(out.read_text(encoding="utf-8"))
     assert result["study"] == "partner"
     assert "SIMULATED" in result["label"]
     assert "no person took part" in result["label"]
@@ -224,9 +224,11 @@ def test_the_command_writes_every_robots_episodes_and_the_card_reads_them(checkp
     assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     copy = save_untrained_policy(tmp_path / "copy")
     card_input = tmp_path / "card.json"
-    card_input.write_text(json.dumps({**result, "policy": {"weights_sha256": _digest(copy), "parameters": 1}}))
+    card_input.write_text(
+        json.dumps({**result, "policy": {"weights_sha256": _digest(copy), "parameters": 1}}), encoding="utf-8"
+    )
     assert cards(["model", str(copy), "--eval", str(card_input)]) == 0
-    text = (copy / "README.md").read_text()
+    text = (copy / "README.md").read_text(encoding="utf-8")
     assert "With simulated partners on 4 starts of the unseen maps, 1 action(s) a plan" in text
     assert "| never-yields | 0.0 ± 0.0 | 0.0 to 19.4 | 16 |" in text
 
@@ -259,7 +261,7 @@ def test_a_wrong_call_is_one_line(checkpoint, tmp_path, capsys, flags, message):
 
 def test_an_existing_result_is_not_replaced(checkpoint, tmp_path, capsys):
     out = tmp_path / "partner.json"
-    out.write_text("{}")
+    out.write_text("{}", encoding="utf-8")
     assert _command(checkpoint, out) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
-    assert out.read_text() == "{}"
+    assert out.read_text(encoding="utf-8") == "{}"

@@ -124,7 +124,7 @@ def test_another_content_under_the_same_version_is_refused(hub, dataset, publish
 
 
 def test_the_next_version_moves_the_format_tag_and_leaves_nothing_behind(hub, dataset, publish, released_once):
-    (dataset / "old.txt").write_text("to go")
+    (dataset / "old.txt").write_text("to go", encoding="utf-8")
     assert publish().status == 0
     first = hub.data_set("lab/table").branches["main"]
     (dataset / "old.txt").unlink()
@@ -144,7 +144,7 @@ def test_the_next_version_moves_the_format_tag_and_leaves_nothing_behind(hub, da
 
 
 def test_a_card_made_after_the_release_is_published_with_a_fitting_manifest(hub, dataset, publish):
-    (dataset / "README.md").write_text("---\nlicense: mit\n---\n\n# Table 1.0.0\n")
+    (dataset / "README.md").write_text("---\nlicense: mit\n---\n\n# Table 1.0.0\n", encoding="utf-8")
     assert publish().status == 0
     assert is_published(hub, dataset)
 
@@ -167,7 +167,9 @@ REFUSED = {
         "content; release it first",
     ),
     "other statistics": (
-        lambda root: (root / "meta/stats.json").write_text((root / "meta/stats.json").read_text() + " "),
+        lambda root: (root / "meta/stats.json").write_text(
+            (root / "meta/stats.json").read_text(encoding="utf-8") + " ", encoding="utf-8"
+        ),
         1,
         "{root}: expected what release 1.0.0 holds, found that meta/stats.json has other content; release it first",
     ),

@@ -136,7 +136,7 @@ def test_calibrations_are_kept_by_the_kind_of_device(tmp_path):
     ],
 )
 def test_a_damaged_file_of_calibrations_is_named(tmp_path, content, found):
-    (tmp_path / "calibrations.json").write_text(content)
+    (tmp_path / "calibrations.json").write_text(content, encoding="utf-8")
     with pytest.raises(FileFormatError) as error:
         CalibrationStore(tmp_path)
     assert str(error.value).startswith(f"{tmp_path / 'calibrations.json'}: expected calibrations")

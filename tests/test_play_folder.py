@@ -225,5 +225,5 @@ def test_a_pilot_has_a_kind_and_a_detail():
 
 def test_the_header_names_no_path(tmp_path):
     folder = SessionFolder(tmp_path, "P01", FIXED, 2)
-    header = json.loads((folder.path / "session.json").read_text())
+    header = json.loads((folder.path / "session.json").read_text(encoding="utf-8"))
     assert header == {"session_id": folder.session_id, "pair_id": "P01", "settings": FIXED}

@@ -103,7 +103,7 @@ class Keyboard:
     def journal(self) -> list[dict]:
         """What the session noted so far."""
         path = self.out / "K01-01" / "journal.jsonl"
-        return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
     def until_part(self, there: bool = True) -> Path | None:
         """Waits for a recording to begin (or to be complete)."""

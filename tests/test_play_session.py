@@ -149,10 +149,12 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
     records = read_metadata(folder / "episode_000.mcap")
     assert records["devices"]["seat_0_device"] == "Alpha pad"
     assert records["episode_result"]["notes"] == "discarded: redo"
-    (calibration,) = json.loads((tmp_path / "config" / "calibrations.json").read_text()).values()
+    (calibration,) = json.loads((tmp_path / "config" / "calibrations.json").read_text(encoding="utf-8")).values()
     assert calibration["centre"] == pytest.approx([0.1, 0.0], abs=1e-3)
     assert calibration["low"] == pytest.approx([-0.7, -0.8], abs=0.03)
-    assert str(tmp_path) not in (folder / "session.json").read_text() + (folder / "journal.jsonl").read_text()
+    assert str(tmp_path) not in (folder / "session.json").read_text(encoding="utf-8") + (
+        folder / "journal.jsonl"
+    ).read_text(encoding="utf-8")
 
     # Every step has its own reading of the stick, and what was read is what acted.
     path = folder / "episode_001.mcap"
@@ -189,7 +191,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
     assert summary["kept_in_session"] == 1
     names = sorted(path.name for path in folder.glob("episode_*"))
     assert names == ["episode_000.mcap", "episode_001.mcap.undone", "episode_002.mcap"]
-    lines = [json.loads(line)["event"] for line in (folder / "journal.jsonl").read_text().splitlines()]
+    lines = [json.loads(line)["event"] for line in (folder / "journal.jsonl").read_text(encoding="utf-8").splitlines()]
     assert lines[0] == "begin"
     assert {"continue", "undo", "redo", "keep", "device_lost", "swap"} <= set(lines)
 

@@ -80,7 +80,7 @@ def test_saved_configuration_holds_the_values_and_loads_back(tmp_path, preset):
     saved = config(preset=preset, past_human_action=False, n_action_steps=4)
     saved.save_pretrained(tmp_path)
     assert None not in {
-        name: value for name, value in json.loads((tmp_path / "config.json").read_text()).items()
+        name: value for name, value in json.loads((tmp_path / "config.json").read_text(encoding="utf-8")).items()
         if name not in ("repo_id", "private", "tags", "license", "pretrained_path", "pretrained_revision")
     }.values()  # fmt: skip
     assert PreTrainedConfig.from_pretrained(tmp_path) == saved

@@ -42,13 +42,13 @@ def test_the_folder_is_small_and_no_machines_path_is_in_it():
     assert sum(path.stat().st_size for path in files.values()) < 8e6
     for name, path in files.items():
         if path.suffix in (".json", ".md"):
-            text = path.read_text()
+            text = path.read_text(encoding="utf-8")
             assert not [place for place in ("/home/", "/root/", "/tmp/", "/work/", "/Users/") if place in text], name
 
 
 def test_it_holds_the_averaged_weights_alone():
-    assert json.loads((FOLDER / "config.json").read_text())["ema"] is False
-    assert json.loads((FOLDER / "recipe.json").read_text())["weights"]["averaged"] is True
+    assert json.loads((FOLDER / "config.json").read_text(encoding="utf-8"))["ema"] is False
+    assert json.loads((FOLDER / "recipe.json").read_text(encoding="utf-8"))["weights"]["averaged"] is True
     with safe_open(FOLDER / "model.safetensors", "np") as weights:
         names = list(weights.keys())
         assert {str(weights.get_tensor(name).dtype) for name in names} == {"float32"}
@@ -62,7 +62,10 @@ def test_git_and_the_wheel_take_it():
         )
         assert (ignored.returncode, ignored.stdout) == (1, "")
     wheel = (
-        (ROOT / "pyproject.toml").read_text().partition("[tool.hatch.build.targets.wheel]")[2].partition("[tool.")[0]
+        (ROOT / "pyproject.toml")
+        .read_text(encoding="utf-8")
+        .partition("[tool.hatch.build.targets.wheel]")[2]
+        .partition("[tool.")[0]
     )
     assert '"train"' in wheel.partition("only-include")[2].partition("\n")[0]
     assert 'exclude = ["/*/README.md"]' in wheel  # of the rooms: not the model's own card, three folders down

@@ -28,10 +28,10 @@ def _check(out: Path, summary: dict) -> None:
         assert Path(where[name]).exists(), name
     for path in (*where["results"].split(", "), *where["pictures"].split(", ")):
         assert Path(path).is_file()
-    evaluation = json.loads((out / "eval" / "holdout.json").read_text())
+    evaluation = json.loads((out / "eval" / "holdout.json").read_text(encoding="utf-8"))
     assert evaluation["summary"]["success"]["episodes"] == 3
     assert "(3 episodes, one training seed)" in summary["what was reached"]["holdout"]
-    assert json.loads((out / "summary.json").read_text()) == summary
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == summary
     assert not [path for path in out.rglob("*") if path.name.endswith(".part")]
 
 
@@ -44,7 +44,7 @@ def test_the_chain_from_simulated_pairs(tmp_path):
     assert facts.counts("source") == {"simulated": 4}
     assert "simulated pairs" in summary["what was reached"]["label"]
     assert "no person took part" in summary["what was reached"]["label"]
-    assert "**No person took part.**" in (out / "dataset" / "README.md").read_text()
+    assert "**No person took part.**" in (out / "dataset" / "README.md").read_text(encoding="utf-8")
     assert "[1/6]" in said
     assert "$ copolicy-collect simulate --episodes 4" in said
     for command in summary["what to type next"].values():
@@ -65,7 +65,7 @@ def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream
 
 
 def test_an_output_folder_in_use_is_left_alone(tmp_path, capsys):
-    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     assert main(["--out", str(tmp_path)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]

@@ -380,7 +380,7 @@ def fake_ffmpeg(folder, fails=False):
     """A program named ffmpeg that tells what it was given; the real one is not on every machine."""
     folder.mkdir()
     program = folder / "ffmpeg"
-    program.write_text(ENCODER.format(python=sys.executable, fails=fails))
+    program.write_text(ENCODER.format(python=sys.executable, fails=fails), encoding="utf-8")
     program.chmod(0o755)
     return str(folder)
 
@@ -393,7 +393,7 @@ def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
     told = json.loads(run.stdout)["video"]
-    size, *command = out.read_text().split()
+    size, *command = out.read_text(encoding="utf-8").split()
     assert int(size) == told["pictures"] * 300 * 220 * 3
     assert command[command.index("-s") + 1] == "300x220"
     failing = fake_ffmpeg(tmp_path / "bad", fails=True)

@@ -49,11 +49,11 @@ def test_a_large_data_set_shows_fewer_frames_and_says_so(report_set):
 
 def test_a_report_is_not_overwritten_unless_asked(report_set, tmp_path, capsys):
     out = tmp_path / "page.html"
-    out.write_text("kept")
+    out.write_text("kept", encoding="utf-8")
     assert main(["report", str(report_set), "--out", str(out)]) == 2
-    assert out.read_text() == "kept"
+    assert out.read_text(encoding="utf-8") == "kept"
     assert main(["report", str(report_set), "--out", str(out), "--overwrite"]) == 0
-    assert out.read_text().startswith("<!doctype html>")
+    assert out.read_text(encoding="utf-8").startswith("<!doctype html>")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
@@ -62,7 +62,7 @@ def test_findings_that_are_not_there_are_named(report_set, tmp_path, capsys):
     assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
     expected = f"{missing}: expected a file with the output of `copolicy-dataset check --json`, found none\n"
     assert capsys.readouterr().err == f"copolicy-cards: {expected}"
-    missing.write_text("[]")
+    missing.write_text("[]", encoding="utf-8")
     assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
     assert capsys.readouterr().err == f"copolicy-cards: {missing}: expected a JSON object, found list\n"
 

@@ -48,7 +48,7 @@ def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
 def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     root = Path(shutil.copytree(report_set, tmp_path / "table"))
     document = route_document(["LL", "LR", "RR", "RL"] * 10, EPISODES)
-    (root / STATISTICS_FILE).write_text(json.dumps(document))
+    (root / STATISTICS_FILE).write_text(json.dumps(document), encoding="utf-8")
     assert main(["report", str(root), "--overwrite"]) == 0
     routes = document["statistics"]["routes"]
     page = visit.open(root / "report.html", width=375)
@@ -92,7 +92,7 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
 
 def test_statistics_of_other_episodes_are_called_stale(visit, report_set, tmp_path):
     root = Path(shutil.copytree(report_set, tmp_path / "table"))
-    (root / STATISTICS_FILE).write_text(json.dumps(route_document(["RL"] * 6, EPISODES - 1)))
+    (root / STATISTICS_FILE).write_text(json.dumps(route_document(["RL"] * 6, EPISODES - 1)), encoding="utf-8")
     assert main(["report", str(root), "--overwrite"]) == 0
     page = visit.open(root / "report.html")
     doubt = f"These statistics are stale. They were computed when the data set had {EPISODES - 1} episodes; it has"
@@ -103,7 +103,7 @@ def test_statistics_of_other_episodes_are_called_stale(visit, report_set, tmp_pa
 def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_path, capsys):
     root = Path(shutil.copytree(report_set, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json")))
     assert dataset_command(["check", str(root), "--json"]) == 0
-    date = json.loads((root / CHECK_FILE).read_text())["date"][:10]
+    date = json.loads((root / CHECK_FILE).read_text(encoding="utf-8"))["date"][:10]
     capsys.readouterr()
     assert main(["report", str(root), "--json", "--overwrite"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == "shown"

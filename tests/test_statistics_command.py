@@ -51,7 +51,7 @@ def test_statistics_lie_in_the_data_set_and_are_the_same_the_next_time(folder, c
 
 def test_every_statistic_has_unit_definition_interval_or_a_reason(folder):
     assert main(["stats", str(folder)]) == 0
-    document = json.loads((folder / STATISTICS_FILE).read_text())
+    document = json.loads((folder / STATISTICS_FILE).read_text(encoding="utf-8"))
     for family, estimates in document["statistics"].items():
         for name, entry in estimates.items():
             assert entry["unit"], name
@@ -67,7 +67,7 @@ def test_every_statistic_has_unit_definition_interval_or_a_reason(folder):
 def test_another_seed_moves_the_draws_and_not_the_values(folder, tmp_path):
     for seed in ("0", "1"):
         assert main(["stats", str(folder), "--seed", seed, "--out", str(tmp_path / f"{seed}.json")]) == 0
-    one, other = (json.loads((tmp_path / f"{seed}.json").read_text())["statistics"] for seed in "01")
+    one, other = (json.loads((tmp_path / f"{seed}.json").read_text(encoding="utf-8"))["statistics"] for seed in "01")
     assert one["forces"]["conflict_fraction"]["value"] == other["forces"]["conflict_fraction"]["value"]
     assert one["forces"]["conflict_fraction"]["null"] != other["forces"]["conflict_fraction"]["null"]
     assert not (folder / STATISTICS_FILE).exists()
@@ -83,7 +83,7 @@ def test_a_document_that_cannot_be_written_leaves_the_old_file(tmp_path):
     write_document({"a": 1}, path)
     with pytest.raises(ValueError, match="nan"):
         write_document({"a": float("nan")}, path)
-    assert json.loads(path.read_text()) == {"a": 1}
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": 1}
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -139,7 +139,7 @@ def test_files_of_the_original_program(tmp_path, upstream):
     known = [(row.route_class, route_class(data.path(n), row.map_config)) for n, row in enumerate(data.rows)]
     assert all(column == word for (column, word), row in zip(known, data.rows, strict=True) if row.success)
     assert main(["stats", str(root)]) == 0
-    document = json.loads((root / STATISTICS_FILE).read_text())
+    document = json.loads((root / STATISTICS_FILE).read_text(encoding="utf-8"))
     assert document["dataset"]["sources"] == {"upstream": 6}
     assert document["statistics"]["paths"]["path_modes"]["note"].startswith("no configuration has 8 episodes")
 
@@ -168,7 +168,7 @@ def test_hardly_any_data_is_described_without_made_up_numbers(episodes, tmp_path
     data = trajectories([(still(3), None)] * episodes, [row(FREE, success=False, duration_s=0.3)] * episodes)
     root = write_folder(data, tmp_path / "table")
     assert main(["stats", str(root)]) == 0
-    document = json.loads((root / STATISTICS_FILE).read_text())
+    document = json.loads((root / STATISTICS_FILE).read_text(encoding="utf-8"))
     missing = {name for family in document["statistics"].values() for name, entry in family.items() if "note" in entry}
     assert {"route_entropy", "path_modes", "action_variance_ratio", "steering_dip", "leadership_share"} <= missing
     assert {"human_distance_3_obstacles", "energy_between_pairs", "route_between_pair_share", "sparc"} <= missing

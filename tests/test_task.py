@@ -56,7 +56,7 @@ def test_varied_maps_are_half_the_papers_and_half_random_layouts_that_nothing_is
 
 @pytest.mark.parametrize(("name", "key"), [("holdout", "holdout_84_nominal_seed88"), ("unseen", "unseen_84")])
 def test_evaluation_maps_are_the_frozen_lists(upstream, name, key):
-    frozen = json.loads((upstream / "maps.json").read_text())["expanded"][key]
+    frozen = json.loads((upstream / "maps.json").read_text(encoding="utf-8"))["expanded"][key]
     for config, entry in zip(MAP_SETS[name], frozen, strict=True):
         x, y, theta = entry["table"]
         assert config.start == (x * 1200, y * 600, theta)

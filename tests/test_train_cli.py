@@ -65,7 +65,9 @@ def test_trains_with_evaluations_and_fine_tunes(random_table, tmp_path, capsys):
     checkpoint = tmp_path / "first" / "checkpoints" / "last" / "pretrained_model"
     tuned = [argument for argument in flags(random_table, tmp_path / "tuned", steps=1) if "policy." not in argument]
     assert main([f"--policy.path={checkpoint}", "--policy.device=cpu", "--policy.n_action_steps=1", *tuned]) == 0
-    config = json.loads((tmp_path / "tuned" / "checkpoints" / "last" / "pretrained_model" / "config.json").read_text())
+    config = json.loads(
+        (tmp_path / "tuned" / "checkpoints" / "last" / "pretrained_model" / "config.json").read_text(encoding="utf-8")
+    )
     assert (config["width"], config["n_action_steps"], config["push_to_hub"]) == (16, 1, False)
 
 
@@ -74,7 +76,9 @@ def test_discarded_episodes_are_left_out_and_recorded(copied_table, tmp_path, ca
     assert main(flags(copied_table, tmp_path / "out", steps=1)) == 0
     assert "Leaving out 2 discarded of 6 episodes: [1, 4]" in capsys.readouterr().err
     config = json.loads(
-        (tmp_path / "out" / "checkpoints" / "last" / "pretrained_model" / "train_config.json").read_text()
+        (tmp_path / "out" / "checkpoints" / "last" / "pretrained_model" / "train_config.json").read_text(
+            encoding="utf-8"
+        )
     )
     assert config["dataset"]["episodes"] == [0, 2, 3, 5]
     assert config["num_workers"] == 0

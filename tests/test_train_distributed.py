@@ -47,13 +47,13 @@ def alone(recorded, tmp_path_factory) -> tuple[Path, list[float]]:
 
 def test_two_processes_learn_as_one_with_the_same_global_batch(recorded, alone, tmp_path):
     output, script = tmp_path / "run", tmp_path / "train.py"
-    script.write_text(_SCRIPT)
+    script.write_text(_SCRIPT, encoding="utf-8")
     launcher = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc_per_node", "2", str(script)]
     done = _run([*launcher, "--json", *flags(recorded, output, batch_size=64, **_LEARNING)])
     summary = json.loads(done.stdout)  # one object: the other process says nothing
     assert "Effective batch size: 64 x 2 = 128" in done.stderr
     checkpoint = Path(summary["checkpoint"])
-    state = json.loads((checkpoint.parent / "training_state" / "training_step.json").read_text())
+    state = json.loads((checkpoint.parent / "training_state" / "training_step.json").read_text(encoding="utf-8"))
     assert (state["step"], state["num_processes"], state["batch_size"]) == (30, 2, 64)
     one, two = alone[1], losses(done.stderr)
     assert len(one) == len(two) == 3

@@ -34,10 +34,12 @@ def checkpoint(tmp_path) -> Path:
         "output_dir": str(tmp_path / "run"), "steps": 900, "batch_size": 64, "seed": 7,
         "optimizer": {"type": "adamw", "lr": 0.001}, "scheduler": {"type": "copolicy_cosine"},
     }  # fmt: skip
-    (folder / "train_config.json").write_text(json.dumps(training))
+    (folder / "train_config.json").write_text(json.dumps(training), encoding="utf-8")
     state = folder.parent / "training_state"
     state.mkdir()
-    (state / "training_step.json").write_text(json.dumps({"step": 600, "num_processes": 2, "batch_size": 64}))
+    (state / "training_step.json").write_text(
+        json.dumps({"step": 600, "num_processes": 2, "batch_size": 64}), encoding="utf-8"
+    )
     return tmp_path / "run"
 
 
@@ -89,10 +91,11 @@ def test_it_plans_as_the_checkpoint_does(checkpoint, tmp_path):
 def test_the_recipe_says_how_it_was_made_and_no_path(checkpoint, tmp_path):
     out, commands = tmp_path / "model", tmp_path / "commands.txt"
     commands.write_text(
-        "# data\ncopolicy-collect simulate --episodes 2 \\\n    --out recordings\n\ncopolicy-train --steps=9\n"
+        "# data\ncopolicy-collect simulate --episodes 2 \\\n    --out recordings\n\ncopolicy-train --steps=9\n",
+        encoding="utf-8",
     )
     assert main(["export", str(checkpoint), "--out", str(out), "--commands", str(commands)]) == 0
-    recipe = json.loads((out / "recipe.json").read_text())
+    recipe = json.loads((out / "recipe.json").read_text(encoding="utf-8"))
     assert recipe["training"] | {"optimizer": 0, "scheduler": 0} == {
         "batch_size": 64, "seed": 7, "steps": 600, "samples": 600 * 64 * 2, "optimizer": 0, "scheduler": 0,
     }  # fmt: skip
@@ -105,7 +108,7 @@ def test_the_recipe_says_how_it_was_made_and_no_path(checkpoint, tmp_path):
         "config.json", "model.safetensors", "policy_postprocessor.json", "policy_preprocessor.json", "recipe.json",
     }  # fmt: skip
     for path in out.glob("*.json"):
-        assert str(tmp_path) not in path.read_text(), path.name
+        assert str(tmp_path) not in path.read_text(encoding="utf-8"), path.name
 
 
 def test_the_recipe_has_the_facts_of_a_data_set_that_is_at_hand(checkpoint, tmp_path):
@@ -114,13 +117,14 @@ def test_the_recipe_has_the_facts_of_a_data_set_that_is_at_hand(checkpoint, tmp_
     table = pq.ParquetFile(episodes).read()
     pq.write_table(table.append_column("source", pa.array(["human", *["simulated"] * 5])), episodes)
     config = checkpoint / "checkpoints" / "last" / "pretrained_model" / "train_config.json"
-    training = json.loads(config.read_text())
+    training = json.loads(config.read_text(encoding="utf-8"))
     config.write_text(
-        json.dumps({**training, "dataset": {"repo_id": "lab/table", "root": str(root), "episodes": [0, 2, 5]}})
+        json.dumps({**training, "dataset": {"repo_id": "lab/table", "root": str(root), "episodes": [0, 2, 5]}}),
+        encoding="utf-8",
     )
     out = tmp_path / "model"
     assert main(["export", str(checkpoint), "--out", str(out)]) == 0
-    assert json.loads((out / "recipe.json").read_text())["dataset"] == {
+    assert json.loads((out / "recipe.json").read_text(encoding="utf-8"))["dataset"] == {
         "repo_id": "lab/table", "revision": None, "episodes": 6, "episodes_used": 3, "frames": sum(LENGTHS), "fps": 10,
         "source": {"simulated": 2, "human": 1},
     }  # fmt: skip
@@ -130,29 +134,29 @@ def test_the_recipe_has_the_facts_of_a_data_set_that_is_at_hand(checkpoint, tmp_
 
 def test_results_of_the_checkpoint_are_kept_without_paths(checkpoint, tmp_path):
     digest = Checkpoint(checkpoint).weights_sha256
-    (tmp_path / "eval.json").write_text(json.dumps(result(digest)))
+    (tmp_path / "eval.json").write_text(json.dumps(result(digest)), encoding="utf-8")
     out, again = tmp_path / "model", tmp_path / "again"
     assert main(["export", str(checkpoint), "--out", str(out), "--eval", str(tmp_path / "eval.json")]) == 0
-    (kept,) = json.loads((out / "eval.json").read_text())["evaluations"]
+    (kept,) = json.loads((out / "eval.json").read_text(encoding="utf-8"))["evaluations"]
     assert kept["policy"] == {"weights_sha256": digest}
     assert kept["episodes"] == [{"map_id": "a", "success": True, "reason": "goal"}]
     assert "by_map" not in kept["summary"]
     (other,) = kept["baselines"]
     assert (other["name"], other["policy"], "episodes" in other) == ("passive", {}, False)
     # So are results of the exported policy: the same command again finds the same weights.
-    (tmp_path / "other.json").write_text(json.dumps(result(Checkpoint(out).weights_sha256)))
+    (tmp_path / "other.json").write_text(json.dumps(result(Checkpoint(out).weights_sha256)), encoding="utf-8")
     flags = ["--out", str(out), "--eval", str(tmp_path / "other.json"), "--overwrite"]
     assert main(["export", str(checkpoint), *flags]) == 0
     # What was exported can be exported again, and keeps its recipe and where it came from.
     assert main(["export", str(out), "--out", str(again), "--eval", str(tmp_path / "eval.json")]) == 0
-    assert (again / "recipe.json").read_text() == (out / "recipe.json").read_text()
+    assert (again / "recipe.json").read_text(encoding="utf-8") == (out / "recipe.json").read_text(encoding="utf-8")
     assert (again / "model.safetensors").read_bytes() == (out / "model.safetensors").read_bytes()
 
 
 def test_what_cannot_be_exported_is_named(checkpoint, tmp_path, capsys):
     out, eval_json, commands = tmp_path / "model", tmp_path / "eval.json", tmp_path / "commands.txt"
-    eval_json.write_text(json.dumps(result(DIGEST)))
-    commands.write_text(f"copolicy-train --dataset.root={Path.home()}/table\n")
+    eval_json.write_text(json.dumps(result(DIGEST)), encoding="utf-8")
+    commands.write_text(f"copolicy-train --dataset.root={Path.home()}/table\n", encoding="utf-8")
     assert main(["export", str(checkpoint), "--out", str(out)]) == 0
     digests = sorted(Checkpoint(folder).weights_sha256[:12] for folder in (checkpoint, out))
     shutil.rmtree(out)
@@ -181,11 +185,11 @@ def test_only_a_policy_is_replaced_and_only_when_asked(checkpoint, tmp_path, cap
     out, notes = tmp_path / "model", tmp_path / "notes"
     call = ["export", str(checkpoint), "--out"]
     notes.mkdir()
-    (notes / "thesis.txt").write_text("years of work")
+    (notes / "thesis.txt").write_text("years of work", encoding="utf-8")
     assert main([*call, str(notes), "--overwrite"]) == 2
-    assert (notes / "thesis.txt").read_text() == "years of work"
+    assert (notes / "thesis.txt").read_text(encoding="utf-8") == "years of work"
     assert main([*call, str(out)]) == 0
-    (out / "README.md").write_text("the card of other weights")
+    (out / "README.md").write_text("the card of other weights", encoding="utf-8")
     assert main([*call, str(out)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert main([*call, str(out), "--overwrite"]) == 0

@@ -56,7 +56,7 @@ def test_by_id_with_a_revision_a_choice_and_exclusions(hub, tmp_path, arguments,
     done, config = _train(hub, tmp_path, *arguments)
     assert done.returncode == 0, done.stderr[-3000:]
     assert left_out in done.stderr
-    trained = json.loads(config.read_text())["dataset"]
+    trained = json.loads(config.read_text(encoding="utf-8"))["dataset"]
     assert (trained["repo_id"], trained["root"], trained["episodes"]) == ("lab/table", None, used)
     assert f"dataset.num_episodes={len(used)}" in done.stderr
 

@@ -43,12 +43,12 @@ def truncate(path: Path) -> None:
             "{root}/meta/info.json: expected a LeRobot v3 data set, found no such file",
         ),
         (
-            lambda root: (root / "meta" / "info.json").write_text("{"),
+            lambda root: (root / "meta" / "info.json").write_text("{", encoding="utf-8"),
             "{root}/meta/info.json: expected LeRobot's data set information, found JSONDecodeError",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text(
-                '{"codebase_version": "v2.1", "total_frames": 1, "total_episodes": 1}'
+                '{"codebase_version": "v2.1", "total_frames": 1, "total_episodes": 1}', encoding="utf-8"
             ),
             "{root}/meta/info.json: expected LeRobot data set format v3, found v2.1",
         ),

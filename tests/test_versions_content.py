@@ -88,8 +88,8 @@ def test_the_type_that_holds_the_numbers_does_not_matter(dataset, converted, kin
 
 
 def test_what_describes_or_follows_does_not_matter(dataset, converted):
-    (dataset / "README.md").write_text("other")
-    (dataset / "meta" / "stats.json").write_text("{}")
+    (dataset / "README.md").write_text("other", encoding="utf-8")
+    (dataset / "meta" / "stats.json").write_text("{}", encoding="utf-8")
     (dataset / "meta" / "copolicy.json").unlink()
     change_table(dataset, EPISODES, lambda table: table.drop([n for n in table.column_names if "stats/" in n]))
     assert read_content(dataset).hash == read_content(converted).hash

@@ -32,7 +32,7 @@ def dataset(converted, tmp_path) -> Path:
 
 
 def uuids(converted: Path) -> list[str]:
-    fields = json.loads((converted / "meta/copolicy_release.json").read_text())
+    fields = json.loads((converted / "meta/copolicy_release.json").read_text(encoding="utf-8"))
     return [episode["episode_uuid"] for episode in fields["content"]["episodes"]]
 
 
@@ -89,7 +89,9 @@ def test_the_text_names_each_change_and_the_step_it_asks_for(converted, dataset,
 def test_stored_statistics_are_compared(converted, dataset, capsys):
     other = Path(shutil.copytree(dataset, dataset.parent / "other"))
     for root, bits in ((dataset, 0.99), (other, 1.71)):
-        (root / "meta/copolicy_stats.json").write_text(json.dumps({"routes": {"bits": bits, "n": [1, 2]}, "x": None}))
+        (root / "meta/copolicy_stats.json").write_text(
+            json.dumps({"routes": {"bits": bits, "n": [1, 2]}, "x": None}), encoding="utf-8"
+        )
     status, found = diff(capsys, dataset, other)
     assert (status, found["statistics"]) == (1, {"routes.bits": [0.99, 1.71]})
     assert main(["diff", str(dataset), str(other)]) == 1

@@ -60,7 +60,9 @@ def test_the_command_says_what_it_made(dataset, capsys):
         "tag": "data-0.1.0",
         "content_hash": read_content(dataset).hash,
         "episodes": 6,
-        "changes": [f"6 episodes added, {json.loads((dataset / 'meta/info.json').read_text())['total_frames']} frames"],
+        "changes": [
+            f"6 episodes added, {json.loads((dataset / 'meta/info.json').read_bytes())['total_frames']} frames"
+        ],
     }
     assert not list(dataset.rglob("*.part"))
 
@@ -75,14 +77,14 @@ def test_the_manifest_names_every_file(released):
 
 def test_a_manifest_names_what_differs(released):
     manifest = Manifest.read(released / MANIFEST_FILE)
-    (released / "README.md").write_text("other")
+    (released / "README.md").write_text("other", encoding="utf-8")
     (released / "meta" / "stats.json").unlink()
     (released / "notes").mkdir()
     (released / "notes" / "routes.png").write_bytes(b"")
     (released / ".cache").mkdir()
-    (released / ".cache" / "x").write_text("")
+    (released / ".cache" / "x").write_text("", encoding="utf-8")
     (released / "raw").mkdir()
-    (released / "raw" / "one.mcap").write_text("")
+    (released / "raw" / "one.mcap").write_text("", encoding="utf-8")
     assert manifest.differences(Manifest.of_folder(released)) == [
         "README.md has other content",
         "meta/stats.json is missing",
@@ -101,7 +103,7 @@ def test_a_release_without_a_change_is_refused(released, capsys):
 
 CHANGES = {
     "patch: a pair": lambda root: set_value(root, EPISODES, "pair_id", 2, "pair-9"),
-    "patch: the card": lambda root: (root / "README.md").write_text("other"),
+    "patch: the card": lambda root: (root / "README.md").write_text("other", encoding="utf-8"),
     "patch: the layout": cut_differently,
     "minor: exclusions": lambda root: exclude(root, ["2"], "stuck"),
     "major: a frame": lambda root: set_value(root, FRAMES, "action[3]", -1, 0.123),
@@ -145,10 +147,14 @@ def test_added_episodes_ask_for_minor(dataset, tmp_path):
 
 def test_the_change_log_keeps_a_changelog(released):
     set_value(released, EPISODES, "pair_id", 2, "pair-9")
-    text = (released / "CHANGELOG.md").read_text().replace("## [1.0.0]", "## [Unreleased]\n- a plan\n\n## [1.0.0]")
-    (released / "CHANGELOG.md").write_text(text)
+    text = (
+        (released / "CHANGELOG.md")
+        .read_text(encoding="utf-8")
+        .replace("## [1.0.0]", "## [Unreleased]\n- a plan\n\n## [1.0.0]")
+    )
+    (released / "CHANGELOG.md").write_text(text, encoding="utf-8")
     record = release(released, "patch", "The pair had a wrong name.", datetime.date(2026, 4, 2))
-    lines = (released / "CHANGELOG.md").read_text().splitlines()
+    lines = (released / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
     assert [line for line in lines if line.startswith("## ")] == [
         "## [Unreleased]",
         "## [1.0.1] - 2026-04-02",
@@ -198,7 +204,7 @@ def test_a_release_that_breaks_off_can_be_run_again(released, monkeypatch, renam
         assert read_release(released).version == "1.0.0"
     monkeypatch.setattr(os, "replace", really_replace)
     assert release(released, "patch", "Corrected.", DAY).version == "1.0.1"
-    assert (released / "CHANGELOG.md").read_text().count("## [1.0.1]") == 1
+    assert (released / "CHANGELOG.md").read_text(encoding="utf-8").count("## [1.0.1]") == 1
     assert Manifest.read(released / MANIFEST_FILE).differences(Manifest.of_folder(released)) == []
     assert not list(released.rglob("*.part"))
 
@@ -212,12 +218,12 @@ def test_notes_that_would_spoil_the_change_log_are_refused(dataset, notes):
 
 def test_a_record_that_contradicts_itself_is_refused(released):
     path = released / RELEASE_FILE
-    fields = json.loads(path.read_text())
+    fields = json.loads(path.read_text(encoding="utf-8"))
     fields["content"]["episodes"][0]["digest"] = "0" * 64
-    path.write_text(json.dumps(fields))
+    path.write_text(json.dumps(fields), encoding="utf-8")
     with pytest.raises(FileFormatError, match=r"found ValueError: a content hash that is not that of the episodes"):
         ReleaseRecord.read(path)
-    path.write_text("{")
+    path.write_text("{", encoding="utf-8")
     with pytest.raises(FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found JSON"):
         read_release(released)
 

@@ -22,7 +22,7 @@ CONFIG = MAP_SETS["training"][10]
 
 def zarr_places(examples) -> dict[int, int]:
     """Place in the store of each numbered episode."""
-    index = json.loads((examples / "zarr_episode_index.json").read_text())
+    index = json.loads((examples / "zarr_episode_index.json").read_text(encoding="utf-8"))
     return {int(entry["raw"].removeprefix("ep_")): entry["zarr_episode"] for entry in index}
 
 
@@ -91,7 +91,7 @@ def write_store(folder: Path, states, actions):
         (folder / name).mkdir(parents=True)
         metadata = {"zarr_format": 2, "shape": array.shape, "chunks": array.shape, "dtype": array.dtype.str}
         metadata |= {"compressor": None, "fill_value": 0, "filters": None, "order": "C"}
-        (folder / name / ".zarray").write_text(json.dumps(metadata))
+        (folder / name / ".zarray").write_text(json.dumps(metadata), encoding="utf-8")
         (folder / name / ".".join("0" * array.ndim)).write_bytes(array.tobytes())
 
 

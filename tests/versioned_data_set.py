@@ -22,7 +22,7 @@ def simulated_data_set(root: Path) -> Path:
     recordings = root.parent / "recordings"
     simulate(recordings, COUNT, seed=1, workers=1)
     assert convert(["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/table", "--license", "mit"]) == 0
-    (root / "README.md").write_text("---\nlicense: mit\n---\n\n# Table\n")
+    (root / "README.md").write_text("---\nlicense: mit\n---\n\n# Table\n", encoding="utf-8")
     return root
 
 
@@ -50,9 +50,9 @@ def set_value(root: Path, file: str, column: str, row: int, value: Any) -> None:
 
 def change_json(root: Path, file: str, change: Callable[[dict], object]) -> None:
     """Rewrites a JSON file after `change` has worked on what it holds."""
-    fields = json.loads((root / file).read_text())
+    fields = json.loads((root / file).read_text(encoding="utf-8"))
     change(fields)
-    (root / file).write_text(json.dumps(fields))
+    (root / file).write_text(json.dumps(fields), encoding="utf-8")
 
 
 def keep_episodes(root: Path, places: list[int]) -> None:

@@ -39,7 +39,7 @@ class _Description(ctypes.Structure):
 
 def _library() -> ctypes.CDLL:
     """SDL as it is mapped into this process already: a second copy would have joysticks of its own."""
-    for line in Path("/proc/self/maps").read_text().splitlines():
+    for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
         if "/libSDL2-2" in line:
             sdl = ctypes.CDLL(line.split(maxsplit=5)[5])
             break

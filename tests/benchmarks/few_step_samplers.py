@@ -164,7 +164,7 @@ def main() -> None:
             "margins": {"success": SUCCESS_MARGIN, "route_entropy_bits": ENTROPY_MARGIN},
             "samplers": results,
         }
-        arguments.out.write_text(json.dumps(document, indent=1) + "\n")
+        arguments.out.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

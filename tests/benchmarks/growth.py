@@ -90,7 +90,7 @@ def measured(code: str, *arguments: str) -> Cost:
     """Runs a command and watches its processes."""
     begin = time.perf_counter()
     before = os.times()
-    with tempfile.TemporaryFile("w+") as out:
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as out:
         process = subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=out)
         peak = 0.0
         while process.poll() is None:

@@ -113,7 +113,7 @@ def run(out: Path, name: str, seed: int, device: str) -> None:
             f"--steps={row.steps}", f"--batch_size={row.batch}", f"--seed={seed}", f"--save_freq={row.steps}",
             f"--log_freq={row.steps}", "--env_eval_freq=0", *row.flags, log=folder / "training.log",
         )  # fmt: skip
-        (folder / "seconds.json").write_text(json.dumps(perf_counter() - started))
+        (folder / "seconds.json").write_text(json.dumps(perf_counter() - started), encoding="utf-8")
     for maps in MAPS:
         result = folder / f"{maps}.json"
         if not result.exists():
@@ -130,7 +130,7 @@ def table(out: Path) -> str:
     for name, row in ROWS.items():
         folders = [path.parent for path in sorted((out / name).glob("seed_*/unseen.json"))]
         if folders:
-            seconds = np.mean([json.loads((folder / "seconds.json").read_text()) for folder in folders])
+            seconds = np.mean([json.loads((folder / "seconds.json").read_text(encoding="utf-8")) for folder in folders])
             cells = [_mean([_successes(folder / f"{maps}.json").mean() for folder in folders]) for maps in MAPS]
             samples = f"{row.steps * row.batch / 1e6:.1f} M"
             lines.append(f"| {name} | {samples} | {len(folders)} | {seconds:.0f} | {cells[0]} | {cells[1]} |")
@@ -145,7 +145,7 @@ def _mean(rates: list[float]) -> str:
 
 
 def _successes(result: Path) -> np.ndarray:
-    return np.array([episode["success"] for episode in json.loads(result.read_text())["episodes"]])
+    return np.array([episode["success"] for episode in json.loads(result.read_text(encoding="utf-8"))["episodes"]])
 
 
 def _data_set(out: Path, recipe: str) -> Path:
@@ -164,7 +164,7 @@ def _command(name: str, *flags: str, log: Path) -> None:
     log.parent.mkdir(parents=True, exist_ok=True)
     program = str(Path(sysconfig.get_path("scripts")) / name)
     environment = {"ACCELERATE_MIXED_PRECISION": "bf16", "OMP_NUM_THREADS": "1", **os.environ, "HF_HUB_OFFLINE": "1"}
-    with log.open("a") as file:
+    with log.open("a", encoding="utf-8") as file:
         status = subprocess.run([program, *flags], env=environment, stdout=file, stderr=file).returncode
     if status:
         sys.exit(f"{name} ended with status {status}; see {log}")

@@ -40,7 +40,7 @@ class DatasetFacts:
         if not path.is_file():
             raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
         try:
-            info = json.loads(path.read_text())
+            info = json.loads(path.read_text(encoding="utf-8"))
             version, count, frames = info["codebase_version"], info["total_episodes"], info["total_frames"]
         except (ValueError, KeyError, TypeError) as error:
             raise FileFormatError(path, "LeRobot's info as JSON", f"{type(error).__name__} {error}") from None

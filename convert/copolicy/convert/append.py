@@ -12,13 +12,13 @@ from typing import Any
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.log import read_metadata
+from copolicy.dataset.staging import sync_folder, sync_tree
 
 from .lerobot_writer import RECORD_FILE
 from .prepare import Conversion
 from .recordings import convert_recordings, find_recordings
 from .scene_video import SCENE
 from .shifted_tables import Place, Shift, numbered_files, read_table, write_like
-from .staging import sync_folder, sync_tree
 
 try:
     from lerobot.datasets.compute_stats import aggregate_stats
@@ -160,16 +160,16 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     if info.get("splits") == {"train": f"0:{info['total_episodes']}"}:
         info["splits"] = {"train": f"0:{total}"}
     info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
-    record = json.loads((whole / RECORD_FILE).read_text()) if (whole / RECORD_FILE).is_file() else {}
-    part = json.loads((added / RECORD_FILE).read_text())
+    record = json.loads((whole / RECORD_FILE).read_text(encoding="utf-8")) if (whole / RECORD_FILE).is_file() else {}
+    part = json.loads((added / RECORD_FILE).read_text(encoding="utf-8"))
     notes = {**record.get("notes", {}), **part.pop("notes")}
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
     for name in (_INFO, _STATS, RECORD_FILE):
         (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
     write_stats(aggregate_stats(statistics), whole)
-    (whole / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False))
-    (whole / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n")
+    (whole / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    (whole / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     return info
 
 
@@ -212,7 +212,7 @@ def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
 
 def _info(root: Path) -> dict[str, Any]:
     try:
-        return json.loads((root / _INFO).read_text())
+        return json.loads((root / _INFO).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", str(error)) from None
 

@@ -48,7 +48,7 @@ def _moved_statistics(roots: Sequence[Path]) -> Iterator[dict[str, dict[str, Any
     episodes = frames = 0
     for root in roots:
         yield Shift(episodes, frames).statistics(load_stats(root) or {})
-        info = json.loads((root / "meta" / "info.json").read_text())
+        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
         episodes, frames = episodes + info["total_episodes"], frames + info["total_frames"]
 
 

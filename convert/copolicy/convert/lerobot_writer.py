@@ -16,12 +16,12 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import RECORD_HZ
 
 from .frame_files import FrameFiles
 from .prepare import PreparedEpisode
 from .scene_video import SCENE, scene_encoder, scene_feature
-from .staging import new_folder
 from .statistics import episode_statistics
 from .video_files import VideoFiles
 
@@ -104,7 +104,7 @@ def write_dataset(
         write_info(meta.info, partial)
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
-        (partial / RECORD_FILE).write_text(text + "\n")
+        (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
     successes = sum(row["success"] for row in rows)
     return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
 

@@ -12,9 +12,9 @@ from copolicy.dataset.clock import stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.log import read_episode
+from copolicy.dataset.staging import require_new
 
 from .prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
-from .staging import require_new
 
 _BATCH = 8  # files handed to a process at a time
 

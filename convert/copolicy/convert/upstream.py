@@ -12,9 +12,9 @@ from copolicy.dataset.clock import Hold, stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.staging import require_new
 
 from .prepare import Conversion, LeftOut, PreparedEpisode, admit, prepare_from
-from .staging import require_new
 from .upstream_episode import UpstreamOptions
 from .upstream_processed import read_processed
 from .upstream_raw import read_raw

@@ -41,7 +41,7 @@ def read_zarr_array(folder: Path) -> np.ndarray:
 
 def _metadata(path: Path) -> dict:
     try:
-        fields = json.loads(path.read_text())
+        fields = json.loads(path.read_text(encoding="utf-8"))
         if fields["zarr_format"] != 2:
             raise ValueError(f"zarr_format {fields['zarr_format']!r}")
         if fields.get("filters"):

@@ -64,13 +64,15 @@ def export_checkpoint(
     recipe = training_recipe(source, original.weights_sha256, averaged=policy.ema is not None, commands=commands)
     with _staged(out, overwrite) as folder:
         _save(policy, source, folder)
-        (folder / RECIPE_FILE).write_text(json.dumps(recipe, indent=1) + "\n")
+        (folder / RECIPE_FILE).write_text(json.dumps(recipe, indent=1) + "\n", encoding="utf-8")
         (folder / "model.safetensors").chmod(0o644)  # safetensors writes for its owner alone
         exported = Checkpoint(folder)
         digests = {original.weights_sha256, recipe["weights"]["exported_from"], exported.weights_sha256}
         results = [kept_evaluation(file, digests) for file in evaluations]
         if results:
-            (folder / EVALUATION_FILE).write_text(json.dumps({"evaluations": results}, indent=1) + "\n")
+            (folder / EVALUATION_FILE).write_text(
+                json.dumps({"evaluations": results}, indent=1) + "\n", encoding="utf-8"
+            )
         difference = _difference(policy, exported.policy)
         if difference > _LARGEST_DIFFERENCE:
             raise RunError(f"{out}: expected the plans of {source}, found one that differs by {difference:.2g}")

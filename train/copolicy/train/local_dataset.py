@@ -21,7 +21,7 @@ def check_local_dataset(root: Path | str) -> None:
     if not root.is_dir():
         raise FileFormatError(root, "the folder of a LeRobot v3 data set", "no such folder")
     try:
-        info = json.loads(info_path.read_text())
+        info = json.loads(info_path.read_text(encoding="utf-8"))
         version, frames, episodes = str(info["codebase_version"]), info["total_frames"], info["total_episodes"]
     except FileNotFoundError:
         raise FileFormatError(info_path, "a LeRobot v3 data set", "no such file") from None

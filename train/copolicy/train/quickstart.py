@@ -73,7 +73,7 @@ def _quickstart(arguments: argparse.Namespace) -> dict:
         _say(f"\n[{number}/{len(steps)}] {step.purpose}\n$ {step.typed}")
         _execute(step, quiet=arguments.json)
     summary = _summary(arguments, perf_counter() - started)
-    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     _say("\nDone.")
     return summary
 
@@ -150,7 +150,7 @@ def _execute(step: Step, quiet: bool) -> None:
 def _mixed_precision() -> tuple[tuple[str, str], ...]:
     """bfloat16 where the processor multiplies it: two and a half times faster than float32 there, slower elsewhere."""
     try:
-        flags = Path("/proc/cpuinfo").read_text()
+        flags = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:  # no Linux
         return ()
     return (("ACCELERATE_MIXED_PRECISION", "bf16"),) if "avx512_bf16" in flags or "amx_bf16" in flags else ()
@@ -162,7 +162,7 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
     source = "files of the original program" if arguments.upstream else "simulated pairs"
     reached = {}
     for name in ("holdout", "unseen"):
-        success = json.loads((out / "eval" / f"{name}.json").read_text())["summary"]["success"]
+        success = json.loads((out / "eval" / f"{name}.json").read_text(encoding="utf-8"))["summary"]["success"]
         mean, error = 100 * success["mean"], 100 * success["standard_error"]
         reached[name] = f"{mean:.1f} ± {error:.1f} % success ({success['episodes']} episodes, one training seed)"
     where = {} if arguments.upstream else {"recordings": str(out / "recordings")}

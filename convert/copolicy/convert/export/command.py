@@ -5,8 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
-
-from ..staging import require_new
+from copolicy.dataset.staging import require_new
 
 FORMATS = {
     "zarr": "diffusion_policy's ReplayBuffer, with the arrays of the original program",

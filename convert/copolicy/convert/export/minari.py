@@ -14,8 +14,8 @@ import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, TASK
+from copolicy.dataset.staging import new_folder
 
-from ..staging import new_folder
 from .source import ExportEpisode, ExportSource
 
 try:
@@ -63,7 +63,7 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
             "description": f"{TASK} Two players, one table; sources: {', '.join(source.facts()['sources'])}.",
             "copolicy": source.facts(),
         }
-        (folder / "metadata.json").write_text(json.dumps(metadata, indent=1))
+        (folder / "metadata.json").write_text(json.dumps(metadata, indent=1), encoding="utf-8")
     return {"frames": source.frames, "dataset_id": out.name}
 
 

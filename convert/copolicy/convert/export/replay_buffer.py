@@ -24,10 +24,10 @@ import numpy as np
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.features import ENVIRONMENT_NAMES, theta_of
+from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import ACTION_NAMES, RECORD_HZ, STATE_NAMES, Physics
 
 from ..dynamics import step_angular, step_linear
-from ..staging import new_folder
 from ..upstream_episode import states_7
 from ..upstream_zarr import ZARR_HZ
 from .source import ExportEpisode, ExportSource
@@ -70,7 +70,7 @@ def export_replay_buffer(source: ExportSource, out: Path, alignment: Alignment =
                 {key: _jsonable(value) for key, value in row.items() if key != "length"} for row in source.rows
             ],
         }
-        (partial / ".zattrs").write_text(json.dumps(attributes, indent=1, allow_nan=False))
+        (partial / ".zattrs").write_text(json.dumps(attributes, indent=1, allow_nan=False), encoding="utf-8")
     return {"alignment": alignment, "fps": fps, "rows": int(ends[-1])}
 
 
@@ -105,7 +105,7 @@ def _jsonable(value: Any) -> Any:
 
 def _write_group(folder: Path) -> None:
     folder.mkdir()
-    (folder / ".zgroup").write_text(json.dumps({"zarr_format": 2}))
+    (folder / ".zgroup").write_text(json.dumps({"zarr_format": 2}), encoding="utf-8")
 
 
 def _write_array(folder: Path, array: np.ndarray) -> None:
@@ -126,7 +126,7 @@ def _write_array(folder: Path, array: np.ndarray) -> None:
         "order": "C",
         "filters": None,
     }
-    (folder / ".zarray").write_text(json.dumps(metadata, indent=1))
+    (folder / ".zarray").write_text(json.dumps(metadata, indent=1), encoding="utf-8")
     for number, start in enumerate(range(0, len(array), length)):
         # Every chunk has the full length; what lies beyond the array's end is not looked at.
         chunk = np.zeros((length, *array.shape[1:]), array.dtype)

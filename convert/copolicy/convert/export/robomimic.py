@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import MissingExtraError
+from copolicy.dataset.staging import new_file
 
-from ..staging import new_file
 from .source import ExportEpisode, ExportSource
 
 try:

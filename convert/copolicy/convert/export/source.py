@@ -108,7 +108,7 @@ class ExportSource:
         if not path.is_file():
             raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
         try:
-            info = json.loads(path.read_text())
+            info = json.loads(path.read_text(encoding="utf-8"))
             version, fps, features = str(info["codebase_version"]), int(info["fps"]), info["features"]
             hold = str(features[ACTION].get("hold", "unknown"))
             splits = {name: _range(text) for name, text in (info.get("splits") or {}).items()}

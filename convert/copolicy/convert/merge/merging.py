@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
+from copolicy.dataset.staging import new_folder, require_new
 from copolicy.dataset.versions.content import Content, read_content
 
 from ..joined_sets import join_data_sets
 from ..lerobot_writer import RECORD_FILE
 from ..shifted_tables import numbered_files, read_table
-from ..staging import new_folder, require_new
 from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
 from .source import MergeSource, require_alike
 
@@ -75,7 +75,7 @@ def merge_datasets(
         content = read_content(partial)
         _verify(content, sources, set(LOCAL_NAMES) if prefixes else set())
         record = _record(sources, prefixes)
-        (partial / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n")
+        (partial / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     left_behind = {str(source.root): names for source in sources if (names := source.left_behind())}
     return {
         "root": str(root),
@@ -130,7 +130,7 @@ def _restore_episodes(root: Path, expected: "pa.Table") -> None:
 
 def _restore_frames(root: Path) -> None:
     """The data files with the types of the feature table, a row group an episode; one file is in memory at a time."""
-    features = json.loads((root / "meta" / "info.json").read_text())["features"]
+    features = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
     features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
     schema = get_hf_features_from_features(features).arrow_schema
     for path in numbered_files(root / "data").values():

@@ -60,10 +60,10 @@ class MergeSource:
             raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
         path = root / RECORD_FILE
         try:
-            record = json.loads(path.read_text()) if path.is_file() else {}
+            record = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
         except ValueError as error:
             raise FileFormatError(path, "JSON", str(error)) from None
-        return cls(root, json.loads((root / _INFO).read_text()), episodes, content, record)
+        return cls(root, json.loads((root / _INFO).read_text(encoding="utf-8")), episodes, content, record)
 
     def left_behind(self) -> list[str]:
         """Files that are about this data set alone and are not carried over: its statistics, releases, card, ..."""

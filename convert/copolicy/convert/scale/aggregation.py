@@ -43,9 +43,9 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
             if not (root / name).exists():
                 raise FileFormatError(root, f"a complete data set with {name}", "none; delete the shard's folder")
     join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
-    info = json.loads((target / _INFO).read_text())
-    info["features"] = json.loads((roots[0] / _INFO).read_text())["features"]
-    (target / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False))
+    info = json.loads((target / _INFO).read_text(encoding="utf-8"))
+    info["features"] = json.loads((roots[0] / _INFO).read_text(encoding="utf-8"))["features"]
+    (target / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     example = next(iter(numbered_files(roots[0] / "meta" / "episodes").values()))
     for path in numbered_files(target / "meta" / "episodes").values():
         write_like(_with_nan(read_table(path)), example, path)

@@ -11,10 +11,10 @@ from typing import Any
 from copolicy.collect.file_lock import hold
 from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.staging import require_new
 
 from ..prepare import Conversion
 from ..recordings import find_recordings
-from ..staging import require_new
 from .plan import LOCK_FILE, ShardPlan, absolute
 
 SHARD_EPISODES = 500

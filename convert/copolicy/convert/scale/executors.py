@@ -136,7 +136,7 @@ def _finished(plan: ShardPlan) -> str:
 
 def _damage(plan: ShardPlan) -> RunError:
     lists = [plan.damage_list(rank) for rank in range(len(plan))]
-    lines = [line for path in lists if path.is_file() for line in path.read_text().splitlines()]
+    lines = [line for path in lists if path.is_file() for line in path.read_text(encoding="utf-8").splitlines()]
     if not lines:
         return RunError(f"{plan.logs}: expected all jobs to end well, found others, see their logs; {_finished(plan)}")
     others = f" (and {len(lines) - 1} more, in {lists[0].parent})" if len(lines) > 1 else ""

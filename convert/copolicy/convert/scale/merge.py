@@ -8,11 +8,11 @@ from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.staging import new_folder, require_new
 
 from ..lerobot_writer import RECORD_FILE, WrittenDataset
 from ..prepare import LeftOut
 from ..shifted_tables import numbered_files, read_table
-from ..staging import new_folder, require_new
 from .aggregation import aggregate
 from .findings import all_findings
 from .plan import DATA_SET, ShardPlan
@@ -52,7 +52,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
         successes = sum(sum(table.column("success").to_pylist()) for table in tables)
     document = json.dumps([finding.to_dict() for finding in findings], indent=1)
-    (plan.folder / FINDINGS_FILE).write_text(document + "\n")
+    (plan.folder / FINDINGS_FILE).write_text(document + "\n", encoding="utf-8")
     conversion = plan.conversion
     written = WrittenDataset(
         plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
@@ -81,7 +81,7 @@ def _require_once(uuids: list[str]) -> None:
 def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> None:
     notes: dict[str, list[str]] = {}
     for part in roots:
-        notes |= json.loads((part / RECORD_FILE).read_text())["notes"]
+        notes |= json.loads((part / RECORD_FILE).read_text(encoding="utf-8"))["notes"]
     document = {
         "converter": "copolicy-convert mcap",
         "version": version("lerobot_policy_copolicy"),
@@ -91,7 +91,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "hold": plan.conversion.hold,
         "notes": notes,
     }
-    (root / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n")
+    (root / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 def _write_statistics(root: Path) -> None:

@@ -46,4 +46,4 @@ class MergeShards(PipelineStep):
         from .merge import merge_shards
 
         summary = merge_shards(self.plan)
-        (self.plan.folder / SUMMARY_FILE).write_text(json.dumps(summary, indent=2) + "\n")
+        (self.plan.folder / SUMMARY_FILE).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")

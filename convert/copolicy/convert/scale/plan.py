@@ -88,7 +88,7 @@ class ShardPlan:
     def record(self, rank: int) -> dict[str, Any] | None:
         """What a finished shard says of itself, None where it is not finished."""
         try:
-            return json.loads((self.shard(rank) / RECORD_FILE).read_text())
+            return json.loads((self.shard(rank) / RECORD_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
 
@@ -112,7 +112,7 @@ class ShardPlan:
             Number of shards that are finished already.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        (self.folder / OPTIONS_FILE).write_text(json.dumps(self.options, indent=2) + "\n")
+        (self.folder / OPTIONS_FILE).write_text(json.dumps(self.options, indent=2) + "\n", encoding="utf-8")
         shutil.rmtree(self.merge_logs / "completions", ignore_errors=True)
         finished = 0
         for path in sorted((self.folder / "shards").glob("[0-9]*")):
@@ -129,7 +129,7 @@ class ShardPlan:
 
     def _compare(self, stored: Path, options: dict[str, Any]) -> None:
         try:
-            found = dict(json.loads(stored.read_text()))
+            found = dict(json.loads(stored.read_text(encoding="utf-8")))
         except (ValueError, TypeError) as error:
             raise FileFormatError(stored, "the options of a conversion", str(error)) from None
         differ = [name for name in {**found, **options} if found.get(name) != options.get(name)]

@@ -9,9 +9,9 @@ from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
 from copolicy.dataset.checks.read_recordings import recordings_table
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.log import read_episode
+from copolicy.dataset.staging import new_folder
 
 from ..prepare import DamagedEpisodeError, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
-from ..staging import new_folder
 from .plan import DATA_SET, RECORD_FILE, ShardPlan
 
 
@@ -53,7 +53,7 @@ def convert_shard(plan: ShardPlan, rank: int) -> int:
             "left_out": asdict(left_out),
             **_findings(plan, prepared, episodes),
         }
-        (partial / RECORD_FILE).write_text(json.dumps(document, indent=1) + "\n")
+        (partial / RECORD_FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return len(prepared)
 
 
@@ -77,7 +77,7 @@ def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | 
     path.unlink(missing_ok=True)
     if damaged and not plan.skip_damaged:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("".join(f"{message}\n" for message in damaged))
+        path.write_text("".join(f"{message}\n" for message in damaged), encoding="utf-8")
         raise DamagedEpisodeError(damaged[0])
 
 

@@ -67,7 +67,7 @@ def read_lerobot(root: Path) -> EpisodeTable:
 def _info(root: Path) -> dict[str, Any]:
     path = root / "meta" / "info.json"
     try:
-        info = json.loads(path.read_text())
+        info = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", "neither") from None
     except ValueError as error:

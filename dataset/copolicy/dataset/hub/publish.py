@@ -59,7 +59,7 @@ def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = 
     record, manifest = verify_release(root)
     _require_checked(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
-    codebase_tag = json.loads((root / "meta" / "info.json").read_text())["codebase_version"]
+    codebase_tag = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))["codebase_version"]
     api = hub_api()
     repository = read_repository(api, repo_id)
     if repository is None:
@@ -114,7 +114,7 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
     if differences:
         partial = root / "meta" / ".manifest.json.part"
-        partial.write_text(found.to_text())
+        partial.write_text(found.to_text(), encoding="utf-8")
         os.replace(partial, root / MANIFEST_FILE)
     return record, found
 

@@ -54,7 +54,7 @@ def write_document(document: dict[str, Any], path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        with partial.open("w") as file:
+        with partial.open("w", encoding="utf-8") as file:
             json.dump(document, file, indent=2, allow_nan=False)
             file.write("\n")
             file.flush()

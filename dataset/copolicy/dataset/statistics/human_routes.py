@@ -29,7 +29,7 @@ def human_routes() -> dict[int, Counter[str]]:
     Raises:
         FileFormatError: the packaged file is not what it should be.
     """
-    text = files(__package__).joinpath(_LABELS).read_text()
+    text = files(__package__).joinpath(_LABELS).read_text(encoding="utf-8")
     counts: dict[int, Counter[str]] = {}
     for row in csv.reader(text.splitlines()):
         if len(row) != 2 or not row[1] or set(row[1]) - set("LR"):

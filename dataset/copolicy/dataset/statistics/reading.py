@@ -68,7 +68,7 @@ def _info(root: Path) -> Mapping[str, Any]:
     if not path.is_file():
         raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
     try:
-        info = json.loads(path.read_text())
+        info = json.loads(path.read_text(encoding="utf-8"))
         version, fps = str(info["codebase_version"]), info["fps"]
     except (ValueError, KeyError, TypeError) as error:
         raise FileFormatError(path, "LeRobot's info as JSON", f"{type(error).__name__} {error}") from None

@@ -172,6 +172,6 @@ def _read_tasks(root: Path) -> dict[int, str]:
 
 def _read_json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise FileFormatError(path, "JSON", str(error)) from None

@@ -46,7 +46,7 @@ class Manifest:
             FileFormatError: none there, or something else.
         """
         try:
-            return cls.from_text(path.read_text())
+            return cls.from_text(path.read_text(encoding="utf-8"))
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise FileFormatError(path, f"a manifest ({_SCHEMA})", _reason(error)) from None
 

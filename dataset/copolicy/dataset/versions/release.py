@@ -72,7 +72,7 @@ def _write(
     root: Path, record: ReleaseRecord, changes: tuple[Change, ...], last: ReleaseRecord | None, manifest: Manifest
 ) -> None:
     changelog = root / CHANGELOG_FILE
-    before = changelog.read_text() if changelog.exists() else ""
+    before = changelog.read_text(encoding="utf-8") if changelog.exists() else ""
     texts: dict[str, str] = {}
     if last is not None:
         texts[f"{EARLIER_FOLDER}/{last.version}.json"] = last.to_text()
@@ -98,7 +98,7 @@ def _stage(path: Path, text: str) -> Path:
     """A hidden file beside `path`, on disk before anything is renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
-    with partial.open("w") as file:
+    with partial.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())

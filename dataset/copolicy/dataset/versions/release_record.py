@@ -53,7 +53,7 @@ class ReleaseRecord:
             FileFormatError: none there, or something else.
         """
         try:
-            return cls.from_text(path.read_text())
+            return cls.from_text(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise FileFormatError(path, f"the record of a release ({_SCHEMA})", error.strerror or str(error)) from None
         except (ValueError, KeyError, TypeError, AttributeError) as error:

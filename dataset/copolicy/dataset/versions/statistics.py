@@ -21,7 +21,7 @@ def read_statistics(root: Path) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        return dict(_flat(json.loads(path.read_text())))
+        return dict(_flat(json.loads(path.read_text(encoding="utf-8"))))
     except ValueError as error:
         raise FileFormatError(path, "JSON", str(error)) from None
 

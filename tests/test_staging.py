@@ -1,8 +1,8 @@
 import pytest
 from disk_order import inodes, record_disk_order
 
-from copolicy.convert.staging import new_file, new_folder
 from copolicy.dataset.exceptions import OutputExistsError
+from copolicy.dataset.staging import new_file, new_folder
 
 
 def names(folder):
@@ -12,7 +12,7 @@ def names(folder):
 def build_and_fail(path, error):
     with new_folder(path) as partial:
         partial.mkdir()
-        (partial / "file").write_text("half")
+        (partial / "file").write_text("half", encoding="utf-8")
         raise error
 
 
@@ -25,10 +25,10 @@ def build_beside_another(path):
 def test_the_folder_appears_when_it_is_complete(tmp_path):
     with new_folder(tmp_path / "deep" / "set") as partial:
         partial.mkdir()
-        (partial / "file").write_text("done")
+        (partial / "file").write_text("done", encoding="utf-8")
         assert not (tmp_path / "deep" / "set").exists()
     assert names(tmp_path / "deep") == ["set"]
-    assert (tmp_path / "deep" / "set" / "file").read_text() == "done"
+    assert (tmp_path / "deep" / "set" / "file").read_text(encoding="utf-8") == "done"
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -60,7 +60,7 @@ def test_a_broken_link_is_something(tmp_path):
 
 def test_what_a_killed_process_left_goes_where_the_name_is_fixed(tmp_path):
     (tmp_path / ".set.merging").mkdir()
-    (tmp_path / ".set.merging" / "half").write_text("")
+    (tmp_path / ".set.merging" / "half").write_text("", encoding="utf-8")
     with new_folder(tmp_path / "set", "merging") as partial:
         partial.mkdir()
         assert names(tmp_path) == [".set.merging"]
@@ -72,8 +72,8 @@ def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch)
     order = record_disk_order(monkeypatch)
     with new_folder(tmp_path / "set") as partial:
         (partial / "data").mkdir(parents=True)
-        (partial / "data" / "file").write_text("x")
-        (partial / "info").write_text("y")
+        (partial / "data" / "file").write_text("x", encoding="utf-8")
+        (partial / "info").write_text("y", encoding="utf-8")
     place = order.index(tmp_path / "set")
     assert set(order[:place]) == inodes(tmp_path / "set", *(tmp_path / "set").rglob("*"))
     assert set(order[place + 1 :]) == inodes(tmp_path)
@@ -82,5 +82,5 @@ def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch)
 def test_so_is_a_single_file(tmp_path, monkeypatch):
     order = record_disk_order(monkeypatch)
     with new_file(tmp_path / "one") as partial:
-        partial.write_text("x")
+        partial.write_text("x", encoding="utf-8")
     assert order == [*inodes(tmp_path / "one"), tmp_path / "one", *inodes(tmp_path)]

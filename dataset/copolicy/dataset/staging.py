@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from copolicy.dataset.exceptions import OutputExistsError
+from .exceptions import OutputExistsError
 
 _FILE = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only what is open for writing
 
@@ -62,6 +62,31 @@ def new_file(path: Path) -> Iterator[Path]:
         sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacement(path: Path) -> Iterator[Path]:
+    """The same for a file that may be there already: the old one stays until the new one takes its place."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
+    try:
+        yield partial
+        _sync(partial, _FILE)
+        os.replace(partial, path)
+        sync_folder(path.parent)
+    except OSError as error:
+        # Nobody finds the hidden file when they read this.
+        if error.filename is None or Path(error.filename) == partial:
+            error.filename = str(path)
+        raise
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Writes a text file in UTF-8, whole or not at all."""
+    with replacement(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
 def sync_tree(folder: Path) -> None:
