@@ -62,6 +62,9 @@ def _type_name(column) -> str:
 EPISODE_COLUMNS: dict[str, str] = {column.name: _type_name(column) for column in fields(EpisodeMeta)}
 """Name and type (`str`, `int`, `float`, `bool`) of every episode column, in order."""
 
+LATER_COLUMNS: tuple[str, ...] = ()
+"""Episode columns that data sets of earlier versions lack; readers take the default of `EpisodeMeta` for them."""
+
 
 @dataclass(frozen=True, repr=False)
 class Episode:
