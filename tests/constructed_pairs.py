@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.features import environment_state
+from copolicy.dataset.features import FEATURES, environment_state
 from copolicy.dataset.statistics import EpisodeRow, Trajectories
 from copolicy.dataset.task import MapConfig
 
@@ -73,7 +73,7 @@ def write_folder(data: Trajectories, root: Path, **columns) -> Path:
     (root / "data/chunk-000").mkdir(parents=True)
     episodes, frames = len(data.rows), len(data.states)
     info = {"codebase_version": "v3.0", "fps": data.fps, "total_episodes": episodes, "total_frames": frames}
-    info["splits"] = {"train": f"0:{episodes}"}
+    info |= {"splits": {"train": f"0:{episodes}"}, "features": FEATURES}
     (root / "meta/info.json").write_text(json.dumps(info), encoding="utf-8")
     table = []
     for index, entry in enumerate(data.rows):

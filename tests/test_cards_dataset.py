@@ -12,6 +12,7 @@ from copolicy.cards.cli import main
 from copolicy.cards.dataset_card import render
 from copolicy.cards.facts import DatasetFacts
 from copolicy.convert.cli import main as convert
+from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 
@@ -105,7 +106,9 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
     assert "| route entropy: two | - | bits | - | - | 0 |" in text
     assert "- **route entropy: two**: of routes (too few)" in text
     (dataset / "meta" / "copolicy_stats.json").write_text("{", encoding="utf-8")
-    with pytest.raises(FileFormatError, match=r"copolicy_stats.json: expected JSON, found"):
+    with pytest.raises(
+        FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found no JSON"
+    ):
         render(DatasetFacts.read(dataset), "lab/table")
 
 
@@ -117,7 +120,8 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
     assert (
-        f"Checked on {kept['date'][:10]} by version 1.0.0 of the rules (`meta/copolicy_check.json`): {counts}" in text
+        f"Checked on {kept['date'][:10]} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}"
+        in text
     )
     assert "| severity | rule | findings | the first |" in text
     assert "**Stale.**" not in text
@@ -227,7 +231,7 @@ def test_a_data_set_that_contradicts_itself_is_refused(dataset):
 def test_a_truncated_parquet_file_is_named(dataset):
     (path,) = (dataset / "meta" / "episodes").glob("*/*.parquet")
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(FileFormatError, match=r"file-000.parquet: expected a complete parquet file, found"):
+    with pytest.raises(FileFormatError, match=r"file-000.parquet: expected a complete Parquet file, found"):
         DatasetFacts.read(dataset)
 
 

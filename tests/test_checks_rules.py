@@ -72,7 +72,7 @@ def test_columns_and_what_stands_in_them(sound):
     table = with_entry(replace(sound, columns=columns), "source", 2, "guessed")
     messages = [str(finding) for finding in find(table, "columns")]
     assert messages == [
-        "error: schema: meta/episodes has no columns pair_id, seed (2; limit 0)",
+        "error: schema: meta/episodes has no usable columns pair_id, seed (2; limit 0)",
         "error: schema: episode 2: unknown source (guessed; limit one of the known)",
     ]
 

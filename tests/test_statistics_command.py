@@ -107,7 +107,8 @@ def test_one_source_is_never_written_as_the_data_sets_statistics(folder, capsys)
 def test_damage_is_one_line(folder, tmp_path, capsys):
     assert main(["stats", str(tmp_path)]) == 2
     assert capsys.readouterr().err == (
-        f"copolicy-dataset: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none\n"
+        f"copolicy-dataset: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none, "
+        f"but one in {folder}\n"
     )
     (path,) = (folder / "data").glob("*/*.parquet")
     table = parquet.read_table(path)
@@ -118,7 +119,7 @@ def test_damage_is_one_line(folder, tmp_path, capsys):
     with pytest.raises(FileFormatError, match="expected the columns of copolicy, found none named action"):
         read_trajectories(folder)
     path.write_bytes(b"PAR1")
-    with pytest.raises(FileFormatError, match="expected a complete parquet file"):
+    with pytest.raises(FileFormatError, match="expected a complete Parquet file"):
         read_trajectories(folder)
 
 

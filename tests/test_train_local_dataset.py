@@ -40,17 +40,17 @@ def truncate(path: Path) -> None:
         (shutil.rmtree, "{root}: expected the folder of a LeRobot v3 data set, found no such folder"),
         (
             lambda root: (root / "meta" / "info.json").unlink(),
-            "{root}/meta/info.json: expected a LeRobot v3 data set, found no such file",
+            "{root}: expected a LeRobot v3 data set with meta/info.json, found none",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text("{", encoding="utf-8"),
-            "{root}/meta/info.json: expected LeRobot's data set information, found JSONDecodeError",
+            "{root}/meta/info.json: expected LeRobot's data set information, found no JSON",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text(
                 '{"codebase_version": "v2.1", "total_frames": 1, "total_episodes": 1}', encoding="utf-8"
             ),
-            "{root}/meta/info.json: expected LeRobot data set format v3, found v2.1",
+            "{root}/meta/info.json: expected codebase_version v3.x, found v2.1, an older one",
         ),
         (
             lambda root: truncate(root / "data" / "chunk-000" / "file-000.parquet"),
@@ -62,11 +62,11 @@ def truncate(path: Path) -> None:
         ),
         (
             lambda root: shutil.rmtree(root / "meta" / "episodes"),
-            "{root}/meta/episodes: expected 6 rows, as meta/info.json says, found 0",
+            "{root}: expected a LeRobot data set with episodes under meta/episodes, found none",
         ),
         (
             lambda root: (root / "meta" / "tasks.parquet").unlink(),
-            "{root}/meta/tasks.parquet: expected part of a LeRobot v3 data set, found no such file",
+            "{root}: expected a LeRobot v3 data set with meta/tasks.parquet, found none",
         ),
     ],
 )

@@ -160,11 +160,11 @@ DAMAGES = {
     ),
     "no identifiers": (
         lambda root: change_table(root, EPISODES, lambda table: table.drop(["episode_uuid"])),
-        r"file-000.parquet: expected the episode columns of copolicy, found none named episode_uuid",
+        r"meta/episodes: expected the episode columns of copolicy, found none named episode_uuid",
     ),
     "twice": (
         lambda root: change_table(root, EPISODES, lambda t: t.set_column(7, "episode_uuid", pa.array(["a"] * 6))),
-        r"episodes: expected an episode_uuid of its own for each episode, found others",
+        r"episodes: expected an episode_uuid of its own for each episode, found 6 with 'a'",
     ),
     "a frame less": (
         lambda root: change_table(root, FRAMES, lambda table: table.slice(1)),
@@ -180,7 +180,7 @@ DAMAGES = {
     ),
     "a value less": (
         lambda root: set_value(root, FRAMES, "next.reward", 10, None),
-        r"expected a value in every row of 'next.reward', found 1 without",
+        r"expected a number in every row of next.reward, found nothing in row 10",
     ),
     "cut off": (
         lambda root: (root / FRAMES).write_bytes((root / FRAMES).read_bytes()[:-20]),

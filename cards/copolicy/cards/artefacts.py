@@ -1,12 +1,12 @@
 """What other commands left in a data set's `meta/` folder, when they were run."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset import json_file
 from copolicy.dataset.checks.stored_check import CHECK_FILE, Validity, content_hash, validity
-from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.documents import CheckDocument, ReleaseDocument, StatisticsDocument
 
 __all__ = [
     "CHECK_FILE",
@@ -16,8 +16,10 @@ __all__ = [
     "KeptFindings",
     "estimates",
     "kept_findings",
+    "newest_release",
     "read_json",
     "statistics_doubt",
+    "stored_statistics",
 ]
 
 STATISTICS_FILE = Path("meta/copolicy_stats.json")
@@ -44,7 +46,7 @@ def kept_findings(root: Path, path: Path | None = None) -> KeptFindings | None:
     Raises:
         FileFormatError: there is a file, and it holds no JSON object.
     """
-    document = read_json(path or root / CHECK_FILE)
+    document = read_json(path or root / CHECK_FILE, CheckDocument, "findings of copolicy-dataset check")
     if document is None:
         return None
     # Reading the whole content is worth the time only where there is something to compare it with.
@@ -52,21 +54,34 @@ def kept_findings(root: Path, path: Path | None = None) -> KeptFindings | None:
     return KeptFindings(document, validity(document, content))
 
 
-def read_json(path: Path) -> dict[str, Any] | None:
+def read_json(path: Path, kind: type = dict, what: str = "a JSON object") -> dict[str, Any] | None:
     """The object in a JSON file, or None where there is no such file.
 
+    Args:
+        kind: the type that it must have (`copolicy.dataset.documents`).
+
     Raises:
-        FileFormatError: there is a file, and it holds no JSON object.
+        FileFormatError: there is a file, and it holds something else.
     """
-    if not path.is_file():
-        return None
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, UnicodeDecodeError) as error:
-        raise FileFormatError(path, "JSON", str(error)) from None
-    if not isinstance(value, dict):
-        raise FileFormatError(path, "a JSON object", type(value).__name__)
-    return value
+    return json_file.read_json(path, kind, what) if path.exists() else None
+
+
+def stored_statistics(root: Path) -> dict[str, Any] | None:
+    """What `copolicy-dataset stats` stored, None where it was not run.
+
+    Raises:
+        FileFormatError: there is a file, and it holds something else.
+    """
+    return read_json(root / STATISTICS_FILE, StatisticsDocument, "statistics of copolicy-dataset stats")
+
+
+def newest_release(root: Path) -> dict[str, Any] | None:
+    """What the newest release says of itself, None where there is none.
+
+    Raises:
+        FileFormatError: there is a file, and it holds something else.
+    """
+    return read_json(root / RELEASE_FILE, ReleaseDocument, "the record of a release")
 
 
 def statistics_doubt(stored: dict[str, Any], episodes: int) -> str:

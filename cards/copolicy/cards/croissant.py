@@ -13,7 +13,7 @@ from typing import Any
 
 from copolicy.dataset.episode import EPISODE_COLUMNS
 
-from .artefacts import RELEASE_FILE, read_json
+from .artefacts import newest_release
 from .dataset_card import PAPER, licence
 from .facts import DatasetFacts
 
@@ -80,7 +80,7 @@ def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = 
 
 def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> dict[str, Any]:
     """The same as a JSON-able dict."""
-    release = read_json(facts.root / RELEASE_FILE) or {}
+    release = newest_release(facts.root) or {}
     url = f"https://huggingface.co/datasets/{repo_id}"
     metadata: dict[str, Any] = {
         "@context": _CONTEXT,

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 
-from .artefacts import RELEASE_FILE, read_json
+from .artefacts import newest_release
 from .datasheet import datasheet
 from .facts import DatasetFacts
 from .findings import findings
@@ -169,7 +169,7 @@ def _features(facts: DatasetFacts) -> str:
 
 
 def _loading(facts: DatasetFacts, repo_id: str) -> str:
-    release = read_json(facts.root / RELEASE_FILE)
+    release = newest_release(facts.root)
     revision = f', revision="data-{release["version"]}"' if release and "version" in release else ""
     return f"""## How to load it, and how to train on it
 

@@ -5,9 +5,10 @@ What the metadata does not say is called not stated, so that a reader knows what
 
 from collections.abc import Iterator
 
+from copolicy.dataset.documents import ConversionRecord
 from copolicy.dataset.features import ACTION
 
-from .artefacts import CONVERSION_FILE, RELEASE_FILE, read_json
+from .artefacts import CONVERSION_FILE, newest_release, read_json
 from .facts import DatasetFacts
 from .markdown import listing, share
 
@@ -88,7 +89,7 @@ def _preprocessing(facts: DatasetFacts) -> list[str]:
     ]
     if "hold" in action:
         lines.append(f"The action of a frame is the {action['hold']} of the recorded actions until the next frame")
-    record = read_json(facts.root / CONVERSION_FILE)
+    record = read_json(facts.root / CONVERSION_FILE, ConversionRecord, "the record of a conversion")
     if record is None:
         return [*lines, f"Conversion: not stated (no `{CONVERSION_FILE}`)"]
     lines.append(f"Converted by `{record.get('converter', 'not stated')}` {record.get('version', '')}".rstrip())
@@ -126,7 +127,7 @@ def _distribution(facts: DatasetFacts) -> list[str]:
 
 
 def _maintenance(facts: DatasetFacts) -> list[str]:
-    release = read_json(facts.root / RELEASE_FILE)
+    release = newest_release(facts.root)
     if release is None:
         return ["Not released yet: no version, no change log.", "Contact: not stated in the metadata."]
     lines = [f"Version {release.get('version')} of {release.get('date')}; changes are in `CHANGELOG.md`."]

@@ -1,19 +1,15 @@
 """What a data set says of itself: everything a card may state, read from the folder and from nowhere else."""
 
-import json
+import math
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as parquet
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.features import FEATURES
+from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
 
 
 @dataclass(frozen=True)
@@ -36,21 +32,14 @@ class DatasetFacts:
         Raises:
             FileFormatError: no LeRobot v3 data set, one without the episode columns, or one that contradicts itself.
         """
-        path = root / "meta" / "info.json"
-        if not path.is_file():
-            raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
-        try:
-            info = json.loads(path.read_text(encoding="utf-8"))
-            version, count, frames = info["codebase_version"], info["total_episodes"], info["total_frames"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise FileFormatError(path, "LeRobot's info as JSON", f"{type(error).__name__} {error}") from None
-        if not str(version).startswith("v3"):
-            raise FileFormatError(path, "codebase_version v3.x", str(version))
-        episodes = _read_episodes(root)
-        if len(episodes) != count or sum(episode["length"] for episode in episodes) != frames:
-            found = f"{len(episodes)} episodes with {sum(episode['length'] for episode in episodes)} frames"
-            raise FileFormatError(path, f"{count} episodes with {frames} frames in meta/episodes", found)
-        return cls(root, info, episodes)
+        folder = LeRobotFolder.open(root)
+        folder.require_task(tuple(FEATURES))
+        episodes = tuple(folder.rows())
+        count, frames = folder.info["total_episodes"], folder.info["total_frames"]
+        if len(episodes) != count or sum(folder.lengths) != frames:
+            found = f"{len(episodes)} episodes with {sum(folder.lengths)} frames"
+            raise FileFormatError(root / INFO_FILE, f"{count} episodes with {frames} frames in meta/episodes", found)
+        return cls(root, folder.info, episodes)
 
     def counts(self, column: str) -> dict[str, int]:
         """How many episodes have each value of a column, most frequent first."""
@@ -63,27 +52,12 @@ class DatasetFacts:
 
     @property
     def seconds(self) -> float:
-        """Recorded time in all, s."""
-        return float(sum(episode["duration_s"] for episode in self.episodes))
+        """Recorded time in all, s; an episode that does not say counts with its frames."""
+        fps = self.info["fps"]
+        times = ((episode["duration_s"], episode["length"] / fps) for episode in self.episodes)
+        return sum(stated if math.isfinite(stated) else counted for stated, counted in times)
 
     @property
     def successes(self) -> int:
         """Episodes that reached the goal."""
         return sum(bool(episode["success"]) for episode in self.episodes)
-
-
-def _read_episodes(root: Path) -> tuple[dict[str, Any], ...]:
-    files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
-    if not files:
-        raise FileFormatError(root, "episode metadata under meta/episodes", "no parquet file")
-    rows: list[dict[str, Any]] = []
-    for path in files:
-        try:
-            names = parquet.read_schema(path).names
-            missing = [name for name in EPISODE_COLUMNS if name not in names]
-            if missing:
-                raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
-            rows += parquet.read_table(path, columns=["episode_index", "length", *EPISODE_COLUMNS]).to_pylist()
-        except (pa.ArrowInvalid, OSError) as error:
-            raise FileFormatError(path, "a complete parquet file", str(error).splitlines()[0]) from None
-    return tuple(sorted(rows, key=lambda row: row["episode_index"]))

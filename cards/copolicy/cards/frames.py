@@ -3,21 +3,18 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, map_of, theta_of
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, STATE, map_of, theta_of
+from copolicy.dataset.files import visible_files
 from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.lerobot_folder.tables import feature_values, pa, read_parquet
 from copolicy.dataset.task import MAP_SETS, MapConfig
 
 from .facts import DatasetFacts
-
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as parquet
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
 
 _COLUMNS = ["episode_index", "frame_index", STATE, ENVIRONMENT_STATE, ACTION]
 
@@ -61,16 +58,10 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
             than meta/episodes says.
     """
     expected = iter(facts.episodes)
-    for path in sorted((facts.root / "data").glob("*/*.parquet")):
-        try:
-            table = parquet.read_table(path, columns=_COLUMNS).combine_chunks()
-        except (pa.ArrowInvalid, OSError, KeyError) as error:
-            raise FileFormatError(path, "a complete parquet file", str(error).splitlines()[0]) from None
-        missing = [name for name in _COLUMNS if name not in table.column_names]
-        if missing:
-            raise FileFormatError(path, "the columns of this task", f"none named {', '.join(missing)}")
-        indices = table["episode_index"].to_numpy()
-        columns = {key: _matrix(table, key) for key in (STATE, ENVIRONMENT_STATE, ACTION)}
+    for path in visible_files(facts.root / "data", "*.parquet"):
+        table = read_parquet(path, _COLUMNS)
+        indices = feature_values(table, "episode_index", (1,), path)
+        columns = {key: _matrix(table, key, path) for key in (STATE, ENVIRONMENT_STATE, ACTION)}
         cuts = [0, *(np.flatnonzero(np.diff(indices)) + 1), len(indices)] if len(indices) else []
         for start, end in pairwise(cuts):
             episode = next(expected, None)
@@ -78,18 +69,21 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
             if episode is None or found != (episode["episode_index"], episode["length"]):
                 named = f"episode {episode['episode_index']} with {episode['length']} frames" if episode else "its end"
                 raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
-            config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode["map_set"]))
+            try:
+                config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode["map_set"]))
+            except CopolicyError as error:
+                raise FileFormatError(path, f"a map in episode {found[0]}", str(error)) from None
             yield EpisodeFrames(found[0], columns[STATE][start:end], columns[ACTION][start:end], config)
     left = next(expected, None)
     if left is not None:
         raise FileFormatError(facts.root / "data", f"the frames of episode {left['episode_index']}", "none")
 
 
-def _matrix(table: "pa.Table", key: str) -> np.ndarray:
-    column = table[key]
-    width = column.type.list_size if pa.types.is_fixed_size_list(column.type) else len(column[0])
-    values = column.combine_chunks().flatten() if column.num_chunks != 1 else column.chunk(0).flatten()
-    return values.to_numpy(zero_copy_only=False).astype(float).reshape(-1, width)
+def _matrix(table: "pa.Table", key: str, path: Path) -> np.ndarray:
+    values = feature_values(table, key, FEATURES[key]["shape"], path).astype(float)
+    if not np.isfinite(values).all():
+        raise FileFormatError(path, f"finite {key}", "nan or inf")
+    return values
 
 
 def _obstacle_size(map_set: str) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from copolicy.dataset.exceptions import MissingExtraError
 
-from .artefacts import STATISTICS_FILE, read_json
+from .artefacts import stored_statistics
 from .facts import DatasetFacts
 from .routes import HumanDistance, RouteStatistics, route_statistics
 
@@ -23,7 +23,7 @@ _HEIGHT = 0.38  # of a bar; two of them to a route
 
 def human_figure(facts: DatasetFacts) -> tuple[Figure, str] | None:
     """The picture and its caption; None where the statistics are missing or hold no distance."""
-    stored = read_json(facts.root / STATISTICS_FILE)
+    stored = stored_statistics(facts.root)
     routes = None if stored is None else route_statistics(stored)
     if routes is None or not routes.distances:
         return None

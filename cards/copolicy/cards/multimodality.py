@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from .artefacts import STATISTICS_FILE, estimates, read_json, statistics_doubt
+from .artefacts import STATISTICS_FILE, estimates, statistics_doubt, stored_statistics
 from .facts import DatasetFacts
 from .markdown import number, table
 from .routes import RouteStatistics, route_statistics
@@ -10,7 +10,7 @@ from .routes import RouteStatistics, route_statistics
 
 def multimodality(facts: DatasetFacts) -> str:
     """Every statistic of `copolicy-dataset stats` with its interval and its null; says so where it was not run."""
-    stored = read_json(facts.root / STATISTICS_FILE)
+    stored = stored_statistics(facts.root)
     heading = "## Multimodality"
     if stored is None:
         return f"{heading}\n\nNot computed: `copolicy-dataset stats` was not run on this data set."

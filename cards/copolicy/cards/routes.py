@@ -3,6 +3,7 @@
 Cards and the report show the same numbers; this is where both get them from.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -83,7 +84,7 @@ def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
     distances = [
         _distance(int(name.split("_")[2]), entry)
         for name, entry in family.items()
-        if name.startswith("human_distance_") and "details" in entry
+        if re.fullmatch(r"human_distance_\d+_obstacles", name) and "details" in entry
     ]
     return RouteStatistics(
         entropy,

@@ -11,6 +11,8 @@ from typing import Any
 
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.lerobot_folder.info import INFO_FILE, read_info
+from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.log import read_metadata
 from copolicy.dataset.staging import sync_folder, sync_tree
 
@@ -27,7 +29,7 @@ try:
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-_INFO, _STATS, _TASKS = Path("meta/info.json"), Path("meta/stats.json"), Path("meta/tasks.parquet")
+_INFO, _STATS, _TASKS = INFO_FILE, Path("meta/stats.json"), Path("meta/tasks.parquet")
 
 
 def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, Hold]:
@@ -38,7 +40,7 @@ def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, H
         InvalidValueError: another rate or hold is asked for.
     """
     finish_interrupted(root)
-    info = _info(root)
+    info = read_info(root)
     try:
         stored = int(info["fps"]), info["features"]["action"]["hold"]
     except (KeyError, TypeError, ValueError):
@@ -59,7 +61,7 @@ def stored_video(root: Path, asked: bool, size: tuple[int, int] | None) -> tuple
     Raises:
         InvalidValueError: another size, or a video where the data set has none.
     """
-    feature = _info(root).get("features", {}).get(SCENE)
+    feature = read_info(root).get("features", {}).get(SCENE)
     if feature is None:
         if asked:
             raise InvalidValueError("--video", f"none, as {root} has no video", "one")
@@ -92,6 +94,7 @@ def append_recordings(
         RunError: nothing usable among what is new; nothing was changed.
     """
     finish_interrupted(root)
+    require_loadable(root)
     files, unfinished = find_recordings(folders)
     known = {name for path in numbered_files(root / "meta" / "episodes").values() for name in _uuids(path)}
     new = [path for path in files if _uuid(path) not in known]
@@ -136,7 +139,7 @@ def finish_interrupted(root: Path) -> None:
 
 def _join(whole: Path, added: Path) -> dict[str, Any]:
     """Puts the files of `added` behind those of `whole`, which is not in use yet; returns the new info."""
-    info, new = _info(whole), _info(added)
+    info, new = read_info(whole), read_info(added)
     if info["features"] != new["features"]:
         names = {*info["features"], *new["features"]}
         differ = sorted(name for name in names if info["features"].get(name) != new["features"].get(name))
@@ -208,13 +211,6 @@ def _link(source: str, target: str) -> None:
 
 def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
     return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
-
-
-def _info(root: Path) -> dict[str, Any]:
-    try:
-        return json.loads((root / _INFO).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", str(error)) from None
 
 
 def _uuids(path: Path) -> list[str]:

@@ -1,41 +1,23 @@
 """Looks at a local LeRobot data set before LeRobot does, which takes anything missing for a reason to download."""
 
-import json
 import logging
 from pathlib import Path
 
-import pyarrow.parquet as pq
-
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.lerobot_folder.loading import require_loadable
 
 
 def check_local_dataset(root: Path | str) -> None:
-    """Checks that the files of a LeRobot v3 data set are there and complete.
+    """Checks that the files of a LeRobot v3 data set are there and complete, whatever its task.
 
     Raises:
-        FileFormatError: no such folder, no `meta/info.json` of version 3, a Parquet file that is missing or broken, or
-            another number of rows or episodes than `meta/info.json` says.
+        FileFormatError: no such folder, no `meta/info.json` of version 3, a Parquet file that is missing or broken,
+            another number of rows or episodes than `meta/info.json` says, or an episode whose file is not named.
     """
     root = Path(root)
-    info_path = root / "meta" / "info.json"
     if not root.is_dir():
         raise FileFormatError(root, "the folder of a LeRobot v3 data set", "no such folder")
-    try:
-        info = json.loads(info_path.read_text(encoding="utf-8"))
-        version, frames, episodes = str(info["codebase_version"]), info["total_frames"], info["total_episodes"]
-    except FileNotFoundError:
-        raise FileFormatError(info_path, "a LeRobot v3 data set", "no such file") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise FileFormatError(info_path, "LeRobot's data set information", f"{type(error).__name__} {error}") from None
-    if not version.startswith("v3."):
-        raise FileFormatError(info_path, "LeRobot data set format v3", version)
-    for folder, expected in ((root / "meta" / "episodes", episodes), (root / "data", frames)):
-        found = _rows(folder)
-        if found != expected:
-            raise FileFormatError(folder, f"{expected} rows, as meta/info.json says", f"{found}")
-    tasks = root / "meta" / "tasks.parquet"
-    if not tasks.is_file():
-        raise FileFormatError(tasks, "part of a LeRobot v3 data set", "no such file")
+    require_loadable(root)
 
 
 def training_episodes(episodes: list[int] | None, total: int, discarded: list[bool]) -> list[int] | None:
@@ -65,13 +47,3 @@ def training_episodes(episodes: list[int] | None, total: int, discarded: list[bo
     left_out = sorted(set(asked) - set(kept))
     logging.info("Leaving out %d discarded of %d episodes: %s", len(left_out), len(asked), left_out)
     return kept
-
-
-def _rows(folder: Path) -> int:
-    rows = 0
-    for path in sorted(folder.glob("*/*.parquet")):
-        try:
-            rows += pq.read_metadata(path).num_rows
-        except (OSError, ValueError) as error:  # pyarrow's own errors are ValueErrors
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
-    return rows

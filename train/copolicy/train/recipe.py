@@ -9,10 +9,9 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -101,9 +100,10 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
     facts: dict[str, Any] = {"repo_id": settings.get("repo_id"), "revision": settings.get("revision")}
     chosen = settings.get("episodes")
     root = Path(settings.get("root") or "")
-    info = _json(root / "meta" / "info.json") if settings.get("root") else None
-    if info is None:
+    if not settings.get("root") or not (root / INFO_FILE).is_file():
         return {**facts, "episodes_used": None if chosen is None else len(chosen)}
+    folder = LeRobotFolder.open(root)
+    info = folder.info
     used = range(info["total_episodes"]) if chosen is None else chosen
     release = _json(root / _RELEASE) or {}
     return {
@@ -112,22 +112,17 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
         "episodes_used": len(used),
         "frames": info["total_frames"],
         "fps": info["fps"],
-        **{column: counts for column in _COUNTED if (counts := _counts(root, column, set(used)))},
+        **{column: counts for column in _COUNTED if (counts := _counts(folder, column, set(used)))},
         **{key: release[key] for key in ("version", "content_hash") if key in release},
     }
 
 
-def _counts(root: Path, column: str, used: Collection[int]) -> dict[str, int]:
+def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[str, int]:
     """How many of the used episodes have each value of an episode column."""
-    counts: Counter[str] = Counter()
-    for path in sorted((root / "meta" / "episodes").glob("*/*.parquet")):
-        try:
-            if column not in pq.read_schema(path).names:
-                continue
-            table = pq.read_table(path, columns=["episode_index", column]).to_pylist()
-        except (pa.ArrowInvalid, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
-        counts.update(str(row[column]) for row in table if row["episode_index"] in used)
+    if column not in folder.episodes.column_names:
+        return {}
+    values = folder.episodes.column(column).to_pylist()
+    counts = Counter(str(value) for episode, value in enumerate(values) if episode in used)
     return dict(counts.most_common())
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError
 
-from ..artefacts import CHECK_FILE, STATISTICS_FILE, KeptFindings, kept_findings, read_json
+from ..artefacts import CHECK_FILE, KeptFindings, kept_findings, stored_statistics
 
 REPORT_NAME = "report.html"
 
@@ -43,7 +43,7 @@ def _report(arguments: argparse.Namespace) -> dict:
     findings = kept_findings(arguments.root, arguments.findings)
     if findings is None and arguments.findings is not None:
         raise FileFormatError(arguments.findings, "a file with the output of `copolicy-dataset check --json`", "none")
-    statistics = read_json(arguments.root / STATISTICS_FILE)
+    statistics = stored_statistics(arguments.root)
     payload = build_payload(facts, arguments.title or arguments.root.resolve().name, findings, statistics)
     text = render_page(payload)
     write_whole(path, text)

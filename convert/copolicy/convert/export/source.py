@@ -1,7 +1,5 @@
 """The episodes of a LeRobot v3 data set of this task, one after the other, for the exporters."""
 
-import json
-import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,21 +10,16 @@ import numpy as np
 
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
+from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
+from copolicy.dataset.files import visible_files
+from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
+from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
 from copolicy.dataset.task import RECORD_HZ, Physics
 
 from ..dynamics import integrate
 from ..upstream_episode import states_7
-
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
-
-# A merge with a set that lacks a column leaves nulls, which none of the formats can hold.
-_UNKNOWN: dict[str, Any] = {"str": "", "int": -1, "float": math.nan, "bool": False}
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,20 +97,16 @@ class ExportSource:
             FileFormatError: no LeRobot v3 data set of this task.
             RunError: no episode is left.
         """
-        path = root / "meta" / "info.json"
-        if not path.is_file():
-            raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
-        try:
-            info = json.loads(path.read_text(encoding="utf-8"))
-            version, fps, features = str(info["codebase_version"]), int(info["fps"]), info["features"]
-            hold = str(features[ACTION].get("hold", "unknown"))
-            splits = {name: _range(text) for name, text in (info.get("splits") or {}).items()}
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise FileFormatError(path, "LeRobot's info as JSON", f"{type(error).__name__} {error}") from None
-        if not version.startswith("v3"):
-            raise FileFormatError(path, "codebase_version v3.x", version)
+        folder = LeRobotFolder.open(root)
+        folder.require_task(tuple(FEATURES))
+        info = folder.info
+        fps, hold = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))
+        if fps != int(fps):
+            raise FileFormatError(root / INFO_FILE, f"a rate that divides {RECORD_HZ}", str(fps))
+        fps = int(fps)
+        splits = {name: _range(text, root) for name, text in (info.get("splits") or {}).items()}
         stride(fps)
-        rows = _episode_rows(root)
+        rows = folder.rows()
         kept = tuple(row for row in rows if keep_discarded or not row["discarded"])
         if not kept:
             raise RunError(f"{root}: expected an episode to export, found {len(rows)}, all discarded")
@@ -150,7 +139,7 @@ class ExportSource:
         """
         wanted = {row["episode_index"]: row for row in self.rows}
         expected = iter(sorted(self._lengths))
-        for path in sorted((self.root / "data").glob("*/*.parquet")):
+        for path in visible_files(self.root / "data", "*.parquet"):
             columns = _frames(path)
             numbers = columns["episode_index"]
             starts = np.flatnonzero(np.diff(numbers, prepend=-1))
@@ -168,8 +157,10 @@ class ExportSource:
             raise FileFormatError(self.root / "data", f"the frames of episode {due}", "none")
 
 
-def _range(text: str) -> range:
-    first, last = str(text).split(":")
+def _range(text: str, root: Path) -> range:
+    first, colon, last = text.partition(":")
+    if not (colon and first.isdecimal() and last.isdecimal()):
+        raise FileFormatError(root / INFO_FILE, "splits as FIRST:END", repr(text))
     return range(int(first), int(last))
 
 
@@ -180,40 +171,12 @@ def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: 
     )
 
 
-def _episode_rows(root: Path) -> list[dict[str, Any]]:
-    names = ("episode_index", "length", *EPISODE_COLUMNS)
-    rows: list[dict[str, Any]] = []
-    for path in sorted((root / "meta" / "episodes").glob("*/*.parquet")):
-        rows += _read(path, names).to_pylist()
-    if not rows:
-        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
-    for row in rows:
-        row |= {name: _UNKNOWN[kind] for name, kind in EPISODE_COLUMNS.items() if row[name] is None}
-    return sorted(rows, key=lambda row: row["episode_index"])
-
-
 def _frames(path: Path) -> dict[str, np.ndarray]:
     names = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION, "next.reward")
-    table = _read(path, (*names, "episode_index"))
-    columns = {"episode_index": table["episode_index"].to_numpy()}
+    table = read_parquet(path, (*names, "episode_index"))
+    columns = {"episode_index": feature_values(table, "episode_index", (1,), path)}
     for name in names:
-        (width,) = FEATURES[name]["shape"]
-        column = table[name].combine_chunks()
-        flat = column if width == 1 and pa.types.is_primitive(column.type) else column.flatten()
-        values = flat.to_numpy(zero_copy_only=False)
-        if len(values) != width * len(table) or not np.isfinite(values).all():
-            raise FileFormatError(path, f"{name} of {width} finite numbers a frame", "others")
-        columns[name] = values.reshape(-1, width) if width > 1 else values
+        columns[name] = feature_values(table, name, FEATURES[name]["shape"], path)
+        if not np.isfinite(columns[name]).all():
+            raise FileFormatError(path, f"finite numbers of {name}", "nan or inf")
     return columns
-
-
-def _read(path: Path, names: tuple[str, ...]) -> "pa.Table":
-    try:
-        # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
-        with pq.ParquetFile(path) as file:
-            missing = [name for name in names if name not in file.schema_arrow.names]
-            if missing:
-                raise FileFormatError(path, "the columns of copolicy", f"none named {', '.join(missing)}")
-            return file.read(columns=list(names))
-    except (pa.ArrowException, OSError) as error:
-        raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None

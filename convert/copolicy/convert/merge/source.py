@@ -1,6 +1,5 @@
 """One of the data sets that are merged, and whether it fits to the others."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,9 @@ from typing import Any
 
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.json_file import read_json
+from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.versions.content import Content, read_content
 from copolicy.dataset.versions.manifest import data_set_files
 
@@ -49,6 +51,7 @@ class MergeSource:
         Raises:
             FileFormatError: no data set of this project, or one that contradicts itself.
         """
+        require_loadable(root)
         content = read_content(root)
         tables = [read_table(path) for path in numbered_files(root / "meta" / "episodes").values()]
         try:
@@ -59,11 +62,8 @@ class MergeSource:
         if missing:
             raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
         path = root / RECORD_FILE
-        try:
-            record = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-        except ValueError as error:
-            raise FileFormatError(path, "JSON", str(error)) from None
-        return cls(root, json.loads((root / _INFO).read_text(encoding="utf-8")), episodes, content, record)
+        record = read_json(path, dict, "the record of a conversion") if path.is_file() else {}
+        return cls(root, read_info(root), episodes, content, record)
 
     def left_behind(self) -> list[str]:
         """Files that are about this data set alone and are not carried over: its statistics, releases, card, ..."""

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..exceptions import FileFormatError
 from . import (
     balance,
@@ -14,6 +16,7 @@ from . import (
     duplicates,
     inputs,
     leakage,
+    loading,
     maps,
     motion,
     schema,
@@ -27,6 +30,7 @@ from .rule import Rule
 RULES: tuple[Rule, ...] = (
     *schema.RULES,
     *check_sums.RULES,
+    *loading.RULES,
     *timing.RULES,
     *drift.RULES,
     *inputs.RULES,
@@ -125,7 +129,13 @@ def check_table(table: EpisodeTable, rules: Sequence[Rule] = RULES) -> CheckResu
             not_applied[rule.name] = reason
             continue
         applied.append(rule.name)
-        findings += rule.find(table)
+        with np.errstate(all="ignore"):  # a number that is none is a finding of `finite`
+            findings += rule.find(table)
+    lacking = [name for name, reason in not_applied.items() if reason.startswith("needs")]
+    if lacking and not any(finding.severity == "error" for finding in findings):
+        # Whatever these rules were to find may be there.
+        message = f"rules that could not be applied: {', '.join(f'{name} {not_applied[name]}' for name in lacking)}"
+        findings.append(Finding("", "applied", len(lacking), 0, "error", message))
     return CheckResult(table, _worst_first(findings), tuple(applied), not_applied)
 
 
@@ -142,6 +152,4 @@ def _why_not(rule: Rule, table: EpisodeTable) -> str:
         return f"needs {', '.join(missing)}"
     if rule.frames and not len(table.starts):
         return "needs the frames of at least one episode"
-    if table.fps <= 0 and rule.name not in ("format", "features", "columns", "reading"):
-        return "needs a rate"
     return ""

@@ -29,6 +29,8 @@ class EpisodeTable:
         files: how the data files describe the columns of the frames: name to (type, width).
         damage: what kept a part of the data from being read, or contradicts the rest of it.
         obstacle_sizes: `(F,)` side of the obstacles, px, where it was stored.
+        episodes: the rows of meta/episodes in the order of `labels`, as they are stored.
+        data_files: the episodes that each data file has rows of, by its path below the folder.
     """
 
     root: Path
@@ -44,6 +46,8 @@ class EpisodeTable:
     info: dict[str, Any] = field(default_factory=dict)
     files: dict[str, tuple[str, int]] = field(default_factory=dict)
     damage: tuple[Finding, ...] = ()
+    episodes: Any = None  # a pyarrow.Table, where it was read from one
+    data_files: dict[str, frozenset[int]] = field(default_factory=dict)
 
     @property
     def frame_count(self) -> int:

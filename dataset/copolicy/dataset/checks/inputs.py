@@ -13,8 +13,11 @@ from .rule import Rule, each
 
 
 def _finite(table: EpisodeTable) -> Iterator[Finding]:
-    for name in (STATE, ACTION):
-        wrong = np.add.reduceat((~np.isfinite(table.frames[name]).all(axis=1)).astype(int), table.starts)
+    for name, values in table.frames.items():
+        if values.dtype.kind != "f":
+            continue
+        rows = values.reshape(table.frame_count, -1)
+        wrong = np.add.reduceat((~np.isfinite(rows).all(axis=1)).astype(int), table.starts)
         message = f"frames whose {name} is not finite"
         yield from each(table, wrong > 0, "finite", wrong, 0, "error", message, table.framed)
 
@@ -73,7 +76,7 @@ def _action(table: EpisodeTable, player: int) -> np.ndarray:
 
 
 RULES = (
-    Rule("finite", "states and actions are finite", _finite, (STATE, ACTION)),
+    Rule("finite", "all numbers of the frames are finite", _finite, (STATE, ACTION)),
     Rule("action_range", "actions within a player's full force", _action_range, (ACTION,)),
     Rule("state_range", "the table in the window, its angle an angle", _state_range, (STATE,)),
     Rule("idle", "both players take part", _idle, (ACTION,), ("source",)),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-RULES_VERSION = "1.0.0"
+RULES_VERSION = "1.1.0"
 """Of the rules and their limits: major where a finding means something else, minor where a rule is added or goes,
 patch where a limit moves. Kept findings name it."""
 
@@ -18,6 +18,7 @@ class Limit:
 
 LIMITS: dict[str, Limit] = {
     "timestamp": Limit(1e-4, "s", "LeRobot's own tolerance between a timestamp and its frame"),
+    "frame_statistics": Limit(1e-3, "1", "sums over millions of frames in single precision; LeRobot joins parts"),
     "duration": Limit(1.0, "frames", "the last frame may hold fewer steps than the others"),
     "jump": Limit(
         52.0, "px/s", "terminal speed of an axis under two full forces is 50 px/s; 4 % for other integrators"

@@ -1,117 +1,182 @@
 """A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow so that a broken file is a finding, not an end."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..episode import EPISODE_COLUMNS
-from ..exceptions import FileFormatError, MissingExtraError
-from .episode_table import COLUMN_TYPES, EpisodeTable
+from ..episode import EPISODE_COLUMNS, LATER_COLUMNS
+from ..exceptions import FileFormatError
+from ..features import ACTION, FEATURES, STATE
+from ..files import visible_files
+from ..lerobot_folder.folder import other_task
+from ..lerobot_folder.info import INFO_FILE, read_info, require_episodes
+from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
+from .episode_table import EpisodeTable
 from .finding import Finding
 
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
-
-CLOCK = ("timestamp", "frame_index", "episode_index", "index")
+CLOCK = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 """The columns of the frames that LeRobot itself adds."""
 
-_EMPTY: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
-_META = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
+_UNKNOWN: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
+_POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 
 
 def read_lerobot(root: Path) -> EpisodeTable:
     """Everything about a data set that the rules look at: numbers and flags, no pictures.
 
     Raises:
-        FileFormatError: `meta/info.json` is no JSON object, or no table of episodes can be read at all.
+        FileFormatError: no LeRobot v3 data set of this task, or no table of episodes can be read at all.
     """
-    info = _info(root)
+    info = read_info(root)
+    require_episodes(root, info)
     damage: list[Finding] = []
-    meta = _concatenated(root, "meta/episodes", damage)
-    if meta is None or any(name not in meta.column_names for name in ("episode_index", "length")):
+    meta = _concatenated(root, "meta/episodes", damage)[0]
+    if meta is None:
         raise FileFormatError(
             root / "meta" / "episodes", "a table with episode_index and length", "none that can be read"
         )
-    columns = {name: _column(meta, name) for name in (*_META, *EPISODE_COLUMNS) if name in meta.column_names}
-    for name in columns:
-        nulls = meta.column(name).null_count
-        # LeRobot's merge writes NaN, "not measured", as null.
-        if nulls and EPISODE_COLUMNS.get(name) != "float":
-            message = f"episodes with nothing in column {name}, as after a merge with a set that lacks it"
-            damage.append(Finding("", "schema", nulls, 0, "error", message))
+    columns = _episode_columns(root, meta, damage)
     order = np.argsort(columns["episode_index"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
     labels = tuple(str(index) for index in columns["episode_index"])
-    data = _concatenated(root, "data", damage)
+    data, episodes_of_files = _concatenated(root, "data", damage)
     frames: dict[str, np.ndarray] = {}
     files: dict[str, tuple[str, int]] = {}
     if data is not None:
         files = {column.name: _type(column.type) for column in data.schema}
-        frames = {name: values for name in data.column_names if (values := _numbers(data, name)) is not None}
+        _require_task(root, info, files)
+        frames = _frame_columns(data, damage)
     frames, framed, starts = _whole_episodes(frames, columns, labels, damage)
-    found = (len(labels), data.num_rows if data is not None else 0)
-    for name, number in zip(("total_episodes", "total_frames"), found, strict=True):
-        if info.get(name) != number:
+    counted = (len(labels), data.num_rows if data is not None else 0)
+    for name, number in zip(("total_episodes", "total_frames"), counted, strict=True):
+        if info[name] != number:
             message = f"meta/info.json has another {name} than the files"
-            damage.append(Finding("", "rows", number, _figure(info.get(name)), "error", message))
+            damage.append(Finding("", "rows", number, info[name], "error", message))
     return EpisodeTable(
-        root, "lerobot", _rate(info), labels, columns, frames, framed, starts, None, None, info, files, tuple(damage)
-    )
+        root, "lerobot", float(info["fps"]), labels, columns, frames, framed, starts, None, None, info, files,
+        tuple(damage), meta.take(pa.array(order)), episodes_of_files,
+    )  # fmt: skip
 
 
-def _info(root: Path) -> dict[str, Any]:
-    path = root / "meta" / "info.json"
-    try:
-        info = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", "neither") from None
-    except ValueError as error:
-        raise FileFormatError(path, "LeRobot's data set information", str(error)) from None
-    if not isinstance(info, dict):
-        raise FileFormatError(path, "LeRobot's data set information", type(info).__name__)
-    return info
+def _require_task(root: Path, info: dict[str, Any], files: dict[str, tuple[str, int]]) -> None:
+    """A sound data set of another task is none to hold against the rules of this one."""
+    widths = {name: files[name][1] if name in files else None for name in (STATE, ACTION)}
+    ours = {name: FEATURES[name]["shape"][0] for name in (STATE, ACTION)}
+    difference = other_task(info)
+    if difference and widths != ours:
+        raise FileFormatError(root / INFO_FILE, "a data set of carrying a table (copolicy-convert)", difference)
 
 
-def _rate(info: dict[str, Any]) -> float:
-    fps = info.get("fps")
-    return float(fps) if isinstance(fps, int | float) and fps > 0 else 0.0
+def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dict[str, np.ndarray]:
+    """The columns of meta/episodes that hold what they should; what is wrong with the others is a finding.
 
-
-def _figure(value: object) -> float | int | str | None:
-    return value if isinstance(value, int | float | str) or value is None else str(value)
-
-
-def _concatenated(root: Path, folder: str, damage: list[Finding]) -> "pa.Table | None":
-    """All Parquet files of a folder, without statistics of episodes and without nested columns such as pictures."""
-    tables = []
-    for path in sorted((root / folder).glob("*/*.parquet")):
+    Raises:
+        FileFormatError: `episode_index` or `length` is missing, or is none in some row.
+    """
+    path = root / "meta" / "episodes"
+    columns: dict[str, np.ndarray] = {}
+    for name in (*_POSITIONS, *EPISODE_COLUMNS):
+        if name not in meta.column_names:
+            if name in _POSITIONS[:2]:
+                raise FileFormatError(path, "a table with episode_index and length", f"none named {name}")
+            if name in _POSITIONS:
+                message = f"meta/episodes has no column {name}, without which LeRobot loads no episode"
+                damage.append(Finding("", "schema", None, None, "error", message))
+            elif name in LATER_COLUMNS:
+                columns[name] = np.full(meta.num_rows, _UNKNOWN[EPISODE_COLUMNS[name]])
+            continue
+        kind = EPISODE_COLUMNS.get(name, "int")
+        unknown = None if name in _POSITIONS else _UNKNOWN[kind]
         try:
-            with pq.ParquetFile(path) as file:
-                names = [field.name for field in file.schema_arrow if _wanted(field)]
-                tables.append(file.read(columns=names))
-        except (pa.ArrowException, OSError) as error:
-            message = f"{path.relative_to(root).as_posix()} cannot be read: {str(error).splitlines()[0]}"
+            columns[name] = scalars(meta.column(name), kind, unknown)
+        except ColumnError as error:
+            if name in _POSITIONS[:2]:
+                raise FileFormatError(path, f"{error.expected} of {name}", error.found) from None
+            message = f"episode column {name}: expected {error.expected}, found {error.found}"
+            damage.append(Finding("", "schema", len(error.rows) or None, 0 if error.rows else None, "error", message))
+            continue
+        nulls = meta.column(name).null_count
+        # LeRobot's merge writes NaN, "not measured", as null.
+        if nulls and kind != "float" and name not in LATER_COLUMNS:
+            message = f"episodes with nothing in column {name}, as after a merge with a set that lacks it"
+            damage.append(Finding("", "schema", nulls, 0, "error", message))
+    for name in ("episode_index", "length"):
+        wrong = np.flatnonzero((columns[name] < (name == "length")) | (columns[name] > 2**40))
+        if len(wrong):
+            raise FileFormatError(path, f"a usable {name} in every row", str(columns[name][wrong[0]]))
+    return columns
+
+
+def _frame_columns(data: "pa.Table", damage: list[Finding]) -> dict[str, np.ndarray]:
+    """The columns of the frames that are numbers in every row; what is wrong with the others is a finding."""
+    frames: dict[str, np.ndarray] = {}
+    needed = (*FEATURES, *CLOCK)
+    for name in data.column_names:
+        try:
+            values = vectors(data.column(name))
+            width = FEATURES[name]["shape"][0] if name in FEATURES else 1 if name in CLOCK else None
+            if width is None or values.size == width * len(values):
+                frames[name] = values if width is None or width > 1 else values.reshape(-1)
+            # Another width is said by the rule on features.
+        except ColumnError as error:
+            if name in needed:
+                message = f"column {name} of the frames: expected {error.expected}, found {error.found}"
+                message += _of_episodes(data, error)
+                figure = len(error.rows) or None
+                damage.append(Finding("", "schema", figure, 0 if figure else None, "error", message))
+    for name in CLOCK:
+        if name not in data.column_names:
+            message = f"no column {name} in the data files, without which LeRobot loads no episode"
+            damage.append(Finding("", "schema", None, None, "error", message))
+    return frames
+
+
+def _of_episodes(data: "pa.Table", error: ColumnError) -> str:
+    """Names the episodes of the rows that are wrong, where the rows tell."""
+    if not error.rows or "episode_index" not in data.column_names:
+        return ""
+    try:
+        numbers = scalars(data.column("episode_index"), "int")
+    except ColumnError:
+        return ""
+    episodes = sorted(set(numbers[list(error.rows)].tolist()))
+    named = ", ".join(map(str, episodes[:5])) + (", ..." if len(episodes) > 5 else "")
+    return f", in episode {named}" if len(episodes) == 1 else f", in episodes {named}"
+
+
+def _concatenated(
+    root: Path, folder: str, damage: list[Finding]
+) -> "tuple[pa.Table | None, dict[str, frozenset[int]]]":
+    """All Parquet files of a folder, without statistics of episodes and without nested columns such as pictures; and
+    the episodes that each file has rows of."""
+    tables, episodes = [], {}
+    for path in visible_files(root / folder, "*.parquet"):
+        name = path.relative_to(root).as_posix()
+        try:
+            table = read_parquet(path, [column for column, kind in column_types(path).items() if _wanted(column, kind)])
+        except FileFormatError as error:
+            message = f"{name} cannot be read: {str(error).removeprefix(f'{path}: ')}"
             damage.append(Finding("", "check_sum", None, None, "error", message))
+            continue
+        tables.append(table)
+        try:
+            numbers = scalars(table.column("episode_index"), "int", -1) if "episode_index" in table.column_names else ()
+        except ColumnError:
+            numbers = ()
+        episodes[name] = frozenset(np.unique(numbers).tolist())
     if not tables:
         damage.append(Finding("", "check_sum", 0, 1, "error", f"no Parquet file in {folder} can be read"))
-        return None
+        return None, episodes
     try:
-        return pa.concat_tables(tables, promote_options="permissive").combine_chunks()
+        return pa.concat_tables(tables, promote_options="permissive").combine_chunks(), episodes
     except pa.ArrowException as error:
         damage.append(Finding("", "schema", None, None, "error", f"files of {folder} disagree: {error}"))
-        return tables[0]
+        return tables[0], episodes
 
 
-def _wanted(field: "pa.Field") -> bool:
-    kind = field.type
-    if field.name.startswith("stats/") or pa.types.is_struct(kind):
-        return False
-    return not pa.types.is_nested(kind) or pa.types.is_primitive(kind.value_type)
+def _wanted(name: str, kind: "pa.DataType") -> bool:
+    return not name.startswith("stats/") and not pa.types.is_struct(kind)
 
 
 def _type(kind: "pa.DataType") -> tuple[str, int]:
@@ -120,44 +185,13 @@ def _type(kind: "pa.DataType") -> tuple[str, int]:
     return str(kind), 1
 
 
-def _numbers(data: "pa.Table", name: str) -> np.ndarray | None:
-    """`(N,)` or `(N, n)` numbers of a column; None where it holds something else or has rows of several lengths."""
-    column = data.column(name)
-    if column.num_chunks == 0 or column.null_count:
-        return None
-    kind = column.type
-    flat = column.combine_chunks()
-    if pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
-        if not pa.types.is_primitive(kind.value_type):
-            return None
-        values = flat.flatten()
-        if values.null_count or not data.num_rows or len(values) % data.num_rows:
-            return None
-        if not pa.types.is_fixed_size_list(kind) and len(set(flat.value_lengths().to_pylist())) > 1:
-            return None
-        return values.to_numpy(zero_copy_only=False).reshape(data.num_rows, -1)
-    if pa.types.is_primitive(kind):
-        return flat.to_numpy(zero_copy_only=False)
-    return None
-
-
-def _column(meta: "pa.Table", name: str) -> np.ndarray:
-    """`(E,)` an episode column; a missing entry is an empty text, NaN, -1 or False, and `schema` reports it."""
-    column = meta.column(name)
-    kind = EPISODE_COLUMNS.get(name, "int")
-    values = [_EMPTY[kind] if value is None else value for value in column.to_pylist()]
-    try:
-        return np.array(values, COLUMN_TYPES[kind])
-    except (TypeError, ValueError):
-        return np.array([str(value) for value in values])
-
-
 def _whole_episodes(
     frames: dict[str, np.ndarray], columns: dict[str, np.ndarray], labels: tuple[str, ...], damage: list[Finding]
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """The frames of the episodes that have as many rows as they should, in the order of the episodes."""
     nothing = np.array([], np.int64)
-    if "episode_index" not in frames:
+    numbers = frames.get("episode_index")
+    if numbers is None or numbers.ndim != 1 or numbers.dtype.kind != "i":
         return {}, nothing, nothing
     order = np.arange(len(frames["episode_index"]))
     if np.any(np.diff(frames["episode_index"]) < 0):

@@ -13,6 +13,15 @@ from .finding import Finding
 from .limits import limit
 from .rule import Rule, each
 
+CLOCK_FEATURES: dict[str, dict] = {
+    "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
+    **{
+        name: {"dtype": "int64", "shape": (1,), "names": None}
+        for name in ("frame_index", "episode_index", "index", "task_index")
+    },
+}
+"""The features that LeRobot adds to every data set."""
+
 _CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
 
 
@@ -26,23 +35,23 @@ def _format(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _features(table: EpisodeTable) -> Iterator[Finding]:
-    features = table.info.get("features")
-    features = features if isinstance(features, dict) else {}
-    for name, expected in FEATURES.items():
+    features = table.info["features"]
+    for name, expected in {**FEATURES, **CLOCK_FEATURES}.items():
         entry = features.get(name)
-        if not isinstance(entry, dict):
+        if entry is None:
             yield Finding("", "schema", None, None, "error", f"no feature {name} in meta/info.json")
             continue
         for part in ("dtype", "shape", "names"):
             found, wanted = entry.get(part), expected[part]
             if part == "shape":
-                found, wanted = tuple(found or ()), tuple(wanted)
+                found, wanted = tuple(entry["shape"]), tuple(wanted)
             if found != wanted and not (part == "names" and wanted is None):
                 yield Finding("", "schema", str(found), str(wanted), "error", f"feature {name} with another {part}")
         if not table.files:
             continue  # that no file can be read is said elsewhere, once
         if name not in table.files:
-            yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
+            if name in FEATURES:
+                yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
             continue
         kind, width = {"float32": "float"}.get(expected["dtype"], expected["dtype"]), expected["shape"][0]
         # A list without a fixed size, as some tools write it, is judged by its rows.
@@ -57,12 +66,8 @@ def _features(table: EpisodeTable) -> Iterator[Finding]:
 def _columns(table: EpisodeTable) -> Iterator[Finding]:
     missing = [name for name in EPISODE_COLUMNS if name not in table.columns]
     if missing:
-        message = f"meta/episodes has no columns {', '.join(missing)}"
+        message = f"meta/episodes has no usable columns {', '.join(missing)}"
         yield Finding("", "schema", len(missing), 0, "error", message)
-    kinds = {"str": "U", "int": "i", "float": "f", "bool": "b"}
-    for name, kind in EPISODE_COLUMNS.items():
-        if name in table.columns and len(table.labels) and table.columns[name].dtype.kind != kinds[kind]:
-            yield Finding("", "schema", str(table.columns[name].dtype), kind, "error", f"episode column {name}")
     for name, choices in _CHOICES.items():
         if name in table.columns:
             values = table.columns[name]

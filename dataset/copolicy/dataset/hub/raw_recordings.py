@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
-from ..versions import parquet
+from ..lerobot_folder.folder import LeRobotFolder
 from ..versions.manifest import FileEntry, Manifest, file_entry
 
 RAW_FOLDER = "raw"
@@ -67,8 +67,5 @@ def still_wanted(root: Path, published: Manifest) -> Manifest:
 
 def _sources(root: Path) -> dict[str, str]:
     """`episode_uuid` by the sha256 of the recording that the episode was made from."""
-    return {
-        row["source_sha256"]: row["episode_uuid"]
-        for path in parquet.files_under(root, "meta/episodes")
-        for row in parquet.read_rows(path, ["episode_uuid", "source_sha256"])
-    }
+    rows = LeRobotFolder.open(root).rows(("episode_uuid", "source_sha256"))
+    return {row["source_sha256"]: row["episode_uuid"] for row in rows}

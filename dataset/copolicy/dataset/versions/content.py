@@ -12,13 +12,14 @@ numbers of frames and episodes), what is computed from the frames (statistics), 
 figures, `meta/copolicy.json`). A manifest covers those.
 """
 
-import json
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from ..exceptions import FileFormatError
-from . import parquet
+from ..lerobot_folder.folder import LeRobotFolder
+from ..lerobot_folder.references import read_tasks, video_span
 from .canonical import digest
 from .frames import frame_digests
 from .videos import video_digest
@@ -49,6 +50,26 @@ class EpisodeContent:
     columns: dict[str, str]
 
 
+class EpisodeFields(TypedDict):
+    """An `EpisodeContent` in JSON."""
+
+    episode_uuid: str
+    digest: str
+    frames: int
+    features: dict[str, str]
+    columns: dict[str, str]
+
+
+class ContentFields(TypedDict):
+    """A `Content` in JSON."""
+
+    fps: float | int
+    robot_type: str | None
+    features: dict[str, Any]
+    tasks: list[str]
+    episodes: list[EpisodeFields]
+
+
 @dataclass(frozen=True)
 class Content:
     """Everything that two data sets are compared by."""
@@ -77,14 +98,15 @@ class Content:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, fields: dict[str, Any]) -> "Content":
-        """The inverse of `to_json`.
-
-        Raises:
-            TypeError, KeyError: other fields.
-        """
-        episodes = tuple(EpisodeContent(**episode) for episode in fields["episodes"])
-        return cls(**{**fields, "episodes": episodes})
+    def from_json(cls, fields: ContentFields) -> "Content":
+        """The inverse of `to_json`."""
+        episodes = tuple(
+            EpisodeContent(
+                episode["episode_uuid"], episode["digest"], episode["frames"], episode["features"], episode["columns"]
+            )
+            for episode in fields["episodes"]
+        )
+        return cls(fields["fps"], fields["robot_type"], fields["features"], fields["tasks"], episodes)
 
 
 def read_content(root: Path) -> Content:
@@ -94,9 +116,9 @@ def read_content(root: Path) -> Content:
         FileFormatError: no such data set, one without `episode_uuid`, or one that contradicts itself.
         MissingExtraError: pyarrow is not installed.
     """
-    info = _read_info(root)
-    rows = _read_episodes(root)
-    tasks = _read_tasks(root)
+    folder = LeRobotFolder.open(root)
+    info, rows = folder.info, _read_episodes(folder)
+    tasks = read_tasks(root)
     frames = frame_digests(root, info, [row["length"] for row in rows], tasks)
     episodes = tuple(_episode(root, info, row, features) for row, features in zip(rows, frames, strict=True))
     return Content(
@@ -111,9 +133,7 @@ def read_content(root: Path) -> Content:
 def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, str]) -> EpisodeContent:
     for name, feature in info["features"].items():
         if feature["dtype"] == "video":
-            place = {part: row[f"videos/{name}/{part}"] for part in ("chunk_index", "file_index")}
-            path = root / info["video_path"].format(video_key=name, **place)
-            start, end = (row[f"videos/{name}/{part}_timestamp"] for part in ("from", "to"))
+            path, start, end = video_span(root, info, row, name)
             features[name] = video_digest(path, start, end, info["fps"])
     columns = {
         name: digest(value) for name, value in row.items() if name not in _POSITION and not name.startswith(_LAYOUT)
@@ -127,51 +147,12 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
     )
 
 
-def _read_info(root: Path) -> dict[str, Any]:
-    path = root / "meta" / "info.json"
-    if not path.is_file():
-        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", "none")
-    info = _read_json(path)
-    missing = [name for name in ("codebase_version", "fps", "features") if name not in info]
-    if missing:
-        raise FileFormatError(path, "LeRobot's info", f"none of {', '.join(missing)}")
-    if not str(info["codebase_version"]).startswith("v3"):
-        raise FileFormatError(path, "codebase_version v3.x", str(info["codebase_version"]))
-    return info
-
-
-def _read_episodes(root: Path) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
-    for path in parquet.files_under(root, "meta/episodes"):
-        names = [name for name in parquet.column_names(path) if not name.startswith("stats/")]
-        missing = [name for name in ("episode_index", "length", "episode_uuid") if name not in names]
-        if missing:
-            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
-        rows += parquet.read_rows(path, names)
-    rows.sort(key=lambda row: row["episode_index"])
-    if [row["episode_index"] for row in rows] != list(range(len(rows))):
-        raise FileFormatError(root / "meta" / "episodes", f"episodes 0 to {len(rows) - 1}, each once", "others")
-    uuids = [row["episode_uuid"] for row in rows]
-    if len(set(uuids)) != len(uuids) or not all(uuids):
-        raise FileFormatError(root / "meta" / "episodes", "an episode_uuid of its own for each episode", "others")
+def _read_episodes(folder: LeRobotFolder) -> list[dict[str, Any]]:
+    root = folder.root
+    uuids = Counter(row["episode_uuid"] for row in folder.rows(("episode_uuid",)))
+    uuid, episodes = uuids.most_common(1)[0]
+    if episodes > 1 or "" in uuids:
+        found = f"{episodes} with {uuid!r}" if episodes > 1 else "one with none"
+        raise FileFormatError(root / "meta" / "episodes", "an episode_uuid of its own for each episode", found)
     # A file of a merge may lack a column that another has; LeRobot reads it as null.
-    names = {name: None for row in rows for name in row}
-    return [{name: row.get(name) for name in names} for row in rows]
-
-
-def _read_tasks(root: Path) -> dict[int, str]:
-    path = root / "meta" / "tasks.parquet"
-    if not path.is_file():
-        raise FileFormatError(root, "a LeRobot v3 data set with meta/tasks.parquet", "none")
-    # pandas calls an index without a name so, and LeRobot before 0.4 left it without one.
-    names = [name for name in parquet.column_names(path) if name in ("task", "__index_level_0__")]
-    if "task_index" not in parquet.column_names(path) or not names:
-        raise FileFormatError(path, "columns task_index and task", "others")
-    return {row["task_index"]: row[names[0]] for row in parquet.read_rows(path, ["task_index", names[0]])}
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise FileFormatError(path, "JSON", str(error)) from None
+    return folder.episodes.to_pylist()

@@ -1,7 +1,6 @@
 """Digests of the frames of a data set: one for every episode and feature, blind to how files are cut."""
 
 import hashlib
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import FileFormatError
-from . import parquet
+from ..files import visible_files
+from ..lerobot_folder.tables import column_types, feature_values, read_parquet
 from .canonical import encode
 
 POSITION_COLUMNS = ("index", "episode_index")
@@ -31,10 +31,12 @@ def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[in
     Raises:
         FileFormatError: files that contradict the features, the lengths, or the order of the frames.
     """
-    files = parquet.files_under(root, "data")
+    files = visible_files(root / "data", "*.parquet")
+    if not files:
+        raise FileFormatError(root, "at least one Parquet file under data", "none")
     features = {name: feature for name, feature in info["features"].items() if feature["dtype"] != "video"}
     for path in files:
-        names = parquet.column_names(path)
+        names = column_types(path)
         if set(names) != set(features):
             found = ", ".join(sorted(set(names) ^ set(features)))
             raise FileFormatError(path, "the columns that meta/info.json names as features", f"a difference in {found}")
@@ -58,11 +60,11 @@ def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[in
 
 def _order(root: Path, files: list[Path], lengths: Sequence[int]) -> np.ndarray:
     """Where the frames of `index` 0, 1, 2, ... stand in the files."""
-    index = parquet.read_numbers(files, "index", "int64", 1)[:, 0]
+    index = _numbers(files, "index", "int64", [1])[:, 0]
     order = np.argsort(index, kind="stable")
     if not np.array_equal(index[order], np.arange(sum(lengths))):
         raise FileFormatError(root / "data", f"frames with index 0 to {sum(lengths) - 1}, each once", "others")
-    episode = parquet.read_numbers(files, "episode_index", "int64", 1)[:, 0]
+    episode = _numbers(files, "episode_index", "int64", [1])[:, 0]
     if not np.array_equal(episode[order], np.repeat(np.arange(len(lengths)), lengths)):
         raise FileFormatError(root / "data", "frames in the episodes that meta/episodes names", "others")
     return order
@@ -73,17 +75,39 @@ def _encodable(
 ) -> np.ndarray | list[Any]:
     """The values of a feature in the order of the files."""
     if name == "task_index":
-        numbers = parquet.read_numbers(files, name, "int64", 1)[:, 0].tolist()
+        numbers = _numbers(files, name, "int64", [1])[:, 0].tolist()
         unknown = set(numbers) - set(tasks)
         if unknown:
             raise FileFormatError(root / "meta" / "tasks.parquet", f"task {min(unknown)}", "no such number")
         return [tasks[number] for number in numbers]
     if feature["dtype"] == "string":
-        return parquet.read_values(files, name)
+        return _values(files, name)
     if feature["dtype"] == "image":
         # The path beside a picture's bytes is a file name of whoever recorded it.
-        return [value["bytes"] if isinstance(value, dict) else value for value in parquet.read_values(files, name)]
-    numbers = parquet.read_numbers(files, name, feature["dtype"], math.prod(feature["shape"]))
+        return [value.get("bytes") if isinstance(value, dict) else value for value in _values(files, name)]
+    try:
+        np.dtype(feature["dtype"])
+    except TypeError:
+        found = f"the dtype {feature['dtype']!r} of {name}"
+        raise FileFormatError(root / "meta" / "info.json", "features of known types", found) from None
+    numbers = _numbers(files, name, feature["dtype"], feature["shape"])
     if numbers.dtype.kind == "f":
         numbers[np.isnan(numbers)] = np.nan
     return numbers
+
+
+def _numbers(files: Sequence[Path], name: str, dtype: str, shape: Sequence[int]) -> np.ndarray:
+    """A column of numbers over all files, `(rows, n)`, little-endian.
+
+    Raises:
+        FileFormatError: a file is damaged, lacks a value, or holds rows of another width.
+    """
+    kind = np.dtype(dtype).newbyteorder("<")
+    parts = (feature_values(read_parquet(path, [name]), name, shape, path) for path in files)
+    with np.errstate(invalid="ignore"):  # a value that its declared type cannot hold is said by the checks
+        return np.concatenate([part.reshape(len(part), -1).astype(kind) for part in parts])
+
+
+def _values(files: Sequence[Path], name: str) -> list[Any]:
+    """A column of texts or pictures over all files."""
+    return [value for path in files for value in read_parquet(path, [name]).column(name).to_pylist()]

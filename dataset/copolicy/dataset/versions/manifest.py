@@ -6,12 +6,15 @@ import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypedDict
 
 from ..exceptions import FileFormatError
+from ..json_file import parse_json, read_json
 from .canonical import digest
 
 MANIFEST_FILE = "meta/manifest.json"
 _SCHEMA = "copolicy-manifest-1"
+_WHAT = f"a manifest ({_SCHEMA})"
 _NO_DATA = ("images", "raw")
 
 
@@ -21,6 +24,16 @@ class FileEntry:
 
     size: int
     sha256: str
+
+
+class _Entry(TypedDict):
+    size: int
+    sha256: str
+
+
+class _File(TypedDict):
+    schema: str
+    files: dict[str, _Entry]
 
 
 @dataclass(frozen=True)
@@ -45,21 +58,24 @@ class Manifest:
         Raises:
             FileFormatError: none there, or something else.
         """
-        try:
-            return cls.from_text(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise FileFormatError(path, f"a manifest ({_SCHEMA})", _reason(error)) from None
+        return cls._of(read_json(path, _File, _WHAT), path)
 
     @classmethod
-    def from_text(cls, text: str) -> "Manifest":
+    def from_text(cls, text: str, path: Path | str = MANIFEST_FILE) -> "Manifest":
         """The inverse of `to_text`.
 
+        Args:
+            path: where the text is from, for the error.
+
         Raises:
-            ValueError, KeyError, TypeError, AttributeError: something else.
+            FileFormatError: something else.
         """
-        fields = json.loads(text)
+        return cls._of(parse_json(text, _File, _WHAT, path), path)
+
+    @classmethod
+    def _of(cls, fields: "_File", path: Path | str) -> "Manifest":
         if fields["schema"] != _SCHEMA:
-            raise ValueError(f"schema {fields['schema']!r}")
+            raise FileFormatError(path, _WHAT, f"schema {fields['schema']!r}")
         return cls({name: FileEntry(entry["size"], entry["sha256"]) for name, entry in fields["files"].items()})
 
     def to_text(self) -> str:
@@ -102,9 +118,3 @@ def file_entry(path: Path) -> FileEntry:
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
         return FileEntry(file.tell(), sha256)
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, OSError):
-        return error.strerror or str(error)
-    return f"{type(error).__name__}: {error}"

@@ -1,11 +1,13 @@
 """The record of a release, `meta/copolicy_release.json`: its version and everything to compare a later state with."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any, TypedDict
 
 from ..exceptions import FileFormatError, UnknownNameError
-from .content import Content
+from ..json_file import read_json
+from .content import Content, ContentFields
 from .data_version import DataVersion
 
 RELEASE_FILE = "meta/copolicy_release.json"
@@ -15,6 +17,20 @@ EARLIER_FOLDER = "meta/copolicy_releases"
 """The records of the releases before it, `x.y.z.json`."""
 
 _SCHEMA = "copolicy-release-1"
+
+
+class _Record(TypedDict):
+    """The file: schema and tag beside the fields of a `ReleaseRecord`."""
+
+    schema: str
+    tag: str
+    version: str
+    date: str
+    notes: str
+    changes: list[str]
+    content_hash: str
+    files_sha256: str
+    content: ContentFields
 
 
 @dataclass(frozen=True)
@@ -42,8 +58,8 @@ class ReleaseRecord:
 
     def to_text(self) -> str:
         """The text of the file."""
-        fields = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
-        return json.dumps(fields, indent=1) + "\n"
+        record = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
+        return json.dumps(record, indent=1) + "\n"
 
     @classmethod
     def read(cls, path: Path) -> "ReleaseRecord":
@@ -52,28 +68,15 @@ class ReleaseRecord:
         Raises:
             FileFormatError: none there, or something else.
         """
-        try:
-            return cls.from_text(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise FileFormatError(path, f"the record of a release ({_SCHEMA})", error.strerror or str(error)) from None
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            found = f"{type(error).__name__}: {error}"
-            raise FileFormatError(path, f"the record of a release ({_SCHEMA})", found) from None
-
-    @classmethod
-    def from_text(cls, text: str) -> "ReleaseRecord":
-        """The inverse of `to_text`.
-
-        Raises:
-            ValueError, KeyError, TypeError: something else.
-        """
-        fields = json.loads(text)
-        if fields.pop("schema") != _SCHEMA:
-            raise ValueError("another schema")
-        fields.pop("tag")
-        record = cls(**{**fields, "content": Content.from_json(fields["content"])})
+        what = f"the record of a release ({_SCHEMA})"
+        stored = read_json(path, _Record, what)
+        if stored["schema"] != _SCHEMA:
+            raise FileFormatError(path, what, f"schema {stored['schema']!r}")
+        values: dict[str, Any] = {column.name: stored[column.name] for column in fields(cls)}
+        record = cls(**{**values, "content": Content.from_json(stored["content"])})
         if record.content.hash != record.content_hash:
-            raise ValueError("a content hash that is not that of the episodes listed")
+            raise FileFormatError(path, what, "a content hash that is not that of the episodes listed")
+        _ = record.data_version
         return record
 
 

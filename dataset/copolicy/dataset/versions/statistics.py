@@ -1,11 +1,10 @@
 """What differs between the statistics of two data sets."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
-from ..exceptions import FileFormatError
+from ..json_file import read_json
 
 STATISTICS_FILE = Path("meta/copolicy_stats.json")
 """What `copolicy-dataset stats` stores."""
@@ -15,15 +14,12 @@ def read_statistics(root: Path) -> dict[str, Any] | None:
     """The stored statistics of a folder by the path of each value, `None` where there are none.
 
     Raises:
-        FileFormatError: a file that is no JSON.
+        FileFormatError: a file that is no JSON object.
     """
     path = root / STATISTICS_FILE
     if not path.exists():
         return None
-    try:
-        return dict(_flat(json.loads(path.read_text(encoding="utf-8"))))
-    except ValueError as error:
-        raise FileFormatError(path, "JSON", str(error)) from None
+    return dict(_flat(read_json(path, dict, "statistics of copolicy-dataset stats")))
 
 
 def compare_statistics(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:

@@ -1,0 +1,110 @@
+"""The shapes of the JSON documents that commands leave in a data set's `meta/`, for those who read them."""
+
+from typing import Any, NotRequired, TypedDict
+
+Number = float | int | None
+
+
+class NullDistribution(TypedDict):
+    """What a statistic would be by chance."""
+
+    mean: Number
+    low: Number
+    high: Number
+    p: Number
+
+
+class _Routes(TypedDict, total=False):
+    counts: dict[str, int]
+
+
+class Configuration(TypedDict):
+    """The routes of one configuration of obstacles."""
+
+    episodes: int
+    counts: dict[str, int]
+    entropy_bits: NotRequired[Number]
+    interval: NotRequired[tuple[Number, Number] | None]
+    effective_modes: NotRequired[Number]
+    effective_modes_interval: NotRequired[tuple[Number, Number] | None]
+
+
+class EstimateDetails(TypedDict, total=False):
+    """The parts of an estimate that cards and the report show; others are passed on."""
+
+    configurations: dict[str, Configuration]
+    effective_modes: Number
+    reading: str
+    counts: dict[str, int]
+    human: _Routes
+
+
+class EstimateDocument(TypedDict):
+    """One statistic."""
+
+    value: Number
+    unit: str
+    interval: NotRequired[tuple[Number, Number] | None]
+    episodes: NotRequired[int]
+    definition: NotRequired[str]
+    note: NotRequired[str]
+    null: NotRequired[NullDistribution]
+    details: NotRequired[EstimateDetails]
+
+
+class _Described(TypedDict, total=False):
+    episodes: int
+    sources: dict[str, int]
+    left_out: dict[str, int]
+
+
+class _HumanReference(TypedDict, total=False):
+    source: str
+
+
+class StatisticsDocument(TypedDict):
+    """`meta/copolicy_stats.json`, written by `copolicy-dataset stats`."""
+
+    definition_version: NotRequired[str]
+    dataset: NotRequired[_Described]
+    human_reference: NotRequired[_HumanReference]
+    statistics: NotRequired[dict[str, dict[str, EstimateDocument]]]
+
+
+class FindingDocument(TypedDict):
+    """One finding."""
+
+    rule: str
+    severity: str
+    message: str
+    episode: NotRequired[str | None]
+    figure: NotRequired[Number | str]
+    limit: NotRequired[Number | str]
+
+
+class CheckDocument(TypedDict):
+    """`meta/copolicy_check.json`, written by `copolicy-dataset check`; also what `check --json` prints."""
+
+    findings: NotRequired[list[FindingDocument]]
+    date: NotRequired[str]
+    rules_version: NotRequired[str]
+    rules: NotRequired[int]
+    content_hash: NotRequired[str | None]
+
+
+class ReleaseDocument(TypedDict):
+    """What cards read of `meta/copolicy_release.json`, the record of a release."""
+
+    version: str
+    date: str
+    content_hash: str
+
+
+class ConversionRecord(TypedDict):
+    """`meta/copolicy.json`, written by `copolicy-convert`."""
+
+    converter: NotRequired[str]
+    version: NotRequired[str]
+    left_out: NotRequired[dict[str, list[str]]]
+    notes: NotRequired[dict[str, list[str]]]
+    appended: NotRequired[list[dict[str, Any]]]

@@ -1,0 +1,69 @@
+"""JSON files from outside: read with their types checked, so that whoever uses them meets no surprise."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from .exceptions import FileFormatError
+
+_MISMATCH = re.compile(r"Expected (?P<expected>.+), got (?P<found>.+?)(?: - at `(?P<place>.+)`)?")
+
+
+def read_json[T](path: Path, kind: type[T], what: str) -> T:
+    """The content of a JSON file in UTF-8, with or without a byte order mark.
+
+    Args:
+        kind: the type it must have, for example a `TypedDict`, whose further keys are passed on.
+        what: the file is, for the error.
+
+    Raises:
+        FileFormatError: no such file, no JSON, or a value of another type; the line names its place.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FileFormatError(path, what, "no such file") from None
+    except OSError as error:
+        raise FileFormatError(path, what, error.strerror or str(error)) from None
+    except UnicodeDecodeError as error:
+        raise FileFormatError(path, what, f"no text in UTF-8 (byte {error.start})") from None
+    return parse_json(text, kind, what, path)
+
+
+def parse_json[T](text: str, kind: type[T], what: str, path: Path | str) -> T:
+    """The same for a text.
+
+    Args:
+        path: where it is from, for the error.
+    """
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(path, what, f"no JSON ({error})") from None
+    return require_type(value, kind, what, path)
+
+
+def require_type[T](value: Any, kind: type[T], what: str, path: Path | str) -> T:
+    """A value as it is, if it has a type.
+
+    Raises:
+        FileFormatError: it has another one; the line names the place.
+    """
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise _mismatch(str(error), what, path) from None
+    return value
+
+
+def _mismatch(message: str, what: str, path: Path | str) -> FileFormatError:
+    match = _MISMATCH.fullmatch(message)
+    if match is None:
+        return FileFormatError(path, what, message[0].lower() + message[1:])
+    expected = match["expected"].replace("`", "")
+    found = match["found"].replace("`", "")
+    place = f" at {match['place']}" if match["place"] else ""
+    return FileFormatError(path, f"{what}, with {expected}{place}", found)

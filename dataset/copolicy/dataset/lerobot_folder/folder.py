@@ -1,0 +1,166 @@
+"""A LeRobot v3 data set folder: what every reader of one goes through first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, EpisodeMeta
+from ..exceptions import FileFormatError
+from ..features import ACTION, FEATURES, STATE
+from ..files import visible_files
+from .info import INFO_FILE, read_info, require_episodes
+from .tables import column_types, damaged, episode_values, pa, read_parquet
+
+POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
+"""The columns of meta/episodes that say which rows of the frames an episode has."""
+_UNKNOWN: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
+_DEFAULTS = {column.name: column.default for column in fields(EpisodeMeta)}
+
+
+@dataclass(frozen=True)
+class LeRobotFolder:
+    """The metadata of a data set, verified as far as any reader needs it.
+
+    Attributes:
+        info: `meta/info.json`, the types of its entries checked.
+        episodes: the rows of meta/episodes in the order of `episode_index`, without statistics.
+    """
+
+    root: Path
+    info: dict[str, Any]
+    episodes: pa.Table
+
+    @classmethod
+    def open(cls, root: Path) -> "LeRobotFolder":
+        """Reads the metadata.
+
+        Raises:
+            FileFormatError: no LeRobot v3 data set, or one whose episodes cannot be told apart: no or a broken table
+                of episodes, or an `episode_index` or `length` that is none.
+        """
+        info = read_info(root)
+        require_episodes(root, info)
+        table = read_episodes(root)
+        path = root / "meta" / "episodes"
+        for name in POSITIONS:
+            if name in table.column_names:
+                values = episode_values(table, name, "int", path)
+                place = table.column_names.index(name)
+                table = table.set_column(place, name, pa.array(values))
+            elif name in POSITIONS[:2]:
+                raise FileFormatError(path, f"a column {name}", "none")
+        table = table.sort_by("episode_index")
+        numbers, lengths = (table.column(name).to_numpy() for name in POSITIONS[:2])
+        if not np.array_equal(numbers, np.arange(len(numbers))):
+            raise FileFormatError(path, f"episodes 0 to {len(numbers) - 1}, each once", _others(numbers))
+        if (lengths < 1).any():
+            raise FileFormatError(path, "episodes of at least one frame", f"episode {int(np.argmin(lengths))} of none")
+        if lengths.sum(dtype=float) > 2**40:
+            raise FileFormatError(path, "lengths that add up to a data set", f"{lengths.max()} frames in an episode")
+        return cls(root, info, table)
+
+    @property
+    def lengths(self) -> list[int]:
+        """Frames of each episode."""
+        return self.episodes.column("length").to_pylist()
+
+    @property
+    def data_files(self) -> list[Path]:
+        """The files of frames, in the order of their paths.
+
+        Raises:
+            FileFormatError: there is none.
+        """
+        files = visible_files(self.root / "data", "*.parquet")
+        if not files:
+            raise FileFormatError(self.root, "Parquet files under data", "none")
+        return files
+
+    def rows(self, columns: Sequence[str] = tuple(EPISODE_COLUMNS)) -> list[dict[str, Any]]:
+        """`episode_index`, `length` and some episode columns of each episode; an empty entry is what stands for
+        unknown: an empty text, NaN, -1 or False.
+
+        Raises:
+            FileFormatError: a column is missing or holds something else.
+        """
+        path = self.root / "meta" / "episodes"
+        missing = [name for name in columns if name not in self.episodes.column_names and name not in LATER_COLUMNS]
+        if missing:
+            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
+        values: dict[str, list[Any]] = {name: self.episodes.column(name).to_pylist() for name in POSITIONS[:2]}
+        for name in columns:
+            kind = EPISODE_COLUMNS[name]
+            if name in self.episodes.column_names:
+                values[name] = episode_values(self.episodes, name, kind, path, _UNKNOWN[kind]).tolist()
+            else:
+                values[name] = [_DEFAULTS[name]] * self.episodes.num_rows
+        return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+
+    def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:
+        """Checks that the data set is one of this task.
+
+        Raises:
+            FileFormatError: a feature is missing or has another shape, as in a data set of another task.
+        """
+        difference = other_task(self.info, features)
+        if difference:
+            raise FileFormatError(
+                self.root / INFO_FILE, "a data set of carrying a table (copolicy-convert)", difference
+            )
+
+    def require_frames(self, features: Sequence[str]) -> None:
+        """Checks that every data file has the columns of some features.
+
+        Raises:
+            FileFormatError: a file is no complete Parquet file, or lacks a column.
+        """
+        for path in self.data_files:
+            missing = [name for name in features if name not in column_types(path)]
+            if missing:
+                raise FileFormatError(path, "the columns of this task", f"none named {', '.join(missing)}")
+
+
+def read_episodes(root: Path) -> pa.Table:
+    """All rows of meta/episodes, without the statistics of episodes.
+
+    Raises:
+        FileFormatError: no file, one that is no complete Parquet file, or files that do not fit together.
+    """
+    folder = root / "meta" / "episodes"
+    files = visible_files(folder, "*.parquet")
+    if not files:
+        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
+    tables = []
+    for path in files:
+        names = [name for name in column_types(path) if not name.startswith("stats/")]
+        tables.append(read_parquet(path, names))
+    try:
+        table = pa.concat_tables(tables, promote_options="permissive").combine_chunks()
+    except pa.ArrowException as error:
+        raise damaged(folder, error) from None
+    if not table.num_rows:
+        raise FileFormatError(folder, "episodes", "none")
+    return table
+
+
+def other_task(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) -> str:
+    """What makes a feature table one of another task; empty where nothing does."""
+    for name in features:
+        feature = info["features"].get(name)
+        if feature is None:
+            others = ", ".join(name for name in info["features"] if name not in ("timestamp", "frame_index"))
+            return f"one of another task: no feature {name} ({others[:120]})"
+        shape = tuple(FEATURES[name]["shape"])
+        if tuple(feature["shape"]) != shape:
+            return f"one of another task: {name} of shape {tuple(feature['shape'])} instead of {shape}"
+    return ""
+
+
+def _others(numbers: np.ndarray) -> str:
+    repeated = numbers[1:][np.diff(numbers) == 0]
+    if len(repeated):
+        return f"episode {repeated[0]} twice"
+    return f"{', '.join(map(str, numbers[:3].tolist()))}{', ...' if len(numbers) > 3 else ''}"

@@ -1,0 +1,97 @@
+"""`meta/info.json` of a LeRobot v3 data set, and what a folder is that has none."""
+
+import math
+from pathlib import Path
+from typing import Any, NotRequired, TypedDict
+
+from ..exceptions import FileFormatError
+from ..files import visible_files
+from ..json_file import read_json
+
+INFO_FILE = Path("meta/info.json")
+_WHAT = "LeRobot's data set information"
+
+
+class Feature(TypedDict):
+    """A column of the frames, or a video."""
+
+    dtype: str
+    shape: list[int]
+    names: NotRequired[Any]
+
+
+class Info(TypedDict):
+    """The entries that LeRobot or copolicy reads; others are passed on."""
+
+    codebase_version: str
+    fps: int | float
+    features: dict[str, Feature]
+    total_episodes: int
+    total_frames: int
+    total_tasks: NotRequired[int]
+    chunks_size: NotRequired[int]
+    data_files_size_in_mb: NotRequired[int | float]
+    video_files_size_in_mb: NotRequired[int | float]
+    data_path: NotRequired[str | None]
+    video_path: NotRequired[str | None]
+    robot_type: NotRequired[str | None]
+    splits: NotRequired[dict[str, str] | None]
+
+
+class _Version(TypedDict):
+    codebase_version: NotRequired[str]
+
+
+def read_info(root: Path) -> dict[str, Any]:
+    """The information of a data set, with the types of all entries checked.
+
+    Raises:
+        FileFormatError: no such folder, a folder of something else, another version of the format, or an entry that
+            is missing or of another type.
+    """
+    path = root / INFO_FILE
+    if not path.is_file():
+        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", _instead(root))
+    version = read_json(path, _Version, _WHAT).get("codebase_version")
+    if version is not None and not version.startswith("v3."):
+        raise FileFormatError(path, "codebase_version v3.x", _other_version(version))
+    info: dict[str, Any] = dict(read_json(path, Info, _WHAT))
+    if not (math.isfinite(info["fps"]) and info["fps"] > 0):
+        raise FileFormatError(path, f"{_WHAT}, with a positive fps", repr(info["fps"]))
+    for name in ("chunks_size", "data_files_size_in_mb", "video_files_size_in_mb"):
+        if info.get(name, 1) <= 0:
+            raise FileFormatError(path, f"{_WHAT}, with a positive {name}", repr(info[name]))
+    for name, feature in info["features"].items():
+        if not all(size > 0 for size in feature["shape"]):
+            raise FileFormatError(path, f"a shape of positive sizes for the feature {name}", str(feature["shape"]))
+    return info
+
+
+def require_episodes(root: Path, info: dict[str, Any]) -> None:
+    """
+    Raises:
+        FileFormatError: a data set that says of itself that it has no episode, and has none.
+    """
+    if info["total_episodes"] == 0 and not visible_files(root / "meta" / "episodes", "*.parquet"):
+        raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
+
+
+def _other_version(version: str) -> str:
+    if version.startswith("v2"):
+        convert = "python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id=U/N --root=FOLDER --push-to-hub=false"
+        return f"{version}, an older one; LeRobot converts it: {convert}"
+    return repr(version)
+
+
+def _instead(root: Path) -> str:
+    """What is at a path that is no data set."""
+    if root.is_file():
+        return "a file"
+    if not root.is_dir():
+        return "no such folder"
+    if next(iter(visible_files(root, "*.mcap")), None) is not None:
+        return "a folder of recordings; copolicy-convert mcap makes a data set of them"
+    inside = sorted((*root.glob("*/meta/info.json"), *root.glob("*/*/meta/info.json")))
+    if inside:
+        return f"none, but one in {inside[0].parent.parent}"
+    return "none"

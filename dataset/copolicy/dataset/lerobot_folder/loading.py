@@ -1,0 +1,212 @@
+"""What LeRobot needs to load any single episode, join data sets, or normalise their frames."""
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..exceptions import CopolicyError, FileFormatError
+from ..files import visible_files
+from ..json_file import read_json
+from .folder import POSITIONS, LeRobotFolder
+from .references import (
+    TASKS_FILE,
+    data_path,
+    read_tasks,
+    tasks_are_indexed,
+    video_features,
+    video_span,
+)
+from .tables import ColumnError, column_types, episode_values, pa, read_parquet, row_count, scalars, vectors
+
+STATS_FILE = Path("meta/stats.json")
+STATISTICS = ("min", "max", "mean", "std")
+"""The statistics of a feature that normalisation may use."""
+
+
+class Problem(NamedTuple):
+    """Something that keeps a data set, or one episode of it, from being loaded.
+
+    Attributes:
+        episode: its `episode_index`; None where all are concerned.
+    """
+
+    episode: int | None
+    message: str
+
+
+def require_loadable(root: Path) -> LeRobotFolder:
+    """Checks that LeRobot can load every episode of a data set, whatever its task.
+
+    Raises:
+        FileFormatError: it cannot; the line names the first reason.
+    """
+    folder = LeRobotFolder.open(root)
+    info = folder.info
+    for place, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
+        rows = sum(row_count(path) for path in visible_files(root / place, "*.parquet"))
+        if rows != expected:
+            raise FileFormatError(root / place, f"{expected} rows, as meta/info.json says", f"{rows}")
+    for name in POSITIONS:
+        episode_values(folder.episodes, name, "int", root / "meta" / "episodes")
+    episodes_of_files: dict[str, frozenset[int]] = {}
+    task_numbers: set[int] = set()
+    for path in folder.data_files:
+        types = column_types(path)
+        stored = [name for name, feature in info["features"].items() if feature["dtype"] != "video"]
+        if missing := [name for name in stored if name not in types]:
+            raise FileFormatError(path, "the features of meta/info.json", f"no column {missing[0]}")
+        if missing := [name for name in ("episode_index", "index", "task_index", "timestamp") if name not in types]:
+            raise FileFormatError(path, "the columns of a LeRobot data set", f"no column {missing[0]}")
+        table = read_parquet(path, ["episode_index", "task_index"])
+        numbers, tasks = (_whole_numbers(table, name, path) for name in table.column_names)
+        episodes_of_files[path.relative_to(root).as_posix()] = frozenset(np.unique(numbers).tolist())
+        task_numbers.update(np.unique(tasks).tolist())
+    read_tasks(root)
+    read_statistics(root)
+    rows = folder.episodes.to_pylist()
+    for problems in (
+        file_problems(root, info, rows, episodes_of_files),
+        task_problems(root, info, rows, task_numbers),
+        statistics_problems(root, info),
+        episode_statistics_problems(root),
+    ):
+        for problem in problems:
+            where = "" if problem.episode is None else f"episode {problem.episode}: "
+            raise FileFormatError(root, "a data set that LeRobot can load", f"this: {where}{problem.message}")
+    return folder
+
+
+def file_problems(
+    root: Path, info: Mapping[str, Any], rows: Collection[dict[str, Any]], data_files: Mapping[str, frozenset[int]]
+) -> Iterator[Problem]:
+    """Episodes whose files are not where the metadata say.
+
+    Args:
+        rows: of meta/episodes.
+        data_files: the episodes that each data file has rows of, by its path below the folder.
+    """
+    for row in rows:
+        index = row["episode_index"]
+        try:
+            name = data_path(info, row)
+        except ValueError as error:
+            yield Problem(index, f"the metadata do not say which file holds the frames: {error}")
+            continue
+        if name not in data_files:
+            yield Problem(index, f"the frames should be in {name}, which is not there or cannot be read")
+        elif index not in data_files[name]:
+            yield Problem(index, f"the frames should be in {name}, which has none of this episode")
+        for key in video_features(info):
+            try:
+                _, start, end = video_span(root, info, row, key)
+            except CopolicyError as error:
+                yield Problem(index, _below(root, error))
+                continue
+            expected = row["length"] / info["fps"]
+            if abs(end - start - expected) > 0.5 / info["fps"]:
+                yield Problem(index, f"{expected:g} s of frames, but {end - start:g} s of the video {key}")
+
+
+def task_problems(
+    root: Path, info: Mapping[str, Any], rows: Collection[dict[str, Any]], numbers: Collection[int]
+) -> Iterator[Problem]:
+    """What is wrong with the sentences of the tasks, which LeRobot looks up by their row.
+
+    Args:
+        numbers: every `task_index` that a frame has.
+    """
+    try:
+        tasks = read_tasks(root)
+    except CopolicyError as error:
+        yield Problem(None, _below(root, error))
+        return
+    name = TASKS_FILE.as_posix()
+    if list(tasks) != list(range(len(tasks))) or not all(text.strip() for text in tasks.values()):
+        yield Problem(None, f"{name} does not number its sentences 0, 1, ...: {list(tasks)[:5]}")
+    if not tasks_are_indexed(root / TASKS_FILE):
+        yield Problem(None, f"{name} does not mark its sentences as the index, where LeRobot looks for them")
+    if info.get("total_tasks") != len(tasks):
+        yield Problem(None, f"meta/info.json has total_tasks {info.get('total_tasks')}, {name} {len(tasks)} rows")
+    unknown = sorted(set(numbers) - set(tasks))
+    if unknown:
+        yield Problem(None, f"frames name task {unknown[0]}, which {name} does not have")
+    for row in rows:
+        named = row.get("tasks")
+        if not isinstance(named, list) or not named or not {str(text) for text in named} <= set(tasks.values()):
+            yield Problem(row["episode_index"], f"meta/episodes names no task of the data set: {str(named)[:80]}")
+
+
+def statistics_problems(root: Path, info: Mapping[str, Any]) -> Iterator[Problem]:
+    """What is wrong with the form of `meta/stats.json`."""
+    name = STATS_FILE.as_posix()
+    try:
+        stored = read_statistics(root)
+    except CopolicyError as error:
+        yield Problem(None, _below(root, error))
+        return
+    for key, feature in info["features"].items():
+        if feature["dtype"] == "string":
+            continue
+        if key not in stored:
+            yield Problem(None, f"{name} says nothing of {key}")
+            continue
+        # Pictures have one figure a channel.
+        width = None if feature["dtype"] in ("video", "image") else math.prod(feature["shape"])
+        for kind in dict.fromkeys((*STATISTICS, "count", *stored[key])):
+            if numbers(stored[key].get(kind), 1 if kind == "count" else width) is None:
+                yield Problem(None, f"{name} has no usable {kind} of {key}")
+                break
+
+
+def episode_statistics_problems(root: Path) -> Iterator[Problem]:
+    """Columns `stats/...` of meta/episodes that hold something else than lists of numbers, which joining reads."""
+    for path in visible_files(root / "meta" / "episodes", "*.parquet"):
+        names = [name for name, kind in column_types(path).items() if name.startswith("stats/") and _flat(kind)]
+        table = read_parquet(path, names)
+        for name in names:
+            try:
+                vectors(table.column(name))
+            except ColumnError as error:
+                yield Problem(None, f"{name} of meta/episodes: expected {error.expected}, found {error.found}")
+
+
+def read_statistics(root: Path) -> dict[str, dict[str, Any]]:
+    """`meta/stats.json`.
+
+    Raises:
+        FileFormatError: no such file, or something else.
+    """
+    return read_json(root / STATS_FILE, dict[str, dict[str, Any]], "statistics of the frames")
+
+
+def numbers(value: Any, width: int | None) -> np.ndarray | None:
+    """Finite numbers, `width` of them where that is given; None for anything else."""
+    if isinstance(value, str | bool) or value is None:
+        return None
+    try:
+        array = np.asarray(value, float).reshape(-1)
+    except (TypeError, ValueError):
+        return None
+    if not array.size or not np.isfinite(array).all() or (width is not None and array.size != width):
+        return None
+    return array
+
+
+def _flat(kind: pa.DataType) -> bool:
+    """Not the statistics of pictures, which are nested."""
+    return not (pa.types.is_list(kind) and pa.types.is_nested(kind.value_type))
+
+
+def _whole_numbers(table: pa.Table, name: str, path: Path) -> np.ndarray:
+    try:
+        return scalars(table.column(name), "int")
+    except ColumnError as error:
+        raise FileFormatError(path, f"{error.expected} of {name}", error.found) from None
+
+
+def _below(root: Path, error: CopolicyError) -> str:
+    """An error's line with paths below the data set's folder."""
+    return str(error).replace(f"{root}/", "").removeprefix(f"{root}: ")
