@@ -194,13 +194,13 @@ def _tables(root: Path) -> "dict[Path, pa.Table]":
         import pyarrow.parquet as pq
     except ModuleNotFoundError:
         raise MissingExtraError("pyarrow") from None
-    files = visible_files(root / "meta" / "episodes", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     # The types of all columns, before any of them is rewritten.
     from .lerobot_folder.folder import LeRobotFolder
 
     LeRobotFolder.open(root).rows(_NEEDED[1:])
+    files = visible_files(root / "meta" / "episodes", "*.parquet")
+    if not files:
+        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     tables = {}
     for path in files:
         try:
