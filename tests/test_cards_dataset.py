@@ -117,7 +117,7 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
     assert (
-        f"Checked on {kept['date'][:10]} by version 1.0.0 of the rules (`meta/copolicy_check.json`): {counts}" in text
+        f"Checked on {kept['date'][:10]} by version 1.1.0 of the rules (`meta/copolicy_check.json`): {counts}" in text
     )
     assert "| severity | rule | findings | the first |" in text
     assert "**Stale.**" not in text

@@ -108,7 +108,7 @@ def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_
     assert main(["report", str(root), "--json", "--overwrite"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == "shown"
     page = visit.open(root / "report.html")
-    expect(page.locator("#finding-list")).to_contain_text(f"Checked on {date} by version 1.0.0 of the rules.")
+    expect(page.locator("#finding-list")).to_contain_text(f"Checked on {date} by version 1.1.0 of the rules.")
     expect(page.locator("#finding-list")).not_to_contain_text("stale")
     assert dataset_command(["exclude", str(root), "--episodes", "0", "--reason", "a test"]) == 0
     capsys.readouterr()

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import EPISODE_COLUMNS
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.files import visible_files
 
 try:
     import pyarrow as pa
@@ -72,18 +73,29 @@ class DatasetFacts:
         return sum(bool(episode["success"]) for episode in self.episodes)
 
 
+def stored_columns(root: Path) -> set[str]:
+    """The columns of meta/episodes; a data set of an earlier version lacks some of `LATER_COLUMNS`."""
+    files = visible_files(root / "meta" / "episodes", "*.parquet")
+    return {name for path in files for name in parquet.read_schema(path).names}
+
+
 def _read_episodes(root: Path) -> tuple[dict[str, Any], ...]:
-    files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
+    files = visible_files(root / "meta" / "episodes", "*.parquet")
     if not files:
         raise FileFormatError(root, "episode metadata under meta/episodes", "no parquet file")
     rows: list[dict[str, Any]] = []
     for path in files:
         try:
             names = parquet.read_schema(path).names
-            missing = [name for name in EPISODE_COLUMNS if name not in names]
+            missing = [name for name in EPISODE_COLUMNS if name not in names and name not in LATER_COLUMNS]
             if missing:
                 raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
-            rows += parquet.read_table(path, columns=["episode_index", "length", *EPISODE_COLUMNS]).to_pylist()
+            wanted = ["episode_index", "length", *(name for name in EPISODE_COLUMNS if name in names)]
+            rows += [_completed(row) for row in parquet.read_table(path, columns=wanted).to_pylist()]
         except (pa.ArrowInvalid, OSError) as error:
             raise FileFormatError(path, "a complete parquet file", str(error).splitlines()[0]) from None
     return tuple(sorted(rows, key=lambda row: row["episode_index"]))
+
+
+def _completed(row: dict[str, Any]) -> dict[str, Any]:
+    return row | {name: default for name, default in LATER_DEFAULTS.items() if row.get(name) is None}

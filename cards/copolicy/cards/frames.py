@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, map_of, theta_of
+from copolicy.dataset.files import visible_files
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import MAP_SETS, MapConfig
 
@@ -61,7 +63,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
             than meta/episodes says.
     """
     expected = iter(facts.episodes)
-    for path in sorted((facts.root / "data").glob("*/*.parquet")):
+    for path in visible_files(facts.root / "data", "*.parquet"):
         try:
             table = parquet.read_table(path, columns=_COLUMNS).combine_chunks()
         except (pa.ArrowInvalid, OSError, KeyError) as error:
@@ -78,7 +80,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
             if episode is None or found != (episode["episode_index"], episode["length"]):
                 named = f"episode {episode['episode_index']} with {episode['length']} frames" if episode else "its end"
                 raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
-            config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode["map_set"]))
+            config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode))
             yield EpisodeFrames(found[0], columns[STATE][start:end], columns[ACTION][start:end], config)
     left = next(expected, None)
     if left is not None:
@@ -92,7 +94,7 @@ def _matrix(table: "pa.Table", key: str) -> np.ndarray:
     return values.to_numpy(zero_copy_only=False).astype(float).reshape(-1, width)
 
 
-def _obstacle_size(map_set: str) -> int:
-    # The observation has no room for it; all maps of a set have one size.
-    maps = MAP_SETS.get(map_set)
-    return maps[0].obstacle_size if maps else MapConfig.obstacle_size
+def _obstacle_size(episode: dict[str, Any]) -> int:
+    # In data sets of earlier versions no column tells it; all maps of a set have one size.
+    maps = MAP_SETS.get(episode["map_set"])
+    return episode["obstacle_size"] or (maps[0].obstacle_size if maps else MapConfig.obstacle_size)

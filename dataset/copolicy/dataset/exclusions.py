@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from .commandline import add_command
 from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from .files import visible_files
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -193,7 +194,7 @@ def _tables(root: Path) -> "dict[Path, pa.Table]":
         import pyarrow.parquet as pq
     except ModuleNotFoundError:
         raise MissingExtraError("pyarrow") from None
-    files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
+    files = visible_files(root / "meta" / "episodes", "*.parquet")
     if not files:
         raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     tables = {}

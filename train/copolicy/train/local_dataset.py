@@ -7,6 +7,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.files import visible_files
 
 
 def check_local_dataset(root: Path | str) -> None:
@@ -69,7 +70,7 @@ def training_episodes(episodes: list[int] | None, total: int, discarded: list[bo
 
 def _rows(folder: Path) -> int:
     rows = 0
-    for path in sorted(folder.glob("*/*.parquet")):
+    for path in visible_files(folder, "*.parquet"):
         try:
             rows += pq.read_metadata(path).num_rows
         except (OSError, ValueError) as error:  # pyarrow's own errors are ValueErrors

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files import visible_files
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -120,7 +121,7 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
 def _counts(root: Path, column: str, used: Collection[int]) -> dict[str, int]:
     """How many of the used episodes have each value of an episode column."""
     counts: Counter[str] = Counter()
-    for path in sorted((root / "meta" / "episodes").glob("*/*.parquet")):
+    for path in visible_files(root / "meta" / "episodes", "*.parquet"):
         try:
             if column not in pq.read_schema(path).names:
                 continue

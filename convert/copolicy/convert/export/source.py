@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.clock import stride
-from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, LATER_DEFAULTS
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
+from copolicy.dataset.files import visible_files
+from copolicy.dataset.physics_text import physics_counts, physics_of
 from copolicy.dataset.task import RECORD_HZ, Physics
 
 from ..dynamics import integrate
@@ -42,6 +44,7 @@ class ExportEpisode:
         rewards: `(T,)` float32.
         meta: its episode columns.
         fps: frames a second.
+        physics: what led from state to state; the default where the data set does not say.
     """
 
     index: int
@@ -52,6 +55,7 @@ class ExportEpisode:
     rewards: np.ndarray
     meta: dict[str, Any]
     fps: int
+    physics: Physics
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -60,13 +64,13 @@ class ExportEpisode:
         """`(7,)` float32, the state that the last action led to.
 
         The data set ends with the last action, so that it is integrated from the last state over the steps that
-        `duration_s` leaves for the last frame, under the default physics.
+        `duration_s` leaves for the last frame, under the episode's own physics.
         """
         step = stride(self.fps)
         steps = round(self.meta["duration_s"] * RECORD_HZ) - step * (len(self) - 1)
         x, y, _, _, vx, vy, omega = self.states[-1].astype(float).tolist()
         held = np.repeat(self.actions[-1:].astype(float), min(max(steps, 1), step), axis=0)
-        after = integrate((x, y, float(theta_of(self.states[-1]))), (vx, vy, omega), held, Physics())
+        after = integrate((x, y, float(theta_of(self.states[-1]))), (vx, vy, omega), held, self.physics)
         return states_7(after[-1]).astype(np.float32)
 
     def next_states(self) -> np.ndarray:
@@ -140,7 +144,14 @@ class ExportSource:
             "sources": dict(sorted(sources.items())),
             "simulated": bool(sources["simulated"]),
             "licenses": licenses,
+            "physics": physics_counts(row["physics"] for row in self.rows),
         }
+
+    @property
+    def physics(self) -> Physics | None:
+        """The settings that led from state to state in all exported episodes; None where they differ or are unknown."""
+        settings = {physics_of(row["physics"]) for row in self.rows}
+        return next(iter(settings)) if len(settings) == 1 else None
 
     def episodes(self) -> Iterator[ExportEpisode]:
         """The exported episodes in order; one data file is in memory at a time.
@@ -150,7 +161,7 @@ class ExportSource:
         """
         wanted = {row["episode_index"]: row for row in self.rows}
         expected = iter(sorted(self._lengths))
-        for path in sorted((self.root / "data").glob("*/*.parquet")):
+        for path in visible_files(self.root / "data", "*.parquet"):
             columns = _frames(path)
             numbers = columns["episode_index"]
             starts = np.flatnonzero(np.diff(numbers, prepend=-1))
@@ -176,19 +187,25 @@ def _range(text: str) -> range:
 def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int) -> ExportEpisode:
     meta = {name: row[name] for name in EPISODE_COLUMNS}
     return ExportEpisode(
-        index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta, fps
-    )
+        index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta,
+        fps, physics_of(row["physics"]) or Physics(),
+    )  # fmt: skip
 
 
 def _episode_rows(root: Path) -> list[dict[str, Any]]:
     names = ("episode_index", "length", *EPISODE_COLUMNS)
     rows: list[dict[str, Any]] = []
-    for path in sorted((root / "meta" / "episodes").glob("*/*.parquet")):
-        rows += _read(path, names).to_pylist()
+    for path in visible_files(root / "meta" / "episodes", "*.parquet"):
+        rows += [LATER_DEFAULTS | row for row in _read(path, names, LATER_COLUMNS).to_pylist()]
     if not rows:
         raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     for row in rows:
-        row |= {name: _UNKNOWN[kind] for name, kind in EPISODE_COLUMNS.items() if row[name] is None}
+        unknown = {name: _UNKNOWN[kind] for name, kind in EPISODE_COLUMNS.items()} | LATER_DEFAULTS
+        row |= {name: value for name, value in unknown.items() if row[name] is None}
+        try:
+            physics_of(row["physics"])
+        except InvalidValueError as error:
+            raise FileFormatError(root, f"the settings of episode {row['episode_index']}", str(error)) from None
     return sorted(rows, key=lambda row: row["episode_index"])
 
 
@@ -207,13 +224,13 @@ def _frames(path: Path) -> dict[str, np.ndarray]:
     return columns
 
 
-def _read(path: Path, names: tuple[str, ...]) -> "pa.Table":
+def _read(path: Path, names: tuple[str, ...], optional: tuple[str, ...] = ()) -> "pa.Table":
     try:
         # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
         with pq.ParquetFile(path) as file:
             missing = [name for name in names if name not in file.schema_arrow.names]
-            if missing:
-                raise FileFormatError(path, "the columns of copolicy", f"none named {', '.join(missing)}")
-            return file.read(columns=list(names))
+            if lacking := [name for name in missing if name not in optional]:
+                raise FileFormatError(path, "the columns of copolicy", f"none named {', '.join(lacking)}")
+            return file.read(columns=[name for name in names if name not in missing])
     except (pa.ArrowException, OSError) as error:
         raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-RULES_VERSION = "1.0.0"
+RULES_VERSION = "1.1.0"
 """Of the rules and their limits: major where a finding means something else, minor where a rule is added or goes,
 patch where a limit moves. Kept findings name it."""
 

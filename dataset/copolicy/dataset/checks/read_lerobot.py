@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..episode import EPISODE_COLUMNS
+from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, LATER_DEFAULTS
 from ..exceptions import FileFormatError, MissingExtraError
+from ..files import visible_files
 from .episode_table import COLUMN_TYPES, EpisodeTable
 from .finding import Finding
 
@@ -41,9 +42,11 @@ def read_lerobot(root: Path) -> EpisodeTable:
     for name in columns:
         nulls = meta.column(name).null_count
         # LeRobot's merge writes NaN, "not measured", as null.
-        if nulls and EPISODE_COLUMNS.get(name) != "float":
+        if nulls and EPISODE_COLUMNS.get(name) != "float" and name not in LATER_COLUMNS:
             message = f"episodes with nothing in column {name}, as after a merge with a set that lacks it"
             damage.append(Finding("", "schema", nulls, 0, "error", message))
+    for name, default in LATER_DEFAULTS.items():
+        columns.setdefault(name, np.full(meta.num_rows, default))
     order = np.argsort(columns["episode_index"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
     labels = tuple(str(index) for index in columns["episode_index"])
@@ -89,7 +92,7 @@ def _figure(value: object) -> float | int | str | None:
 def _concatenated(root: Path, folder: str, damage: list[Finding]) -> "pa.Table | None":
     """All Parquet files of a folder, without statistics of episodes and without nested columns such as pictures."""
     tables = []
-    for path in sorted((root / folder).glob("*/*.parquet")):
+    for path in visible_files(root / folder, "*.parquet"):
         try:
             with pq.ParquetFile(path) as file:
                 names = [field.name for field in file.schema_arrow if _wanted(field)]

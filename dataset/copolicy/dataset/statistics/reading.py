@@ -9,6 +9,7 @@ import numpy as np
 
 from ..exceptions import CopolicyError, FileFormatError, MissingExtraError, RunError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, map_of
+from ..files import visible_files
 from .trajectories import EpisodeRow, Trajectories
 
 try:
@@ -21,7 +22,7 @@ _EPISODE_COLUMNS = (
     "episode_index", "length", "episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class",
     "discarded",
 )  # fmt: skip
-_OBSTACLE_SIZE = 50  # px; of a map that is in no set, whose obstacles' size a data set does not tell
+_OBSTACLE_SIZE = 50  # px; of a map in no set, in a data set of an earlier version, which does not tell
 
 
 def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectories, dict[str, int]]:
@@ -78,7 +79,8 @@ def _info(root: Path) -> Mapping[str, Any]:
 
 
 def _episodes(root: Path) -> list[dict[str, Any]]:
-    rows = [row for path in _files(root, "meta/episodes") for row in _table(path, _EPISODE_COLUMNS).to_pylist()]
+    files = _files(root, "meta/episodes")
+    rows = [row for path in files for row in _table(path, _EPISODE_COLUMNS, ("obstacle_size",)).to_pylist()]
     rows.sort(key=lambda row: row["episode_index"])
     if [row["episode_index"] for row in rows] != list(range(len(rows))):
         raise FileFormatError(root / "meta/episodes", "episodes 0 to n - 1, each once", f"{len(rows)} others")
@@ -110,7 +112,8 @@ def _frames(root: Path, lengths: list[int]) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _row(root: Path, row: dict[str, Any], environment: np.ndarray, split: str) -> EpisodeRow:
-    size = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
+    guessed = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
+    size = row.get("obstacle_size") or guessed
     try:
         config = map_of(environment, size)
     except CopolicyError as error:
@@ -130,17 +133,19 @@ def _splits(splits: Mapping[str, str], episodes: int) -> list[str]:
 
 
 def _files(root: Path, folder: str) -> list[Path]:
-    files = sorted((root / folder).glob("*/*.parquet"))
+    files = visible_files(root / folder, "*.parquet")
     if not files:
         raise FileFormatError(root, f"parquet files under {folder}", "none")
     return files
 
 
-def _table(path: Path, columns: tuple[str, ...]) -> "pa.Table":
+def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ()) -> "pa.Table":
     try:
-        missing = [name for name in columns if name not in pq.read_schema(path).names]
+        stored = pq.read_schema(path).names
+        missing = [name for name in columns if name not in stored]
         if missing:
             raise FileFormatError(path, "the columns of copolicy", f"none named {', '.join(missing)}")
-        return pq.read_table(path, columns=list(columns), use_threads=False)
+        wanted = [*columns, *(name for name in optional if name in stored)]
+        return pq.read_table(path, columns=wanted, use_threads=False)
     except (pa.ArrowInvalid, OSError) as error:
         raise FileFormatError(path, "a complete parquet file", str(error).splitlines()[0]) from None

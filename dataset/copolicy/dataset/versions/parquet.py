@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import FileFormatError, MissingExtraError
+from ..files import visible_files
 
 try:
     import pyarrow as pa
@@ -21,7 +22,7 @@ def files_under(root: Path, folder: str) -> list[Path]:
     Raises:
         FileFormatError: there is none.
     """
-    files = sorted((root / folder).rglob("*.parquet"))
+    files = visible_files(root / folder, "*.parquet")
     if not files:
         raise FileFormatError(root, f"at least one Parquet file under {folder}", "none")
     return files

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, UnknownNameError
+from ..files import visible_files
 from .content import Content
 from .data_version import DataVersion
 
@@ -95,6 +96,6 @@ def read_release(root: Path, version: str | None = None) -> ReleaseRecord:
         return newest
     path = root / EARLIER_FOLDER / f"{wanted}.json"
     if not path.exists():
-        earlier = [file.stem for file in (root / EARLIER_FOLDER).glob("*.json")]
+        earlier = [file.stem for file in visible_files(root / EARLIER_FOLDER, "*.json")]
         raise UnknownNameError(f"release of {root}", wanted, [newest.version, *earlier])
     return ReleaseRecord.read(path)
