@@ -283,7 +283,9 @@ def test_other_software_sources_and_rewards_are_said(made, copied, tmp_path, run
     set_columns(other, software_version=["0.0.1"] * 2, physics=[physics_text(HALF)] * 2, source=["upstream"] * 2)
     set_frames(other, "next.reward", lambda rewards: rewards + 1)
     record = other / "meta" / "copolicy.json"
-    record.write_text(json.dumps({**json.loads(record.read_text(encoding="utf-8")), "version": "0.0.1"}), "utf-8")
+    record.write_text(
+        json.dumps({**json.loads(record.read_text(encoding="utf-8")), "version": "0.0.1"}), encoding="utf-8"
+    )
     summary, errors = run("merge", one, other, "--root", tmp_path / "out", "--repo-id", "lab/both")
     version = json.loads((one / "meta" / "copolicy.json").read_text(encoding="utf-8"))["version"]
     assert summary["mixed"] == [
