@@ -67,6 +67,8 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
         "damaged_left_out": [],
         "discarded_left_out": ["episode_2.mcap"],
         "unfinished_recordings": [],
+        "physics": {"angular acceleration up to pi/2 rad/s^2": 3},
+        "mixed": ["license: 2 episodes CC-BY-4.0; 1 episode CC0-1.0"],
     }
     assert captured.err == ""
     dataset = load(tmp_path / "set")

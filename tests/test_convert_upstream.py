@@ -30,6 +30,7 @@ from copolicy.convert.upstream_processed import read_processed
 from copolicy.convert.upstream_raw import read_raw
 from copolicy.convert.upstream_zarr import ZarrStore
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.physics_text import physics_of
 from copolicy.dataset.task import Physics
 
 
@@ -113,6 +114,8 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     assert np.abs(episode.states[0, :2] - CONFIG.start[:2]).max() < 1e-9
     other = read_raw(path, UpstreamOptions("pi/8" if name == "pi/2" else "pi/2"))
     assert other.meta.quality_flags == "dynamics_mismatch"
+    assert (physics_of(episode.meta.physics), other.meta.physics) == (physics, "")
+    assert episode.meta.obstacle_size == OPTIONS.obstacle_size
 
     cosine, sine = np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])
     pose = np.hstack((states[1:, :2], cosine, sine))
@@ -121,12 +124,24 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     single = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
     assert single.notes[0].endswith(f"angular limit {name}")
     assert np.abs(single.states - episode.states).max() < 1e-4
+    assert physics_of(single.meta.physics) == physics
 
     write_store(tmp_path / "store", states, actions)
     tenth = ZarrStore(tmp_path / "store").read(0, OPTIONS)
     assert tenth.notes[0].endswith(f"angular limit {name}")
     assert tenth.meta.quality_flags == ""
     assert np.abs(tenth.states - episode.states[::3]).max() < 1e-9
+    assert physics_of(tenth.meta.physics) == physics
+
+
+def test_rows_that_tell_no_angular_limit_leave_the_physics_unknown(tmp_path):
+    forces = held(90)[:, :2]
+    path = write_raw(tmp_path, *play(np.hstack((forces, forces))))  # without torque
+    episode = read_raw(path, OPTIONS)
+    assert (episode.meta.physics, episode.meta.quality_flags) == ("", "")
+    assert episode.notes[0].endswith("angular limit pi/2, which the rows do not tell")
+    stated = read_raw(path, UpstreamOptions("pi/8"))
+    assert physics_of(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
 
 
 def test_rows_that_were_skipped_are_refused(tmp_path):

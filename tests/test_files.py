@@ -1,25 +1,93 @@
 import os
 
-from copolicy.dataset.files import visible_files
+import pytest
+
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files import broken_links, distinct, distinct_files, on_visible_files, visible_files
 
 
-def test_links_are_entered_and_hidden_names_passed_over(tmp_path):
+@pytest.fixture
+def session(tmp_path):
+    """A folder with recordings, hidden and foreign files, and a linked folder from which a link leads back."""
     session, elsewhere = tmp_path / "session", tmp_path / "elsewhere"
     for path in (
         session / "a.mcap",
         session / "._a.mcap",
         session / ".trash" / "b.mcap",
+        session / "__MACOSX" / "a.mcap",
+        session / "notes.txt",
         elsewhere / "deep" / "c.mcap",
     ):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     os.symlink(elsewhere, session / "linked")
     os.symlink(session, elsewhere / "back")  # a circle
-    assert visible_files(session, "*.mcap") == [session / "a.mcap", session / "linked" / "deep" / "c.mcap"]
+    os.symlink("..", session / "up")
+    return session
 
 
-def test_a_folder_linked_twice_counts_once(tmp_path):
+@pytest.mark.parametrize("files", [visible_files, distinct_files])
+def test_links_are_entered_and_hidden_names_passed_over(session, files):
+    assert files(session, "*.mcap") == [session / "a.mcap", session / "linked" / "deep" / "c.mcap"]
+    assert files(session, "*.mcap", "*.txt")[-1] == session / "notes.txt"
+
+
+def test_a_linked_folder_itself_may_be_asked_for(session, tmp_path):
+    os.symlink(session, tmp_path / "name")
+    assert visible_files(tmp_path / "name", "a.mcap") == [tmp_path / "name" / "a.mcap"]
+    assert distinct_files(tmp_path / "name", "a.mcap") == [tmp_path / "name" / "a.mcap"]
+
+
+def test_a_folder_that_is_not_there_holds_nothing(tmp_path):
+    assert visible_files(tmp_path / "none", "*") == distinct_files(tmp_path / "none", "*") == []
+
+
+def test_a_file_counts_once_by_its_own_path(tmp_path):
     (tmp_path / "session" / "one").mkdir(parents=True)
-    (tmp_path / "session" / "one" / "a.mcap").touch()
-    os.symlink(tmp_path / "session" / "one", tmp_path / "session" / "two")
-    assert visible_files(tmp_path / "session", "*.mcap") == [tmp_path / "session" / "one" / "a.mcap"]
+    recording = tmp_path / "session" / "one" / "a.mcap"
+    recording.touch()
+    os.symlink(recording.parent, tmp_path / "session" / "all")
+    os.symlink(recording, tmp_path / "session" / "a.mcap")
+    os.link(recording, tmp_path / "session" / "one" / "b.mcap")
+    assert distinct_files(tmp_path / "session", "*.mcap") == [recording]
+    assert len(visible_files(tmp_path / "session", "*.mcap")) == 5
+    assert distinct([recording, tmp_path / "session" / "a.mcap"]) == [recording]
+
+
+def test_folders_that_link_to_each_other_end(tmp_path):
+    folders = [tmp_path / f"session-{number:02d}" for number in range(12)]
+    for folder in folders:
+        folder.mkdir()
+        (folder / "a.mcap").touch()
+        for other in folders:
+            os.symlink(other, folder / other.name)
+    assert distinct_files(tmp_path, "*.mcap") == [folder / "a.mcap" for folder in folders]
+
+
+def test_links_that_lead_nowhere_are_named(session):
+    os.symlink("gone.mcap", session / "lost.mcap")
+    os.symlink("/nowhere/session-2", session / "session-2")
+    os.symlink("ring", session / "ring")
+    assert session / "lost.mcap" in visible_files(session, "*.mcap")
+    assert session / "lost.mcap" in distinct_files(session, "*.mcap")
+    assert broken_links(session) == [session / "lost.mcap", session / "ring", session / "session-2"]
+
+
+def test_a_folder_that_cannot_be_read_is_no_empty_folder(session, monkeypatch):
+    scandir = os.scandir
+
+    def refused(path):
+        if str(path).endswith("deep"):
+            raise PermissionError(13, "Permission denied")
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    expected = "linked/deep: expected a folder that can be read, found Permission denied"
+    for files in (visible_files, distinct_files):
+        with pytest.raises(FileFormatError, match=expected):
+            files(session, "*.mcap")
+
+
+def test_foreign_code_does_not_find_hidden_files(session):
+    names = on_visible_files(lambda folder: sorted(path.name for path in folder.glob("*.mcap")))
+    assert names(session) == ["a.mcap"]

@@ -21,6 +21,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.features import state_vector
 from copolicy.dataset.log import read_episode, read_metadata
 from copolicy.dataset.messages.copolicy_pb2 import PlayerAction, TableState
+from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
 
 MAP = MapConfig((240.0, 120.0, 3.14), (960.0, 180.0), ((480.0, 300.0), (0.1 + 0.2, 420.0)), 45)
@@ -110,6 +111,7 @@ def test_meta_map_and_digest_come_back(recording):
         META, success=True, termination_reason="goal", duration_s=40 / 30, achieved_hz=29.97, late_ticks=3,
         quality_flags="slow,short", source_sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         route_class=episode.meta.route_class, replay_drift_px=episode.meta.replay_drift_px,
+        physics=physics_text(Physics()), obstacle_size=MAP.obstacle_size,
     )  # fmt: skip
     assert episode.meta == expected
     assert len(episode.meta.route_class) == 2

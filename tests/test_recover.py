@@ -94,6 +94,7 @@ def test_a_broken_recording_becomes_an_episode_up_to_its_last_complete_step(tmp_
         META, termination_reason="crash_recovered", quality_flags="slow_loop,recovered", duration_s=53 / 30,
         route_class=episode.meta.route_class, source_sha256=hashlib.sha256(output.read_bytes()).hexdigest(),
         achieved_hz=episode.meta.achieved_hz, late_ticks=1, replay_drift_px=episode.meta.replay_drift_px,
+        physics=truth.meta.physics, obstacle_size=MAP.obstacle_size,
     )  # fmt: skip
     assert episode.meta.achieved_hz == pytest.approx(30.0)
     assert episode.meta == expected

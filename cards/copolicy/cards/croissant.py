@@ -11,7 +11,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import EPISODE_COLUMNS
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
+from copolicy.dataset.files import visible_files
 
 from .artefacts import newest_release
 from .dataset_card import PAPER, licence
@@ -96,7 +97,7 @@ def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | Non
         "keywords": ["robotics", "LeRobot", "human-robot collaboration", *facts.values("source")],
         "distribution": [_repository(url), *_file_set(facts.root, "frames", "data"),
                          *_file_set(facts.root, "episodes", "meta/episodes")],
-        "recordSet": [_frames(facts), _episodes()],
+        "recordSet": [_frames(facts), _episodes(facts)],
     }  # fmt: skip
     stated = licence(facts)
     if stated not in ("unknown", "other"):
@@ -128,7 +129,7 @@ def _file_set(root: Path, name: str, folder: str) -> list[dict[str, Any]]:
     return [{**files, "includes": f"{folder}/*/*.parquet"}, *(
         {"@type": "cr:FileObject", "@id": place, "name": place, "contentUrl": place, **within,
          "contentSize": f"{path.stat().st_size} B", "sha256": _sha256(path)}
-        for path in sorted((root / folder).glob("*/*.parquet"))
+        for path in visible_files(root / folder, "*.parquet")
         for place in (path.relative_to(root).as_posix(),)
     )]  # fmt: skip
 
@@ -159,8 +160,9 @@ def _frames(facts: DatasetFacts) -> dict[str, Any]:
     }
 
 
-def _episodes() -> dict[str, Any]:
+def _episodes(facts: DatasetFacts) -> dict[str, Any]:
     columns = {"episode_index": "int", "length": "int", **EPISODE_COLUMNS}
+    columns = {name: kind for name, kind in columns.items() if name in facts.stored or name not in LATER_COLUMNS}
     return {
         "@type": "cr:RecordSet",
         "@id": "episodes",

@@ -3,7 +3,8 @@
 import re
 from collections.abc import Iterable
 
-from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.physics_text import physics_counts
 
 from .artefacts import newest_release
 from .datasheet import datasheet
@@ -119,11 +120,21 @@ def _overview(facts: DatasetFacts, title: str) -> str:
                     ("rate of the frames", f"{info['fps']:g} Hz"),
                     ("recorded time", f"{facts.seconds / 60:.1f} min"),
                     ("reached the goal", share(facts.successes, len(facts.episodes))),
+                    ("physics", _physics(facts)),
                     ("format", f"LeRobot {info['codebase_version']}"),
                 ),
             ),
         )
     )
+
+
+def _physics(facts: DatasetFacts) -> str:
+    try:
+        counts = physics_counts(episode["physics"] for episode in facts.episodes)
+    except InvalidValueError as error:
+        raise FileFormatError(facts.root, "episodes whose settings of the dynamics can be read", str(error)) from None
+    total = len(facts.episodes)
+    return "; ".join(f"{words} ({count} of {total} episodes)" for words, count in counts.items())
 
 
 def _episodes(facts: DatasetFacts) -> str:

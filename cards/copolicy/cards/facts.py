@@ -19,11 +19,13 @@ class DatasetFacts:
     Attributes:
         info: `meta/info.json`.
         episodes: one dict an episode with its episode columns and `length` (frames).
+        stored: the columns that meta/episodes has; a data set of an earlier version lacks some of `LATER_COLUMNS`.
     """
 
     root: Path
     info: dict[str, Any]
     episodes: tuple[dict[str, Any], ...]
+    stored: frozenset[str]
 
     @classmethod
     def read(cls, root: Path) -> "DatasetFacts":
@@ -39,7 +41,7 @@ class DatasetFacts:
         if len(episodes) != count or sum(folder.lengths) != frames:
             found = f"{len(episodes)} episodes with {sum(folder.lengths)} frames"
             raise FileFormatError(root / INFO_FILE, f"{count} episodes with {frames} frames in meta/episodes", found)
-        return cls(root, folder.info, episodes)
+        return cls(root, folder.info, episodes, frozenset(folder.episodes.column_names))
 
     def counts(self, column: str) -> dict[str, int]:
         """How many episodes have each value of a column, most frequent first."""

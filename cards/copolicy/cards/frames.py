@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
                 named = f"episode {episode['episode_index']} with {episode['length']} frames" if episode else "its end"
                 raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
             try:
-                config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode["map_set"]))
+                config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode))
             except CopolicyError as error:
                 raise FileFormatError(path, f"a map in episode {found[0]}", str(error)) from None
             yield EpisodeFrames(found[0], columns[STATE][start:end], columns[ACTION][start:end], config)
@@ -86,7 +87,7 @@ def _matrix(table: "pa.Table", key: str, path: Path) -> np.ndarray:
     return values
 
 
-def _obstacle_size(map_set: str) -> int:
-    # The observation has no room for it; all maps of a set have one size.
-    maps = MAP_SETS.get(map_set)
-    return maps[0].obstacle_size if maps else MapConfig.obstacle_size
+def _obstacle_size(episode: dict[str, Any]) -> int:
+    # In data sets of earlier versions no column tells it; all maps of a set have one size.
+    maps = MAP_SETS.get(episode["map_set"])
+    return episode["obstacle_size"] or (maps[0].obstacle_size if maps else MapConfig.obstacle_size)

@@ -12,6 +12,7 @@ from typing import Literal
 
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, OutputExistsError
+from copolicy.dataset.files import distinct_files
 from copolicy.dataset.log import read_episode, read_metadata
 
 from .episode_file import PART_SUFFIX
@@ -60,10 +61,10 @@ def recover(folder: Path | str, finished: bool = False, damaged: bool = False) -
     folder = Path(folder)
     if not folder.is_dir():
         raise InvalidValueError("folder of recordings", "a folder", str(folder))
-    parts = sorted(folder.rglob(f"*.mcap{PART_SUFFIX}"))
+    parts = distinct_files(folder, f"*.mcap{PART_SUFFIX}")
     found = [_try_recover(part) for part in progress(parts, len(parts), "broken off")]
     if finished or damaged:
-        files = sorted(folder.rglob("*.mcap"))
+        files = distinct_files(folder, "*.mcap")
         for file in progress(files, len(files), "finished"):
             try:
                 read_episode(file)

@@ -18,6 +18,7 @@ import numpy as np
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
+from copolicy.dataset.files import is_hidden
 from copolicy.dataset.task import MapConfig, Physics, identify
 from copolicy.dataset.task import map_set as maps_of
 
@@ -169,8 +170,8 @@ def _refuse_recordings(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise OutputExistsError(out)
     for pattern in ("*.mcap", f"*.mcap{PART_SUFFIX}"):
-        for found in sorted(out.glob(pattern)):
-            raise OutputExistsError(found)
+        for path in sorted(path for path in out.glob(pattern) if not is_hidden(path.name)):
+            raise OutputExistsError(path)
 
 
 def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict:

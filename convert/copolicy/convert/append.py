@@ -1,15 +1,16 @@
 """Adds recordings to a data set without rewriting what is there: new files beside the old ones."""
 
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.clock import Hold
+from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.lerobot_folder.info import INFO_FILE, read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
@@ -17,10 +18,13 @@ from copolicy.dataset.log import read_metadata
 from copolicy.dataset.staging import sync_folder, sync_tree
 
 from .lerobot_writer import RECORD_FILE
+from .linked_copy import add_later_columns, copy_as_links
+from .mixtures import Mixtures, converter_versions
 from .prepare import Conversion
 from .recordings import convert_recordings, find_recordings
 from .scene_video import SCENE
 from .shifted_tables import Place, Shift, numbered_files, read_table, write_like
+from .stored_rewards import foreign_rewards
 
 try:
     from lerobot.datasets.compute_stats import aggregate_stats
@@ -102,18 +106,23 @@ def append_recordings(
     if not new:
         return {**summary, "unfinished_recordings": unfinished}
     place = root.resolve()
+    rewards = foreign_rewards([root])
     with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
-        added, whole = Path(scratch) / "added", Path(scratch) / "whole"
+        added, whole = Path(scratch) / "added", Path(f"{scratch}.whole")
         try:
             written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
-            shutil.copytree(place, whole, copy_function=_link)
+            copy_as_links(place, whole)
+            columns_added = add_later_columns(whole)
             info = _join(whole, added)
+            mixtures = _mixtures(whole, rewards)
             sync_tree(whole)
+            _take_place(whole, place)
         except CopolicyError as error:
             # The folders in the making are gone when somebody reads this.
             error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
             raise
-        _take_place(whole, place)
+        finally:
+            shutil.rmtree(whole, ignore_errors=True)
     return {
         **summary,
         "episodes_added": written["episodes"],
@@ -123,6 +132,8 @@ def append_recordings(
         "damaged_left_out": written["damaged_left_out"],
         "discarded_left_out": written["discarded_left_out"],
         "unfinished_recordings": unfinished,
+        **({"columns_added": columns_added} if columns_added else {}),
+        **mixtures.summary(),
     }
 
 
@@ -135,6 +146,19 @@ def finish_interrupted(root: Path) -> None:
             shutil.rmtree(before)
         else:
             before.rename(root)
+
+
+def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
+    tables = [read_table(path) for path in numbered_files(whole / "meta" / "episodes").values()]
+    named = [[name for name in EPISODE_COLUMNS if name in table.column_names] for table in tables]
+    rows = [row for table, names in zip(tables, named, strict=True) for row in table.select(names).to_pylist()]
+    record = json.loads((whole / RECORD_FILE).read_text(encoding="utf-8"))
+    versions = converter_versions([record, *record["appended"]])
+    try:
+        mixtures = Mixtures.of(rows)
+    except InvalidValueError as error:
+        raise FileFormatError(whole, "episodes that say their physics", str(error)) from None
+    return replace(mixtures, mixed=[*mixtures.mixed, *versions, *rewards])
 
 
 def _join(whole: Path, added: Path) -> dict[str, Any]:
@@ -200,13 +224,6 @@ def _take_place(whole: Path, root: Path) -> None:
 
 def _before(root: Path) -> Path:
     return root.parent / f".{root.name}.before-append"
-
-
-def _link(source: str, target: str) -> None:
-    try:
-        os.link(source, target)
-    except OSError:  # a file system without hard links
-        shutil.copy2(source, target)
 
 
 def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import MissingExtraError
+from copolicy.dataset.files import on_visible_files
 
 from .shifted_tables import Shift
 
 try:
     from datasets import config
+    from lerobot.datasets import io_utils
     from lerobot.datasets.aggregate import aggregate_datasets
     from lerobot.datasets.compute_stats import aggregate_stats
     from lerobot.datasets.io_utils import load_stats, write_stats
@@ -55,15 +57,17 @@ def _moved_statistics(roots: Sequence[Path]) -> Iterator[dict[str, dict[str, Any
 @contextlib.contextmanager
 def _quiet(cache: Path) -> Iterator[None]:
     """LeRobot logs each of its steps, draws progress bars whether or not stderr is a terminal, and leaves a copy of
-    each table of episodes in the user's cache; here in one that goes away."""
+    each table of episodes in the user's cache, here in one that goes away. It takes hidden files for tables."""
     logger = logging.getLogger("lerobot")
     level, place = logger.level, config.HF_DATASETS_CACHE
     logger.setLevel(logging.WARNING)
     config.HF_DATASETS_CACHE = cache
+    load, io_utils.load_nested_dataset = io_utils.load_nested_dataset, on_visible_files(io_utils.load_nested_dataset)
     try:
         with contextlib.redirect_stderr(io.StringIO()):
             yield
     finally:
+        io_utils.load_nested_dataset = load
         config.HF_DATASETS_CACHE = place
         logger.setLevel(level)
         shutil.rmtree(cache, ignore_errors=True)

@@ -20,6 +20,7 @@ from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import RECORD_HZ
 
 from .frame_files import FrameFiles
+from .mixtures import Mixtures
 from .prepare import PreparedEpisode
 from .scene_video import SCENE, scene_encoder, scene_feature
 from .statistics import episode_statistics
@@ -51,10 +52,12 @@ class WrittenDataset:
     episodes: int
     frames: int
     successes: int
+    mixtures: Mixtures
 
     def summary(self) -> dict:
         """For the end of a command."""
-        return {**asdict(self), "root": str(self.root)}
+        facts = {name: value for name, value in vars(self).items() if name != "mixtures"}
+        return {**facts, "root": str(self.root), **self.mixtures.summary()}
 
 
 def write_dataset(
@@ -106,7 +109,8 @@ def write_dataset(
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
     successes = sum(row["success"] for row in rows)
-    return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
+    frames = rows[-1]["dataset_to_index"]
+    return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows))
 
 
 def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:

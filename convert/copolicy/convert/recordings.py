@@ -1,6 +1,7 @@
 """Converts folders of recordings, one MCAP file an episode, to a LeRobot v3 data set."""
 
 import functools
+import logging
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -11,6 +12,7 @@ from pathlib import Path
 from copolicy.dataset.clock import stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files import broken_links, distinct, distinct_files
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.staging import require_new
 
@@ -71,19 +73,29 @@ def convert_recordings(
 def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     """The recordings in `folders`, sorted by path within each, and the names of those that broke off (`.part`).
 
+    A recording counts once, whatever links lead to it. A link that leads nowhere is among the recordings where it has
+    the name of one, so that reading it says so; of any other there is a warning.
+
     Raises:
-        FileFormatError: a folder does not exist, or there is no recording in any.
+        FileFormatError: a folder does not exist or cannot be read, or there is no recording in any.
     """
     files: list[Path] = []
     unfinished: list[str] = []
+    lost: list[Path] = []
     for folder in folders:
         if folder.is_dir():
-            files += sorted(folder.rglob("*.mcap"))
-            unfinished += [part.name for part in sorted(folder.rglob("*.mcap.part"))]
+            files += distinct_files(folder, "*.mcap")
+            unfinished += [part.name for part in distinct_files(folder, "*.mcap.part")]
+            lost += [link for link in broken_links(folder) if not link.match("*.mcap")]
         elif folder.is_file():
             files.append(folder)
+        elif folder.is_symlink():
+            raise FileFormatError(folder, "a folder of recordings", "a link that leads nowhere")
         else:
             raise FileFormatError(folder, "a folder of recordings", "nothing there")
+    for link in lost:
+        logging.warning("warning: %s: a link that leads nowhere; what it led to is left out", link)
+    files = distinct(files)
     if not files:
         raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", "none")
     return files, unfinished

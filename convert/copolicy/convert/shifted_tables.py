@@ -95,16 +95,18 @@ def read_table(path: Path) -> "pa.Table":
         raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
 
 
-def write_like(table: "pa.Table", example: Path, path: Path) -> None:
-    """Writes a table with the columns, their order and their types, of another file.
+def write_like(table: "pa.Table", example: "Path | pa.Schema", path: Path) -> None:
+    """Writes a table with the columns, their order and their types, of another file or of a schema.
 
     Raises:
         FileFormatError: the other file has other columns.
     """
-    schema = pq.read_schema(example)
+    schema = pq.read_schema(example) if isinstance(example, Path) else example
     if sorted(schema.names) != sorted(table.column_names):
         differ = sorted(set(schema.names) ^ set(table.column_names))
-        raise FileFormatError(example, f"columns {', '.join(sorted(table.column_names)[:4])}, ...", f"not {differ[:4]}")
+        raise FileFormatError(
+            str(example), f"columns {', '.join(sorted(table.column_names)[:4])}, ...", f"not {differ[:4]}"
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table.select(schema.names).cast(schema), path, compression="snappy", use_dictionary=True)
 

@@ -1,6 +1,7 @@
 """Converts files of the original program to a LeRobot v3 data set: finds out which of its three formats they are."""
 
 import functools
+import logging
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ from copolicy.dataset.clock import Hold, stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files import broken_links, distinct_files
 from copolicy.dataset.staging import require_new
 
 from .prepare import Conversion, LeftOut, PreparedEpisode, admit, prepare_from
@@ -46,9 +48,16 @@ def open_upstream(path: Path) -> UpstreamSource:
     """
     if not path.is_dir():
         raise FileFormatError(path, "a folder of the original program's files", "no folder")
-    raw = sorted(path.rglob("trajectories/*.pkl"), key=_by_number)
-    processed = sorted((file for file in path.rglob("*.npz") if file.stem == file.parent.name), key=_by_number)
-    stores = [file.parents[2] for file in sorted(path.rglob("data/obs/.zarray"))]
+    files = distinct_files(path, "*")
+    for link in broken_links(path):
+        if link.suffix not in (".pkl", ".npz"):
+            logging.warning("warning: %s: a link that leads nowhere; what it led to is left out", link)
+    raw = sorted((file for file in files if file.match("trajectories/*.pkl")), key=_by_number)
+    processed = sorted(
+        (file for file in files if file.match("*.npz") and file.stem == file.parent.name), key=_by_number
+    )
+    folders = {folder for file in files for folder in file.parents if folder.match("data/obs")}
+    stores = [folder.parents[1] for folder in sorted(folders) if (folder / ".zarray").is_file()]
     found = {name: len(files) for name, files in (("raw", raw), ("processed", processed), ("zarr", stores)) if files}
     if len(found) != 1 or len(stores) > 1:
         layouts = "; ".join(f"{name}: {layout}" for name, layout in FORMATS.items())
@@ -144,4 +153,11 @@ def _by_number(file: Path) -> tuple:
 
 
 def _of_files(read: Callable[[Path, UpstreamOptions], Episode], files: list[Path], folder: Path) -> list[Reader]:
-    return [(file.relative_to(folder).as_posix(), functools.partial(read, file)) for file in files]
+    return [(file.relative_to(folder).as_posix(), functools.partial(_read_file, read, file)) for file in files]
+
+
+def _read_file(read: Callable[[Path, UpstreamOptions], Episode], file: Path, options: UpstreamOptions) -> Episode:
+    try:
+        return read(file, options)
+    except OSError as error:
+        raise FileFormatError(file, "a file that can be read", error.strerror or str(error)) from None

@@ -22,6 +22,7 @@ from copolicy.collect.world import TableWorld
 from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
 from copolicy.dataset.exclusions import FLAG
 from copolicy.dataset.features import theta_of
+from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.routes import route_class
 from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics, identify
 
@@ -31,6 +32,7 @@ ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 """Bounds on the angular acceleration that versions of the program used, rad/s^2."""
 
 _NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "https://github.com/eleyng/table-carrying-ai")
+_SAME = 1e-9  # px, rad: residuals that differ by rounding alone
 _MISSING_STEPS = 2  # a 10 Hz row stands for three steps, so that up to two may follow the last row
 
 
@@ -56,6 +58,7 @@ class Trajectory:
         actions: `(T, 4)` within [-1, 1].
         final_state: `(6,)`.
         residual: largest disagreement of a step with the dynamics, px or rad.
+        told: the physics was stated, or no other explains the rows as well.
     """
 
     states: np.ndarray
@@ -63,13 +66,17 @@ class Trajectory:
     final_state: np.ndarray
     physics: Physics
     residual: float
+    told: bool = True
 
 
 def best_fit(fit: Callable[[Physics], Trajectory], angular_limit: str) -> Trajectory:
     """The trajectory under the named angular limit, or under the one that leaves the smallest residual."""
     names = ANGULAR_LIMITS if angular_limit == "auto" else (angular_limit,)
     fits = [fit(Physics(angular_acceleration_limit=ANGULAR_LIMITS[name])) for name in names]
-    return min(fits, key=lambda trajectory: trajectory.residual)
+    best = min(fits, key=lambda trajectory: trajectory.residual)
+    # Rows that turn so little that no bound is reached follow from either.
+    others = [trajectory.residual for trajectory in fits if trajectory is not best]
+    return replace(best, told=all(residual > 2 * best.residual + _SAME for residual in others))
 
 
 def states_7(states: np.ndarray) -> np.ndarray:
@@ -156,9 +163,12 @@ def build_episode(
         quality_flags=",".join(flags),
         discarded=excluded,
         source_sha256=digest,
+        physics=physics_text(physics) if trajectory.told and "dynamics_mismatch" not in flags else "",
+        obstacle_size=config.obstacle_size,
     )
     limit = next(name for name, value in ANGULAR_LIMITS.items() if value == physics.angular_acceleration_limit)
-    notes = (f"from {origin}, angular limit {limit}", *notes)
+    doubt = "" if trajectory.told else ", which the rows do not tell"
+    notes = (f"from {origin}, angular limit {limit}{doubt}", *notes)
     episode = Episode(states, trajectory.actions, final_state, meta, config, fps, physics, notes)
     return replace(episode, meta=replace(meta, replay_drift_px=replay_drift(episode, physics)))
 

@@ -1,7 +1,7 @@
 """One recorded episode: what happened, on which map, and who did it with whom."""
 
 from dataclasses import dataclass, field, fields
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,6 +46,8 @@ class EpisodeMeta:
     license: str = ""
     software_version: str = ""
     source_sha256: str = ""
+    physics: str = ""  # see physics_text
+    obstacle_size: int = 0  # px, 0 where it is not known
 
     def __post_init__(self):
         for column in fields(self):
@@ -62,8 +64,19 @@ def _type_name(column) -> str:
 EPISODE_COLUMNS: dict[str, str] = {column.name: _type_name(column) for column in fields(EpisodeMeta)}
 """Name and type (`str`, `int`, `float`, `bool`) of every episode column, in order."""
 
-LATER_COLUMNS: tuple[str, ...] = ()
+LATER_COLUMNS: tuple[str, ...] = ("physics", "obstacle_size")
 """Episode columns that data sets of earlier versions lack; readers take the default of `EpisodeMeta` for them."""
+
+LATER_DEFAULTS: dict[str, Any] = {
+    column.name: column.default for column in fields(EpisodeMeta) if column.name in LATER_COLUMNS
+}
+"""Value of each of them in an episode of such a data set, or where a merge with one left nothing."""
+
+UNKNOWN_VALUES: dict[str, Any] = {
+    name: LATER_DEFAULTS.get(name, {"str": "", "int": -1, "float": float("nan"), "bool": False}[kind])
+    for name, kind in EPISODE_COLUMNS.items()
+}
+"""What stands for an empty entry of each episode column."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -18,6 +18,7 @@ from .episode import Episode
 from .exceptions import CopolicyError, FileFormatError
 from .mcap_records import MESSAGE_HEAD, RecordWalk, chunk_data, metadata_records, walk_chunk
 from .messages.copolicy_pb2 import PlayerAction, TableState
+from .physics_text import physics_text
 from .task import RECORD_HZ, MapConfig
 from .topics import ACTIONS, ENCODING, TABLE_STATE, Topic, schema_difference
 
@@ -36,7 +37,8 @@ def read_episode(path: Path | str) -> Episode:
 
     Reads the file once, one chunk at a time, decodes nothing but states and actions, and verifies all there is:
     the check sums of chunks, data section and summary, that every step from 0 has one state and two actions and
-    the last one a state after it, the metadata, and the map. `meta.source_sha256` is the digest of the file.
+    the last one a state after it, the metadata, and the map. `meta.source_sha256` is the digest of the file,
+    `meta.physics` and `meta.obstacle_size` are those of its record `physics` and of its map.
 
     Raises:
         FileFormatError: the file cannot be read, is damaged, incomplete, or no recording of this task.
@@ -156,7 +158,8 @@ class _Contents:
         if not (np.abs(actions) <= 1).all():
             raise FileFormatError(path, "actions in [-1, 1]", "others")
         states = _state_vectors(table)
-        meta = replace(meta, source_sha256=sha256)
+        seen = {"source_sha256": sha256, "physics": physics_text(physics), "obstacle_size": self._map.obstacle_size}
+        meta = replace(meta, **seen)
         return Episode(states[:-1], actions, states[-1], meta, self._map, RECORD_HZ, physics)
 
 

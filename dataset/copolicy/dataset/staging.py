@@ -96,7 +96,8 @@ def sync_tree(folder: Path) -> None:
     """
     for inside, _, names in os.walk(folder, topdown=False):
         for name in names:
-            _sync(Path(inside, name), _FILE)
+            if not Path(inside, name).is_symlink():
+                _sync(Path(inside, name), _FILE)
         sync_folder(Path(inside))
 
 

@@ -5,7 +5,7 @@ theta turns counter-clockwise on screen. Player 0 is the robot seat, player 1 th
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from .exceptions import InvalidValueError
 from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
@@ -62,6 +62,11 @@ class Physics:
             raise InvalidValueError("angular_acceleration_limit", "a positive number", self.angular_acceleration_limit)
         if self.step_limit < 1:
             raise InvalidValueError("step_limit", "at least 1", self.step_limit)
+        for name, value in asdict(self).items():
+            if not math.isfinite(value):
+                raise InvalidValueError(name, "a finite number", value)
+            if name in ("mass", "inertia") and not value > 0:
+                raise InvalidValueError(name, "a positive number", value)
 
     @property
     def dt(self) -> float:

@@ -5,8 +5,10 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 from lerobot.configs.train import TrainPipelineConfig
-from lerobot.datasets import LeRobotDatasetMetadata
+from lerobot.datasets import LeRobotDatasetMetadata, dataset_reader, io_utils
 from lerobot.scripts import lerobot_train
+
+from copolicy.dataset.files import on_visible_files
 
 from .epoch_order import WholeEpochSampler
 from .local_dataset import training_episodes
@@ -19,7 +21,7 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
     Raises:
         CopolicyError: the data set cannot be trained on.
     """
-    with _datasets_in_memory():
+    with _datasets_in_memory(), _hidden_files_passed_over():
         lerobot_train.train(config)
 
 
@@ -35,6 +37,17 @@ def _datasets_in_memory() -> Iterator[None]:
     finally:
         lerobot_train.make_train_eval_datasets = original
         lerobot_train.EpisodeAwareSampler = original_sampler
+
+
+@contextmanager
+def _hidden_files_passed_over() -> Iterator[None]:
+    # LeRobot takes every file in a folder of tables for one, also what macOS leaves beside them.
+    original = io_utils.load_nested_dataset
+    io_utils.load_nested_dataset = dataset_reader.load_nested_dataset = on_visible_files(original)
+    try:
+        yield
+    finally:
+        io_utils.load_nested_dataset = dataset_reader.load_nested_dataset = original
 
 
 def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:

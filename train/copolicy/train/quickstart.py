@@ -18,6 +18,7 @@ from time import perf_counter
 
 from copolicy.dataset.commandline import add_common_flags, run
 from copolicy.dataset.exceptions import MissingExtraError, OutputExistsError, RunError
+from copolicy.dataset.files import is_hidden
 
 REPO_ID = "local/quickstart"
 
@@ -64,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _quickstart(arguments: argparse.Namespace) -> dict:
     out: Path = arguments.out
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if out.exists() and (not out.is_dir() or not all(is_hidden(entry.name) for entry in out.iterdir())):
         raise OutputExistsError(out)
     out.mkdir(parents=True, exist_ok=True)
     started = perf_counter()

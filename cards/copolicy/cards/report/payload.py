@@ -24,7 +24,7 @@ FRAME_SCALES = {
 FRAME_BYTES = 6_000_000
 """Frames take at most this much of the page; a larger data set shows every second, third, ... frame."""
 
-_COLUMNS = (*EPISODE_COLUMNS, "episode_index", "length")
+_COLUMNS = (*(name for name in EPISODE_COLUMNS if name != "physics"), "episode_index", "length")
 
 
 def build_payload(

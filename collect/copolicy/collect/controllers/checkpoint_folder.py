@@ -4,6 +4,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files import is_hidden
 
 PRETRAINED = "pretrained"
 """In the place of a path: the model that comes with the package."""
@@ -52,4 +53,8 @@ def pretrained_folder() -> Path:
 
 
 def _found(path: Path) -> str:
-    return ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) if path.is_dir() else "no such folder"
+    return (
+        ", ".join(sorted(entry.name for entry in path.iterdir() if not is_hidden(entry.name))[:8])
+        if path.is_dir()
+        else "no such folder"
+    )

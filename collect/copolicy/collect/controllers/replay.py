@@ -15,6 +15,7 @@ class ReplayController:
 
     Attributes:
         map_config: the recording's map, on which alone this makes sense.
+        physics: what led from state to state in the recording.
     """
 
     is_person = False
@@ -27,6 +28,7 @@ class ReplayController:
         episode = read_episode(path)
         self.name = f"replay:{path.stem}"
         self.map_config = episode.map_config
+        self.physics = episode.physics
         self._actions = episode.actions
         self._seat = 0
         self._step = 0

@@ -1,11 +1,13 @@
 """The two players of a session: who they are, what they hold, what they agreed to."""
 
+import logging
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import MapConfig
+from copolicy.dataset.physics_text import physics_summary
+from copolicy.dataset.task import MapConfig, Physics
 
 from ..controllers import Controller, PersonController, PolicyController, ReplayController, ScriptedController
 from ..controllers.checkpoint import Checkpoint
@@ -110,6 +112,16 @@ def replayed_map(players: Iterable[Player]) -> MapConfig | None:
     if len(maps) > 1:
         raise InvalidValueError("pilots", "replays of one map", sorted(config.digest for config in maps))
     return maps.pop() if maps else None
+
+
+def say_other_physics(players: Iterable[Player], physics: Physics) -> None:
+    """Forces of an earlier recording move the table otherwise under another physics."""
+    for player in players:
+        if isinstance(player.controller, ReplayController):
+            recorded = replace(player.controller.physics, step_limit=physics.step_limit)
+            if recorded != physics:
+                words = (player.controller.name, physics_summary(recorded), physics_summary(physics))
+                logging.warning("warning: %s was recorded with %s, this session has %s", *words)
 
 
 def keyboard_half(name: int | str) -> KeyboardHalf | None:

@@ -17,7 +17,7 @@ from ..session import CollectionLock, SessionFolder
 from .application import Application
 from .game import Game
 from .phase import To
-from .player import default_pilots, make_players
+from .player import default_pilots, make_players, say_other_physics
 from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
@@ -60,6 +60,7 @@ def prepared(settings: PlaySettings) -> Iterator[Application]:
         players = make_players(settings.pair, settings.pilots or default_pilots(len(pads)), settings.consents)
         for player in players:
             stack.callback(player.controller.close)
+        say_other_physics(players, settings.physics)
         fixed = settings.fixed()
         folder = SessionFolder(settings.out, settings.pair, fixed, settings.episodes, settings.new_session)
         sounds = Sounds(settings.mute or settings.headless)

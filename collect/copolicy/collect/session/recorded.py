@@ -7,6 +7,7 @@ from pathlib import Path
 
 from copolicy.dataset import episode_records
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files import broken_links, distinct_files
 from copolicy.dataset.log import read_metadata
 
 PRACTICE = "practice"
@@ -35,7 +36,10 @@ class Recorded:
 
 def recordings(folder: Path) -> Iterator[Recorded]:
     """The complete recordings in a folder and all below it, by path; one that cannot be read is told and left out."""
-    for path in sorted(folder.rglob("*.mcap")):
+    for link in broken_links(folder):
+        if not link.match("*.mcap"):
+            logging.warning("not counted: %s: a link that leads nowhere", link)
+    for path in distinct_files(folder, "*.mcap"):
         try:
             records = read_metadata(path)
             result = records[episode_records.RESULT]

@@ -60,5 +60,6 @@ def _export(arguments: argparse.Namespace) -> dict:
         "episodes": len(source.rows),
         "discarded_left_out": source.left_out,
         "sources": source.facts()["sources"],
+        "physics": source.facts()["physics"],
         **written,
     }

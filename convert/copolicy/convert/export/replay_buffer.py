@@ -10,8 +10,8 @@ state (7) followed by the map (11). What a row means is the alignment:
               each observation is paired with the action that produced it.
 
 For `upstream` a data set at 30 Hz gives all of that exactly (every third step is kept, the store has 10 Hz). One at
-10 Hz holds neither the state one step on, which is integrated under the default physics, nor the step before, for
-which the action of the frame before stands in.
+10 Hz holds neither the state one step on, which is integrated under the episode's own physics (the default where it is
+not known), nor the step before, for which the action of the frame before stands in.
 """
 
 import json
@@ -86,14 +86,13 @@ def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[np.ndarray, np.
         kept = slice(None, None, RECORD_HZ // ZARR_HZ)
         states, actions, past = episode.next_states().astype(float)[kept], actions[kept], past[kept]
     elif alignment == "upstream":
-        states = _one_step_on(states, actions)
+        states = _one_step_on(states, actions, episode.physics)
     environment = np.tile(episode.environment.astype(float), (len(states), 1))
     return np.hstack((states, environment)), actions, past
 
 
-def _one_step_on(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+def _one_step_on(states: np.ndarray, actions: np.ndarray, physics: Physics) -> np.ndarray:
     """States `(T, 7)` one step of 1/30 s after `actions` began in `states`."""
-    physics = Physics()
     position, velocity = step_linear(states[:, :2], states[:, 4:6], actions, physics)
     theta, omega = step_angular(theta_of(states), states[:, 6], actions, physics)
     return states_7(np.column_stack((position, theta, velocity, omega)))

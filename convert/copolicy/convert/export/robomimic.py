@@ -15,6 +15,7 @@ import numpy as np
 
 from copolicy.dataset.exceptions import MissingExtraError
 from copolicy.dataset.staging import new_file
+from copolicy.dataset.task import Physics
 
 from .source import ExportEpisode, ExportSource
 
@@ -42,7 +43,8 @@ def export_robomimic(source: ExportSource, out: Path) -> dict[str, Any]:
             _write_demo(data.create_group(name), episode)
             for mask in _masks(source, episode):
                 masks[mask].append(name)
-        environment = {"env_name": _ENVIRONMENT, "type": _GYM, "env_kwargs": {"fps": source.fps}}
+        kwargs = {"fps": source.fps, **_physics_kwargs(source.physics)}
+        environment = {"env_name": _ENVIRONMENT, "type": _GYM, "env_kwargs": kwargs}
         data.attrs.update({"total": source.frames, "env_args": json.dumps(environment)})
         data.attrs["copolicy"] = json.dumps(source.facts())
         for mask, names in masks.items():
@@ -70,6 +72,14 @@ def _write_demo(group: h5py.Group, episode: ExportEpisode) -> None:
     for name, values in arrays.items():
         group.create_dataset(name, data=values)
     group.attrs.update({"num_samples": count, "episode_index": episode.index, **episode.meta})
+
+
+def _physics_kwargs(physics: Physics | None) -> dict[str, float]:
+    """What the environment must be told to go on as the episodes did; nothing where it does by default or no one
+    physics holds for all (the attribute `copolicy` says which do)."""
+    default = Physics().angular_acceleration_limit
+    limit = default if physics is None else physics.angular_acceleration_limit
+    return {} if limit == default else {"angular_acceleration_limit": limit}
 
 
 def _masks(source: ExportSource, episode: ExportEpisode) -> list[str]:

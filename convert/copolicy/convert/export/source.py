@@ -1,5 +1,6 @@
 """The episodes of a LeRobot v3 data set of this task, one after the other, for the exporters."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,12 +11,13 @@ import numpy as np
 
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, RunError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
 from copolicy.dataset.files import visible_files
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
+from copolicy.dataset.physics_text import physics_counts, physics_of
 from copolicy.dataset.task import RECORD_HZ, Physics
 
 from ..dynamics import integrate
@@ -35,6 +37,7 @@ class ExportEpisode:
         rewards: `(T,)` float32.
         meta: its episode columns.
         fps: frames a second.
+        physics: what led from state to state; the default where the data set does not say.
     """
 
     index: int
@@ -45,6 +48,7 @@ class ExportEpisode:
     rewards: np.ndarray
     meta: dict[str, Any]
     fps: int
+    physics: Physics
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -53,13 +57,14 @@ class ExportEpisode:
         """`(7,)` float32, the state that the last action led to.
 
         The data set ends with the last action, so that it is integrated from the last state over the steps that
-        `duration_s` leaves for the last frame, under the default physics.
+        `duration_s` leaves for the last frame, under the episode's own physics.
         """
         step = stride(self.fps)
-        steps = round(self.meta["duration_s"] * RECORD_HZ) - step * (len(self) - 1)
+        seconds = self.meta["duration_s"]
+        steps = round(seconds * RECORD_HZ) - step * (len(self) - 1) if math.isfinite(seconds) else step
         x, y, _, _, vx, vy, omega = self.states[-1].astype(float).tolist()
         held = np.repeat(self.actions[-1:].astype(float), min(max(steps, 1), step), axis=0)
-        after = integrate((x, y, float(theta_of(self.states[-1]))), (vx, vy, omega), held, Physics())
+        after = integrate((x, y, float(theta_of(self.states[-1]))), (vx, vy, omega), held, self.physics)
         return states_7(after[-1]).astype(np.float32)
 
     def next_states(self) -> np.ndarray:
@@ -107,6 +112,11 @@ class ExportSource:
         splits = {name: _range(text, root) for name, text in (info.get("splits") or {}).items()}
         stride(fps)
         rows = folder.rows()
+        for row in rows:
+            try:
+                physics_of(row["physics"])
+            except InvalidValueError as error:
+                raise FileFormatError(root, f"the settings of episode {row['episode_index']}", str(error)) from None
         kept = tuple(row for row in rows if keep_discarded or not row["discarded"])
         if not kept:
             raise RunError(f"{root}: expected an episode to export, found {len(rows)}, all discarded")
@@ -129,7 +139,14 @@ class ExportSource:
             "sources": dict(sorted(sources.items())),
             "simulated": bool(sources["simulated"]),
             "licenses": licenses,
+            "physics": physics_counts(row["physics"] for row in self.rows),
         }
+
+    @property
+    def physics(self) -> Physics | None:
+        """The settings that led from state to state in all exported episodes; None where they differ or are unknown."""
+        settings = {physics_of(row["physics"]) for row in self.rows}
+        return next(iter(settings)) if len(settings) == 1 else None
 
     def episodes(self) -> Iterator[ExportEpisode]:
         """The exported episodes in order; one data file is in memory at a time.
@@ -167,8 +184,9 @@ def _range(text: str, root: Path) -> range:
 def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int) -> ExportEpisode:
     meta = {name: row[name] for name in EPISODE_COLUMNS}
     return ExportEpisode(
-        index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta, fps
-    )
+        index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta,
+        fps, physics_of(row["physics"]) or Physics(),
+    )  # fmt: skip
 
 
 def _frames(path: Path) -> dict[str, np.ndarray]:

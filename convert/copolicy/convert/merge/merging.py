@@ -7,17 +7,21 @@ its type. The content of every episode is then compared with what it was.
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError, RunError
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.staging import new_folder, require_new
 from copolicy.dataset.versions.content import Content, read_content
 
 from ..joined_sets import join_data_sets
 from ..lerobot_writer import RECORD_FILE
+from ..mixtures import Mixtures, converter_versions
 from ..shifted_tables import numbered_files, read_table
+from ..stored_rewards import foreign_rewards
 from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
 from .source import MergeSource, require_alike
 
@@ -68,6 +72,7 @@ def merge_datasets(
         for place, source in enumerate(sources)
     ]
     expected = _joined(sources, tables)
+    mixtures = _mixtures(expected, sources)
     with new_folder(root) as partial:
         join_data_sets(roots, repo_id, partial, partial.with_name(f"{partial.name}.cache"))
         _restore_episodes(partial, expected)
@@ -83,13 +88,25 @@ def merge_datasets(
         "episodes": len(content.episodes),
         "frames": sum(episode.frames for episode in content.episodes),
         "excluded": sum(bool(mark) for mark in expected.column("discarded").to_pylist()),
+        **mixtures.summary(),
         "content_hash": content.hash,
         "left_behind": left_behind,
     }
 
 
+def _mixtures(episodes: "pa.Table", sources: Sequence[MergeSource]) -> Mixtures:
+    named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
+    try:
+        mixtures = Mixtures.of(episodes.select(named).to_pylist())
+    except InvalidValueError as error:
+        roots = ", ".join(str(source.root) for source in sources)
+        raise FileFormatError(roots, "episodes that say their physics", str(error)) from None
+    versions = converter_versions([source.record for source in sources])
+    return replace(mixtures, mixed=[*mixtures.mixed, *versions, *foreign_rewards([source.root for source in sources])])
+
+
 def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa.Table":
-    """All rows of meta/episodes as they were, with null where a data set lacks a column."""
+    """All rows of meta/episodes as they were; where a data set lacks a column, null or what a later column is then."""
     types = {field.name: field.type for field in tables[0].schema}
     for source, table in zip(sources, tables, strict=True):
         for field in table.schema:
@@ -105,7 +122,7 @@ def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa
                 {
                     name: table.column(name).cast(kind)
                     if name in table.column_names
-                    else pa.nulls(table.num_rows, kind)
+                    else pa.array([LATER_DEFAULTS.get(name)] * table.num_rows, kind)
                     for name, kind in types.items()
                 }
             )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import EPISODE_COLUMNS
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.json_file import read_json
 from copolicy.dataset.lerobot_folder.info import read_info
@@ -58,7 +58,7 @@ class MergeSource:
             episodes = pa.concat_tables(tables, promote_options="permissive").sort_by("episode_index")
         except pa.ArrowException as error:
             raise FileFormatError(root / "meta" / "episodes", "files with the same columns", str(error)) from None
-        missing = [name for name in EPISODE_COLUMNS if name not in episodes.column_names]
+        missing = [name for name in EPISODE_COLUMNS if name not in {*episodes.column_names, *LATER_COLUMNS}]
         if missing:
             raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
         path = root / RECORD_FILE

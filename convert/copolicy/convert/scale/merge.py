@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
+from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.staging import new_folder, require_new
 
 from ..lerobot_writer import RECORD_FILE, WrittenDataset
+from ..mixtures import Mixtures
 from ..prepare import LeftOut
 from ..shifted_tables import numbered_files, read_table
 from .aggregation import aggregate
@@ -50,13 +52,13 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         if plan.statistics:
             _write_statistics(partial)
         tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
-        successes = sum(sum(table.column("success").to_pylist()) for table in tables)
+        rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
     document = json.dumps([finding.to_dict() for finding in findings], indent=1)
     (plan.folder / FINDINGS_FILE).write_text(document + "\n", encoding="utf-8")
     conversion = plan.conversion
     written = WrittenDataset(
         plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
-        successes,
+        sum(row["success"] for row in rows), Mixtures.of(rows),
     )  # fmt: skip
     counts = Counter(finding.severity for finding in findings)
     return {

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files import is_hidden
 
 from ..prepare import Conversion
 
@@ -82,7 +83,7 @@ class ShardPlan:
 
     def digest(self, rank: int) -> str:
         """Of all that a shard depends on; a recording is known by its path, size and time of change."""
-        files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in self.files_of(rank)]
+        files = [(str(path), *_state(path)) for path in self.files_of(rank)]
         return hashlib.sha256(json.dumps([self.options, files], sort_keys=True).encode()).hexdigest()
 
     def record(self, rank: int) -> dict[str, Any] | None:
@@ -102,7 +103,9 @@ class ShardPlan:
         stored = self.folder / OPTIONS_FILE
         if stored.is_file():
             self._compare(stored, json.loads(json.dumps(self.options)))
-        elif self.folder.is_dir() and any(entry.name != LOCK_FILE for entry in self.folder.iterdir()):
+        elif self.folder.is_dir() and any(
+            entry.name != LOCK_FILE and not is_hidden(entry.name) for entry in self.folder.iterdir()
+        ):
             raise FileFormatError(self.folder, "a new folder, or one with the shards of this call", "another")
 
     def prepare(self) -> int:
@@ -140,6 +143,15 @@ class ShardPlan:
                 f"{options.get(name)!r} (finish that call first, or give another --shards)",
                 found.get(name),
             )
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """Size and time of change; of a link that leads nowhere neither, which whoever reads the recording says."""
+    try:
+        status = path.stat()
+    except OSError:
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
 
 
 def absolute(files: Sequence[Path]) -> tuple[Path, ...]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
+from ..files import broken_links, distinct_files
 from . import (
     balance,
     check_sums,
@@ -18,6 +19,7 @@ from . import (
     leakage,
     loading,
     maps,
+    mixtures,
     motion,
     schema,
     timing,
@@ -41,6 +43,7 @@ RULES: tuple[Rule, ...] = (
     *balance.RULES,
     *consent.RULES,
     *leakage.RULES,
+    *mixtures.RULES,
 )
 """Every rule, in the order of the report."""
 
@@ -87,8 +90,10 @@ def read_table(root: Path) -> EpisodeTable:
         from .read_lerobot import read_lerobot
 
         return read_lerobot(root)
-    if not root.is_dir() or next(root.rglob("*.mcap*"), None) is None:
-        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", "neither")
+    if not distinct_files(root, "*.mcap", "*.mcap.part"):
+        broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)]
+        found = broken[0] if broken else "neither"
+        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
     return read_recordings(root)
 
 

@@ -35,6 +35,9 @@ def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
     smallest, largest = smallest[:, 0], largest[:, 1]
     if table.obstacle_sizes is not None:
         smallest = largest = table.obstacle_sizes.astype(float)
+    elif "obstacle_size" in table.columns:
+        stored = table.of_framed("obstacle_size").astype(float)
+        smallest, largest = (np.where(stored > 0, stored, guessed) for guessed in (smallest, largest))
     deepest = np.full(len(table.starts), -np.inf)
     nearest = np.full(len(table.starts), np.inf)
     error = 0.0

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..episode import EPISODE_COLUMNS, LATER_COLUMNS
+from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
@@ -18,7 +18,6 @@ from .finding import Finding
 CLOCK = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 """The columns of the frames that LeRobot itself adds."""
 
-_UNKNOWN: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
 _POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 
 
@@ -84,10 +83,10 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
                 message = f"meta/episodes has no column {name}, without which LeRobot loads no episode"
                 damage.append(Finding("", "schema", None, None, "error", message))
             elif name in LATER_COLUMNS:
-                columns[name] = np.full(meta.num_rows, _UNKNOWN[EPISODE_COLUMNS[name]])
+                columns[name] = np.full(meta.num_rows, UNKNOWN_VALUES[name])
             continue
         kind = EPISODE_COLUMNS.get(name, "int")
-        unknown = None if name in _POSITIONS else _UNKNOWN[kind]
+        unknown = UNKNOWN_VALUES.get(name)
         try:
             columns[name] = scalars(meta.column(name), kind, unknown)
         except ColumnError as error:

@@ -9,6 +9,7 @@ from ..commandline import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
+from ..files import broken_links, distinct_files
 from ..log import read_episode
 from ..task import RECORD_HZ
 from .episode_table import COLUMN_TYPES, EpisodeTable
@@ -17,14 +18,19 @@ from .finding import Finding
 
 def read_recordings(root: Path) -> EpisodeTable:
     """Every `*.mcap` below a folder; a file that fails its check sums becomes a finding, as does one that broke off."""
-    paths = sorted(root.rglob("*.mcap"))
+    paths = distinct_files(root, "*.mcap")
     episodes: list[Episode] = []
     labels: list[str] = []
     damage = [
         Finding(path.relative_to(root).as_posix(), "unfinished", None, None, "warning",
                 "a recording that broke off; copolicy-collect recover makes it readable")
-        for path in sorted(root.rglob("*.mcap.part"))
+        for path in distinct_files(root, "*.mcap.part")
     ]  # fmt: skip
+    damage += [
+        Finding(path.relative_to(root).as_posix(), "check_sum", None, None, "error", "a link that leads nowhere")
+        for path in broken_links(root)
+    ]
+    paths = [path for path in paths if path.exists()]
     for path in progress(paths, len(paths), "reading"):
         label = path.relative_to(root).as_posix()
         try:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, OutputExistsError, RunError
+from ..files import visible_files
 from ..versions.content import read_content
 from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release
@@ -67,7 +68,8 @@ def _verify(folder: Path, name: str) -> tuple[ReleaseRecord, int]:
         if (folder / RAW_MANIFEST_FILE).exists():
             recordings = Manifest.read(folder / RAW_MANIFEST_FILE)
             found = {
-                file.relative_to(folder).as_posix(): file_entry(file) for file in (folder / RAW_FOLDER).rglob("*.mcap")
+                file.relative_to(folder).as_posix(): file_entry(file)
+                for file in visible_files(folder / RAW_FOLDER, "*.mcap")
             }
             differences += recordings.differences(Manifest(found))
             files += len(recordings.files) + 1

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
+from ..files import distinct_files
 from ..lerobot_folder.folder import LeRobotFolder
 from ..versions.manifest import FileEntry, Manifest, file_entry
 
@@ -31,7 +32,7 @@ def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
         FileFormatError: no recording in `folder`.
         RunError: an episode's recording is not among them.
     """
-    paths = sorted(folder.rglob("*.mcap"))
+    paths = distinct_files(folder, "*.mcap")
     if not paths:
         raise FileFormatError(folder, "recordings (*.mcap)", "none")
     wanted = _sources(root)
@@ -40,6 +41,8 @@ def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
     left_out = []
     found = set()
     for path in paths:
+        if not path.exists():
+            raise FileFormatError(path, "a recording", "a link that leads nowhere")
         entry = file_entry(path)
         if entry.sha256 in wanted and entry.sha256 not in found:
             name = f"{RAW_FOLDER}/{path.relative_to(folder).as_posix()}"

@@ -1,13 +1,13 @@
 """A LeRobot v3 data set folder: what every reader of one goes through first."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, EpisodeMeta
+from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
@@ -16,8 +16,6 @@ from .tables import column_types, damaged, episode_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 """The columns of meta/episodes that say which rows of the frames an episode has."""
-_UNKNOWN: dict[str, Any] = {"str": "", "float": float("nan"), "int": -1, "bool": False}
-_DEFAULTS = {column.name: column.default for column in fields(EpisodeMeta)}
 
 
 @dataclass(frozen=True)
@@ -80,8 +78,8 @@ class LeRobotFolder:
         return files
 
     def rows(self, columns: Sequence[str] = tuple(EPISODE_COLUMNS)) -> list[dict[str, Any]]:
-        """`episode_index`, `length` and some episode columns of each episode; an empty entry is what stands for
-        unknown: an empty text, NaN, -1 or False.
+        """`episode_index`, `length` and some episode columns of each episode; an empty entry is the one of
+        `UNKNOWN_VALUES`.
 
         Raises:
             FileFormatError: a column is missing or holds something else.
@@ -92,11 +90,11 @@ class LeRobotFolder:
             raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
         values: dict[str, list[Any]] = {name: self.episodes.column(name).to_pylist() for name in POSITIONS[:2]}
         for name in columns:
-            kind = EPISODE_COLUMNS[name]
             if name in self.episodes.column_names:
-                values[name] = episode_values(self.episodes, name, kind, path, _UNKNOWN[kind]).tolist()
+                kind, unknown = EPISODE_COLUMNS[name], UNKNOWN_VALUES[name]
+                values[name] = episode_values(self.episodes, name, kind, path, unknown).tolist()
             else:
-                values[name] = [_DEFAULTS[name]] * self.episodes.num_rows
+                values[name] = [UNKNOWN_VALUES[name]] * self.episodes.num_rows
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
     def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:

@@ -14,9 +14,9 @@ from .trajectories import EpisodeRow, Trajectories
 
 _EPISODE_COLUMNS = (
     "episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class",
-    "discarded",
+    "discarded", "obstacle_size",
 )  # fmt: skip
-_OBSTACLE_SIZE = 50  # px; of a map that is in no set, whose obstacles' size a data set does not tell
+_OBSTACLE_SIZE = 50  # px; of a map in no set, in a data set of an earlier version, which does not tell
 
 
 def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectories, dict[str, int]]:
@@ -83,7 +83,8 @@ def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _row(root: Path, row: dict[str, Any], environment: np.ndarray, split: str) -> EpisodeRow:
-    size = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
+    guessed = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
+    size = row["obstacle_size"] or guessed
     try:
         config = map_of(environment, size)
     except CopolicyError as error:

@@ -2,13 +2,13 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
 from ..exceptions import FileFormatError
+from ..files import is_hidden, visible_files
 from ..json_file import parse_json, read_json
 from .canonical import digest
 
@@ -46,8 +46,9 @@ class Manifest:
     def of_folder(cls, root: Path) -> "Manifest":
         """Hashes the files of a folder, without the manifest itself and without what belongs to no data set.
 
-        Those are hidden files and folders (`.cache`, `.gitattributes`); `images/`, where LeRobot keeps pictures until
-        they are encoded; and `raw/`, the recordings behind a data set, which have a manifest of their own.
+        Those are hidden files and folders (`.cache`, `.gitattributes`, `._NAME` of macOS); `images/`, where LeRobot
+        keeps pictures until they are encoded; and `raw/`, the recordings behind a data set, which have a manifest of
+        their own.
         """
         return cls({name: file_entry(root / name) for name in data_set_files(root)})
 
@@ -103,18 +104,21 @@ class Manifest:
 
 def data_set_files(root: Path) -> list[str]:
     """What `Manifest.of_folder` hashes, sorted."""
-    names = []
-    for folder, folders, files in os.walk(root):
-        inside = Path(folder).relative_to(root)
-        folders[:] = [
-            name for name in folders if not name.startswith(".") and (inside / name).as_posix() not in _NO_DATA
-        ]
-        names += [(inside / name).as_posix() for name in files if not name.startswith(".")]
+    paths = (path for path in root.iterdir() if not is_hidden(path.name) and path.name not in _NO_DATA)
+    files = [file for path in paths for file in (visible_files(path, "*") if path.is_dir() else [path])]
+    names = (file.relative_to(root).as_posix() for file in files)
     return sorted(name for name in names if name != MANIFEST_FILE)
 
 
 def file_entry(path: Path) -> FileEntry:
-    """Size and sha256 of a file, read once."""
+    """Size and sha256 of a file, read once.
+
+    Raises:
+        FileFormatError: it is a link that leads nowhere.
+        OSError: it cannot be read.
+    """
+    if path.is_symlink() and not path.exists():
+        raise FileFormatError(path, "a file", "a link that leads nowhere")
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
         return FileEntry(file.tell(), sha256)

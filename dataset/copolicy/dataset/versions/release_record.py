@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from ..exceptions import FileFormatError, UnknownNameError
+from ..files import visible_files
 from ..json_file import read_json
 from .content import Content, ContentFields
 from .data_version import DataVersion
@@ -98,6 +99,6 @@ def read_release(root: Path, version: str | None = None) -> ReleaseRecord:
         return newest
     path = root / EARLIER_FOLDER / f"{wanted}.json"
     if not path.exists():
-        earlier = [file.stem for file in (root / EARLIER_FOLDER).glob("*.json")]
+        earlier = [file.stem for file in visible_files(root / EARLIER_FOLDER, "*.json")]
         raise UnknownNameError(f"release of {root}", wanted, [newest.version, *earlier])
     return ReleaseRecord.read(path)

@@ -1,0 +1,60 @@
+"""What a data set mixes: said when it is made, before somebody takes unlike episodes for alike."""
+
+import logging
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from copolicy.dataset.physics_text import physics_counts
+
+_COLUMNS = ("source", "software_version", "license")
+
+
+@dataclass(frozen=True)
+class Mixtures:
+    """Of the episodes of one data set.
+
+    Attributes:
+        physics: episodes by their settings of the dynamics, in words.
+        mixed: a line for each thing that is not the same in all episodes.
+    """
+
+    physics: dict[str, int]
+    mixed: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, rows: Iterable[Mapping[str, Any]]) -> "Mixtures":
+        """From the episode columns of each episode.
+
+        Raises:
+            InvalidValueError: the column `physics` of an episode cannot be read.
+        """
+        rows = list(rows)
+        counts: dict[str, Mapping[str, int]] = {"physics": physics_counts(row.get("physics") for row in rows)}
+        for name in _COLUMNS:
+            counts[name] = Counter(str(row.get(name) or "none") for row in rows)
+        sizes: dict[str, Counter[str]] = {}
+        for row in rows:
+            if size := row.get("obstacle_size"):
+                sizes.setdefault(str(row.get("map_set") or "none"), Counter())[f"{size} px"] += 1
+        counts |= {f"obstacles of map set {name}": found for name, found in sizes.items()}
+        lines = [f"{name}: {_listed(found)}" for name, found in counts.items() if len(found) > 1]
+        return cls(dict(counts["physics"]), lines)
+
+    def summary(self) -> dict[str, Any]:
+        """For the end of a command, which says on stderr, too, what changes the motion itself."""
+        for line in self.mixed:
+            if line.startswith(("physics", "obstacles", "rewards")):
+                logging.warning("warning: this data set mixes %s", line)
+        return {"physics": self.physics, **({"mixed": self.mixed} if self.mixed else {})}
+
+
+def converter_versions(records: Iterable[Mapping[str, Any]]) -> list[str]:
+    """A line where several versions of the converter made a data set, from its records `meta/copolicy.json`."""
+    counts = Counter(str(record["version"]) for record in records if "version" in record)
+    return [f"converted by versions {', '.join(sorted(counts))}"] if len(counts) > 1 else []
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    return "; ".join(f"{count} {'episode' if count == 1 else 'episodes'} {name}" for name, count in counts.items())
