@@ -236,7 +236,7 @@ def test_a_map_that_is_not_what_was_written_is_refused(tmp_path, whole):
 def test_other_files_are_refused(tmp_path):
     part = tmp_path / "notes.mcap.part"
     part.write_bytes(b"not an MCAP file at all")
-    with pytest.raises(FileFormatError, match="metadata and map, found another beginning at byte 8"):
+    with pytest.raises(FileFormatError, match="metadata and map, found a text file"):
         recover_file(part)
     with pytest.raises(InvalidValueError, match="folder of recordings: expected a folder, found"):
         recover(tmp_path / "none")

@@ -120,6 +120,7 @@ def append_recordings(
         "damaged_left_out": written["damaged_left_out"],
         "discarded_left_out": written["discarded_left_out"],
         "unfinished_recordings": unfinished,
+        "not_verified": written["not_verified"],
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from copolicy.dataset import episode_records
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.log import read_metadata
+from copolicy.dataset.recording_checks import require_version
 
 PRACTICE = "practice"
 """Quality flag of an episode to try things out; it is marked discarded too."""
@@ -38,6 +39,7 @@ def recordings(folder: Path) -> Iterator[Recorded]:
     for path in sorted(folder.rglob("*.mcap")):
         try:
             records = read_metadata(path)
+            require_version(path, records)
             result = records[episode_records.RESULT]
             players, flags = records["players"], result["quality_flags"].split(",")
             yield Recorded(
@@ -52,4 +54,5 @@ def recordings(folder: Path) -> Iterator[Recorded]:
         except FileFormatError as error:
             logging.warning("not counted: %s", error)
         except KeyError as error:
-            logging.warning("not counted: %s: expected the metadata of a recording, found no %s", path, error)
+            message = "not counted: %s: expected a recording of this task, found no metadata entry %s"
+            logging.warning(message, path, error)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError
+from ..file_kinds import kind_of
 from . import (
     balance,
     check_sums,
@@ -84,7 +85,7 @@ def read_table(root: Path) -> EpisodeTable:
 
         return read_lerobot(root)
     if not root.is_dir() or next(root.rglob("*.mcap*"), None) is None:
-        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", "neither")
+        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", kind_of(root))
     return read_recordings(root)
 
 
