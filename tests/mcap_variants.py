@@ -160,7 +160,7 @@ def _library(change=lambda records: records, **options):
 def _by_topic(records: list[McapRecord]) -> list[McapRecord]:
     messages = [record for record in records if isinstance(record, Message)]
     end = [record for record in records if isinstance(record, Metadata) and record.name == "episode_result"]
-    others = [record for record in records if record not in messages and record not in end]
+    others = [r for r in records if not isinstance(r, Message) and getattr(r, "name", "") != "episode_result"]
     return others + sorted(messages, key=lambda message: message.channel_id) + end
 
 
