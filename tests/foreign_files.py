@@ -54,9 +54,10 @@ def _zarr(path: Path, version: int, **arrays) -> Path:
     return path
 
 
-def _store(path: Path, version: int = 2) -> Path:
-    """A store with the right names and shapes, of zeros."""
-    arrays = {"data__obs": np.zeros((9, 18)), "data__action": np.zeros((9, 4)), "data__past_action": np.zeros((9, 4))}
+def _store(path: Path, version: int = 2, value: float = 1.0) -> Path:
+    """A store with the right names and shapes, of one value; of zeros no chunk is stored."""
+    widths = {"data__obs": 18, "data__action": 4, "data__past_action": 4}
+    arrays = {name: np.full((9, width), value) for name, width in widths.items()}
     return _zarr(path, version, **arrays, meta__episode_ends=np.array([9]))
 
 
@@ -92,6 +93,11 @@ def _folder_of(folder: Path, build: Build, name: str) -> Path:
     folder.mkdir(exist_ok=True)
     build(folder / name)
     return folder
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
 
 
 def _fifo(path: Path) -> Path:
@@ -147,7 +153,7 @@ FOLDERS: dict[str, Build] = {
         d / "a.zarr", 3, data__obs=np.zeros((9, 7)), data__action=np.zeros((9, 2)),
         data__past_action=np.zeros((9, 2)), meta__episode_ends=np.array([9]),
     ),
-    "zarr of zeros": lambda d: _store(d / "a.zarr", 3),
+    "zarr of zeros": lambda d: _store(d / "a.zarr", 3, 0.0),
     "zarr of numbers alone": lambda d: _zarr(
         d / "a.zarr", 2, data__obs=np.float64(1), data__action=np.float64(1), data__past_action=np.float64(1),
         meta__episode_ends=np.float64("nan"),
@@ -165,7 +171,7 @@ FOLDERS: dict[str, Build] = {
     "pickles of anything": lambda d: _bytes(d / "trajectories" / "ep_1.pkl", pickle.dumps([[1, "x", None]])).parent,
     "pickles that open": lambda d: _bytes(d / "trajectories" / "ep_1.pkl", pickle.dumps([Opens(d / "ran")])).parent,
     "empty pickles": lambda d: _bytes(d / "trajectories" / "ep_1.pkl", b"").parent,
-    "folder in place of a pickle": lambda d: _folder_of(d / "trajectories", lambda p: p.mkdir(), "ep_1.pkl"),
+    "folder in place of a pickle": lambda d: _folder_of(d / "trajectories", _folder, "ep_1.pkl"),
 }  # fmt: skip
 """Folders."""
 

@@ -1,54 +1,35 @@
-"""Files that are not what a command takes, through every command that takes a path: one line and exit status 1 or 2.
+"""Files that are not what a command takes, and damaged ones that are, through every command that takes a path: one line
+and exit status 1 or 2.
 
-uv run python tests/benchmarks/foreign_sweep.py --copies 20
+uv run python tests/benchmarks/foreign_sweep.py --copies 200
 """
 
 import argparse
+import shutil
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from damaged_files import damage_one, sound
 from foreign_files import FOREIGN
 from reading_commands import COMMANDS, call
 
+from copolicy.collect.episode_job import record_episode
+from copolicy.collect.pilots import simulated_pair
+from copolicy.collect.wall_clock import WallClockAnchor
 from copolicy.dataset.commandline import progress
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.task import MAP_SETS
 
-SOUND = {
-    *((command, kind) for command in ("collect recover",) for kind in (
-        "empty folder", "folder of text", "folder of hdf5", "npz of other keys", "npz of other shapes",
-        "npz of objects", "npz that is text", "recordings of another project", "lerobot of another task",
-        "zarr v2 of another project", "zarr v3 of another project", "zarr without arrays", "zarr of other widths",
-        "zarr of zeros", "zarr of numbers alone", "zarr with a broken chunk", "zarr with broken metadata",
-        "zarr of an unknown compressor", "pickles of anything", "pickles that open", "empty pickles",
-        "folder in place of a pickle", "folder named mcap",
-    )),
-}  # fmt: skip
+SOUND = {("collect recover", kind) for kind in ("empty folder", "recordings of another project")}
 """Calls that rightly pass: nothing below these folders broke off."""
-
-
-def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """One of: bits flipped, cut, a run of zeros, a run removed, bytes from elsewhere in the file."""
-    copy = bytearray(content)
-    kind, begin, length = int(rng.integers(5)), int(rng.integers(len(copy))), int(rng.integers(1, 200))
-    if kind == 0:
-        for place in rng.integers(len(copy), size=int(rng.integers(1, 9))):
-            copy[place] ^= 1 << int(rng.integers(8))
-    elif kind == 1:
-        del copy[begin:]
-    elif kind == 2:
-        copy[begin : begin + length] = bytes(len(copy[begin : begin + length]))
-    elif kind == 3:
-        del copy[begin : begin + length]
-    else:
-        other = int(rng.integers(len(copy)))
-        copy[begin : begin + length] = copy[other : other + length]
-    return bytes(copy)
 
 
 def foreign(folder: Path, names: dict | None = None) -> Iterator[tuple[str, str, str, str]]:
@@ -67,20 +48,45 @@ def foreign(folder: Path, names: dict | None = None) -> Iterator[tuple[str, str,
             yield command, kind, verdict, words
 
 
+def mutated(folder: Path, copies: int, seed: int) -> Iterator[tuple[str, str, str, str]]:
+    """The same for damaged copies of sound files; what passes may be the truth or a number that nothing vouches for."""
+    rng = np.random.default_rng(seed)
+    recording = folder / "recording.mcap"
+    config = MAP_SETS["training"][6]
+    record_episode(
+        recording, config, simulated_pair(config, "S01", 3), EpisodeMeta("truth", "s-1", "S01", "S01-a", "S01-b"),
+        WallClockAnchor.simulated(10**18),
+    )  # fmt: skip
+    for kind, (commands, build) in sound(recording).items():
+        whole = build(folder / f"whole {kind}")
+        for _ in range(copies):
+            with tempfile.TemporaryDirectory(dir=folder) as scratch:
+                copy = shutil.copytree(whole, Path(scratch) / "copy")
+                damage_one(copy, rng)
+                for command in commands:
+                    path = copy / "episode_000.mcap" if command == "collect replay" else copy
+                    verdict, words = call(*COMMANDS[command](path, Path(scratch)))
+                    shutil.rmtree(Path(scratch) / "out", ignore_errors=True)
+                    yield command, kind, verdict, words
+
+
 def main() -> int:
     """Prints the counts; exit status 1 where a call ended in anything but one line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--copies", type=int, default=40, help="damaged copies of each kind (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--show", action="store_true", help="print what each call said")
     arguments = parser.parse_args()
-    counts: Counter[str] = Counter()
+    counts: dict[str, Counter[str]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        total = len(COMMANDS) * len(FOREIGN)
-        for command, kind, verdict, words in progress(foreign(Path(folder)), total, "calls"):
-            counts[verdict.split()[0]] += 1
+        calls = chain(foreign(Path(folder)), mutated(Path(folder), arguments.copies, arguments.seed))
+        for command, kind, verdict, words in progress(calls, None, "calls"):
+            counts.setdefault(command, Counter())[verdict.split()[0]] += 1
             if arguments.show or verdict not in ("refused", "passed"):
                 print(f"{command} | {kind} | {verdict} | {words.strip()[:300]}")
-    print(", ".join(f"{verdict}: {count}" for verdict, count in sorted(counts.items())))
-    return int(bool(set(counts) - {"refused", "passed"}))
+    for command, verdicts in counts.items():
+        print(f"{command:<22}", ", ".join(f"{verdict}: {count}" for verdict, count in sorted(verdicts.items())))
+    return int(any(set(verdicts) - {"refused", "passed"} for verdicts in counts.values()))
 
 
 if __name__ == "__main__":

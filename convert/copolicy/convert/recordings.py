@@ -93,7 +93,7 @@ def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
         elif folder.is_file():
             files.append(folder)
         else:
-            raise FileFormatError(folder, "a folder of recordings", "nothing there")
+            raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
     if not files:
         kinds = " and ".join(kind_of(folder) for folder in folders)
         raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", kinds)

@@ -166,8 +166,9 @@ def _require_3(fields: dict[str, Any]) -> None:
 
 
 def _require_codecs(codecs: list[Any]) -> None:
-    for codec in codecs:
-        name = codec if isinstance(codec, str) else codec["name"]
+    for entry in codecs:
+        codec: dict[str, Any] = {"name": entry} if isinstance(entry, str) else entry
+        name = codec["name"]
         if name not in _CODECS:
             raise ValueError(f"codec {name!r}, none of {', '.join(_CODECS)}")
         if name == "sharding_indexed":
