@@ -149,7 +149,10 @@ def camera(first_id: int = 900) -> list[McapRecord]:
         Channel(first_id + 1, "/joint_states", "json", {"robot": "arm"}, 0),
         Channel(first_id + 2, "/episode/event", "json", {}, first_id),
     ]
-    about = [Metadata("calibration", {"camera": "1"}), Metadata("calibration", {"camera": "2"})]
+    about = [
+        *(Metadata("calibration", {"camera": number}) for number in "12"),
+        Metadata("dataset_info", {"robot": "arm", "fps": "60", "schema_version": "7"}),
+    ]
     return [schema, *channels, *messages, *about, Attachment(1, 2, "urdf.xml", "text/xml", b"<robot/>")]
 
 

@@ -128,7 +128,7 @@ def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
         raise FileFormatError(path, "a zipped Zarr store", found) from None
     for member in members:
         name = PurePosixPath(member.filename.replace("\\", "/"))
-        if name.is_absolute() or ".." in name.parts or ":" in name.parts[0]:
+        if name.is_absolute() or ".." in name.parts or any(":" in part for part in name.parts[:1]):
             raise FileFormatError(path, "names inside of the archive", repr(member.filename))
     size = sum(member.file_size for member in members)
     if size > _LARGEST:

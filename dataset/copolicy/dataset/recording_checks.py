@@ -1,6 +1,6 @@
 """What vouches for a recording: check sums where it carries them, and what stands in for those that it lacks."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,13 @@ _USED = "could not be verified and {verb} used as {pronoun}"
 _THEY = _USED.format(verb="are", pronoun="they stand")
 _IT = _USED.format(verb="is", pronoun="it stands")
 _TOPICS_SHOWN = 5
+_ENTRIES: dict[str, tuple[str, ...]] = {
+    **episode_records.COLUMNS_AT_START,
+    "dataset_info": ("fps", episode_records.START_DIGEST),
+    "physics": ("angular_acceleration_limit", "step_limit"),
+    episode_records.RESULT: episode_records.COLUMNS_AT_END,
+}
+"""Entries by which a metadata record is told from another project's of the same name."""
 
 
 @dataclass
@@ -61,6 +68,25 @@ class CheckSums:
             return ()
         metadata = f"the result of the episode {_IT}" if self.start else f"the metadata {_THEY}"
         return (*self.content_notes(), f"the data section carries no check sum: {metadata}")
+
+
+def sole_records(path: Path, records: Mapping[str, Sequence[dict[str, str]]]) -> dict[str, dict[str, str]]:
+    """The metadata records of a file by name; of several of a name of ours, the one that has our entries.
+
+    Another project may have a record of the same name beside ours.
+
+    Raises:
+        FileFormatError: several of a name are ours.
+    """
+    chosen: dict[str, dict[str, str]] = {}
+    for name, candidates in records.items():
+        if len(candidates) > 1 and name in _ENTRIES:
+            ours = [entries for entries in candidates if set(_ENTRIES[name]) <= set(entries)]
+            if len(ours) != 1:
+                raise FileFormatError(path, "one episode", f"a second metadata record {name!r}")
+            candidates = ours
+        chosen[name] = candidates[-1]
+    return chosen
 
 
 def require_version(path: Path, records: Mapping[str, Mapping[str, str]]) -> None:

@@ -27,6 +27,7 @@ from .recording_checks import (
     require_start_digest,
     require_statistics,
     require_version,
+    sole_records,
 )
 from .task import RECORD_HZ, MapConfig
 from .topics import ACTIONS, EVENT, SCHEMA_PACKAGE, TABLE_STATE, Topic, channel_difference
@@ -51,9 +52,8 @@ class RecordingContents:
         self._differences: dict[str, str] = {}  # by topic of ours: what keeps a channel of that name from being read
         self._read: set[str] = set()  # topics of ours with a channel that can be read
         self._ours = False  # a channel has a schema of ours, of this version or another
-        self._records: dict[str, dict[str, str]] = {}
-        self._twice: list[str] = []
-        self._map: bytes | None = None
+        self._records: dict[str, list[dict[str, str]]] = {}
+        self._maps: set[bytes] = set()
         self._messages = 0
         self._events: list[EpisodeEvent] = []
         self._steps = {topic.name: array("q") for topic in _MOTION}
@@ -85,9 +85,7 @@ class RecordingContents:
                 handler(body[MESSAGE_HEAD:])
         elif opcode == Opcode.METADATA:
             record = Metadata.read(ReadDataStream(BytesIO(body)))
-            if record.name in self._records:
-                self._twice.append(record.name)
-            self._records[record.name] = record.metadata
+            self._records.setdefault(record.name, []).append(record.metadata)
         elif opcode == Opcode.ATTACHMENT:
             self._take_attachment(body)
         else:
@@ -99,9 +97,7 @@ class RecordingContents:
             raise ValueError("an attachment that fails its check sum")
         attachment = Attachment.read(ReadDataStream(BytesIO(body)))
         if attachment.name == episode_records.MAP_ATTACHMENT:
-            if self._map not in (None, attachment.data):
-                self._twice.append(attachment.name)
-            self._map = attachment.data
+            self._maps.add(attachment.data)
             self.check_sums.map = expected != 0
 
     def _declare(self, opcode: int, body: bytes) -> None:
@@ -165,11 +161,13 @@ class RecordingContents:
         Raises:
             ForeignRecordingError: it is none.
         """
-        info = self._records.get("dataset_info", {})
-        if not self._ours and episode_records.START_DIGEST not in info:
+        infos = self._records.get("dataset_info", [])
+        ours = [info for info in infos if episode_records.START_DIGEST in info]
+        if not self._ours and not ours:
             found = channels_text((*self._topics, *summary_topics))
             raise ForeignRecordingError(self.path, "a recording of this task", found)
-        require_version(self.path, self._records)
+        for info in ours or infos:
+            require_version(self.path, {"dataset_info": info})
 
     def episode(self, walk: RecordWalk) -> Episode:
         """The episode, once the whole file has been walked.
@@ -178,40 +176,40 @@ class RecordingContents:
             FileFormatError: it is not whole.
             InvalidValueError: the metadata or the map are not what they should be.
         """
-        path, records = self.path, self._records
-        for name in self._twice:
-            if name in (*episode_records.COLUMNS_AT_START, episode_records.RESULT, episode_records.MAP_ATTACHMENT):
-                kind = "attachment" if name == episode_records.MAP_ATTACHMENT else "metadata record"
-                raise FileFormatError(path, "one episode", f"a second {kind} {name!r}")
+        path, records = self.path, sole_records(self.path, self._records)
         for topic in self._steps:
             if topic in self._differences and topic not in self._read:
                 raise FileFormatError(path, "a recording of this task", self._differences[topic])
         meta = episode_records.decode(records)
         physics = episode_records.decode_physics(records)
-        if self._map is None:
-            raise FileFormatError(path, f"an attachment {episode_records.MAP_ATTACHMENT!r}", "none")
+        if len(self._maps) != 1:
+            found = "none" if not self._maps else f"{len(self._maps)} of them"
+            raise FileFormatError(path, f"an attachment {episode_records.MAP_ATTACHMENT!r}", found)
         fps = records["dataset_info"].get("fps")
         if fps != str(RECORD_HZ):
             raise FileFormatError(path, f"a recording at {RECORD_HZ} Hz", f"fps {fps!r}")
         require_statistics(path, walk, self._messages + walk.counts[Opcode.MESSAGE])
-        states, actions = self._motion()
+        states, actions = self._motion(records[episode_records.RESULT].get("steps"))
         sums = self.check_sums
         sums.data = walk.data_verified
         if not sums.data:
             sums.start = require_start_digest(path, records)
         meta = replace(meta, source_sha256=walk.sha256)
-        config = MapConfig.from_json(self._map)
+        config = MapConfig.from_json(*self._maps)
         # What a recovered file could not verify in its source, its own check sums do not vouch for.
         earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")
         notes = (*filter(None, (earlier,)), *sums.notes())
         return Episode(states[:-1], actions, states[-1], meta, config, RECORD_HZ, physics, notes)
 
-    def _motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """States `(T + 1, 7)` and actions `(T, 4)` by step, whatever the order of their messages."""
+    def _motion(self, expected: str | None) -> tuple[np.ndarray, np.ndarray]:
+        """States `(T + 1, 7)` and actions `(T, 4)` by step, whatever the order of their messages.
+
+        Args:
+            expected: steps, as the result of the episode counts them.
+        """
         count = len(self._steps[TABLE_STATE.name]) - 1
-        if self._records[episode_records.RESULT].get("steps") != str(count):
-            steps = self._records[episode_records.RESULT].get("steps")
-            raise FileFormatError(self.path, f"states of {steps} steps and the final one", f"{count + 1} states")
+        if expected != str(count):
+            raise FileFormatError(self.path, f"states of {expected} steps and the final one", f"{count + 1} states")
         values = []
         for topic, length in ((TABLE_STATE, count + 1), *((topic, count) for topic in ACTIONS)):
             steps = np.asarray(self._steps[topic.name])

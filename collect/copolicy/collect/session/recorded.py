@@ -39,7 +39,8 @@ def recordings(folder: Path) -> Iterator[Recorded]:
     for path in sorted(folder.rglob("*.mcap")):
         try:
             records = read_metadata(path)
-            require_version(path, records)
+            if episode_records.START_DIGEST in records.get("dataset_info", {}):  # else it is not ours
+                require_version(path, records)
             result = records[episode_records.RESULT]
             players, flags = records["players"], result["quality_flags"].split(",")
             yield Recorded(
