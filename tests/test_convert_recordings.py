@@ -67,6 +67,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
         "damaged_left_out": [],
         "discarded_left_out": ["episode_2.mcap"],
         "unfinished_recordings": [],
+        "not_verified": [],
     }
     assert captured.err == ""
     dataset = load(tmp_path / "set")
@@ -157,7 +158,7 @@ def test_folders_that_do_not_serve(recordings, tmp_path, capsys):
     assert convert(recordings, tmp_path / "empty") == 2
     assert capsys.readouterr().err.splitlines() == [
         f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found nothing there",
-        f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found none",
+        f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found an empty folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected a path that does not exist yet, found one; "
         "nothing was overwritten",
     ]

@@ -13,6 +13,7 @@ import zarr
 from numcodecs.registry import get_codec
 from zarr.codecs import BloscCodec, GzipCodec
 
+from copolicy.convert import zarr_store
 from copolicy.convert.cli import main
 from copolicy.convert.upstream import open_upstream
 from copolicy.convert.upstream_episode import UpstreamOptions
@@ -239,15 +240,12 @@ def test_zip_files_that_are_refused(tmp_path, members, found):
     assert found in refusal(zipped(tmp_path / "store.zarr.zip", members))
 
 
-def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path):
-    path = tmp_path / "bomb.zarr.zip"
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a/.zarray", METADATA)
-        for number in range(9):
-            with archive.open(f"a/{number}", "w", force_zip64=True) as file:
-                for _ in range(8):
-                    file.write(bytes(16 << 20))
-    assert "expected an archive of at most 1024 MiB unpacked, found 1152 MiB" in refusal(path)
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
+    monkeypatch.setattr(zarr_store, "_LARGEST", 3 << 20)
+    members = {"a/.zarray": METADATA, **{f"a/{number}": bytes(1 << 20) for number in range(4)}}
+    path = zipped(tmp_path / "bomb.zarr.zip", members)
+    assert path.stat().st_size < 10_000
+    assert "expected an archive of at most 3 MiB unpacked, found 4 MiB" in refusal(path)
 
 
 def test_damaged_zip_files(tmp_path):
