@@ -39,7 +39,9 @@ COMMANDS: dict[str, Callable[[Path, Path], tuple[Main, list[str]]]] = {
     "dataset stats": lambda path, scratch: (dataset, ["stats", str(path)]),
     "cards dataset": lambda path, scratch: (cards, ["dataset", str(path)]),
     "eval human summarise": lambda path, scratch: (evaluate, ["human", "summarise", str(path)]),
-    "eval human plan": lambda path, scratch: (evaluate, ["human", "summarise", str(scratch), "--plan", str(path)]),
+    "eval human run": lambda path, scratch: (
+        evaluate, ["human", "run", str(path), "--participant", "P01", "--out", str(scratch / "sessions")],
+    ),
 }  # fmt: skip
 
 
