@@ -12,7 +12,7 @@ from checked_data import EPISODES, contents, make_data_set, make_recordings, set
 
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.zarr_array import read_zarr_array
+from copolicy.convert.zarr_store import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.features import BOUNDS, STATE
 from copolicy.dataset.log import read_episode
@@ -50,7 +50,8 @@ def changed(recordings, tmp_path) -> Path:
 
 def arrays(store: Path) -> tuple[np.ndarray, ...]:
     return tuple(
-        read_zarr_array(store / name) for name in ("data/obs", "data/action", "data/past_action", "meta/episode_ends")
+        ZarrArrays(store, "data/obs").read(name)
+        for name in ("data/obs", "data/action", "data/past_action", "meta/episode_ends")
     )
 
 

@@ -69,6 +69,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
         "unfinished_recordings": [],
         "physics": {"angular acceleration up to pi/2 rad/s^2": 3},
         "mixed": ["license: 2 episodes CC-BY-4.0; 1 episode CC0-1.0"],
+        "not_verified": [],
     }
     assert captured.err == ""
     dataset = load(tmp_path / "set")
@@ -159,7 +160,7 @@ def test_folders_that_do_not_serve(recordings, tmp_path, capsys):
     assert convert(recordings, tmp_path / "empty") == 2
     assert capsys.readouterr().err.splitlines() == [
         f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found nothing there",
-        f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found none",
+        f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found an empty folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected a path that does not exist yet, found one; "
         "nothing was overwritten",
     ]

@@ -273,5 +273,5 @@ def test_a_folder_must_hold_one_format(examples, tmp_path, capsys):
     assert convert(tmp_path / "nowhere", tmp_path / "set") == 2
     first, second, third = capsys.readouterr().err.splitlines()
     assert first.endswith("found 6 raw, 6 processed, 1 zarr")
-    assert second.endswith("found none of them")
-    assert third.endswith("nowhere: expected a folder of the original program's files, found no folder")
+    assert second.endswith("found an empty folder")
+    assert third.endswith("files or a zipped Zarr store, found nothing there")

@@ -145,22 +145,23 @@ def test_metadata_of_a_recording_that_broke_off(recording, tmp_path):
 @pytest.mark.parametrize(
     ("content", "found"),
     [
-        (b"", "an intact and complete MCAP file, found its end at byte 0"),
-        (b"\x89PNG\r\n\x1a\nmore", "an intact and complete MCAP file, found another beginning at byte 8"),
+        (b"", "an MCAP file, found an empty file"),
+        (b"\x89PNG\r\n\x1a\nmore", "an MCAP file, found a PNG picture"),
+        (b"notes on the session", "an MCAP file, found a text file"),
     ],
 )
 def test_other_files_are_refused(tmp_path, content, found):
     path = tmp_path / "other.mcap"
     path.write_bytes(content)
     assert refusal(path) == found
-    with pytest.raises(FileFormatError, match="expected an MCAP file, found another beginning"):
+    with pytest.raises(FileFormatError, match=found):
         read_metadata(path)
 
 
 def test_missing_files_and_folders_are_refused(tmp_path):
     assert refusal(tmp_path / "none.mcap") == "a readable MCAP file, found No such file or directory"
-    assert refusal(tmp_path) == "a readable MCAP file, found Is a directory"
-    with pytest.raises(FileFormatError, match="found Is a directory"):
+    assert refusal(tmp_path) == "an MCAP file, found an empty folder"
+    with pytest.raises(FileFormatError, match="found an empty folder"):
         read_metadata(tmp_path)
 
 
@@ -284,7 +285,10 @@ def single_precision(record, topic):
         (lambda r, _: [] if isinstance(r, Metadata) and r.name == "consent" else [r], "expected a record 'consent'"),
         (lambda r, _: [r, r] if isinstance(r, Metadata) else [r], "a second metadata record 'session'"),
         (edit_metadata("dataset_info", fps="10"), "a recording at 30 Hz, found fps '10'"),
-        (edit_metadata("dataset_info", schema_version="2"), "schema_version: expected 1, found '2'"),
+        (
+            edit_metadata("dataset_info", schema_version="2"),
+            "schema version 1, the latest known here, found schema version '2'",
+        ),
         (edit_metadata("episode", seed="x"), "metadata entry 'seed': expected int, found 'x'"),
         (edit_metadata("episode_result", success="yes"), "metadata entry 'success': expected bool, found 'yes'"),
         (edit_metadata("episode", source="robot"), "metadata entry 'source': expected one of"),
@@ -296,13 +300,6 @@ def test_intact_files_that_are_no_whole_episode_are_refused(recording, tmp_path,
     target = tmp_path / "changed.mcap"
     rewrite(path, target, change)
     assert found in refusal(target)
-
-
-def test_a_file_without_check_sum_of_its_data_is_refused(recording, tmp_path):
-    path, *_ = recording
-    target = tmp_path / "unchecked.mcap"
-    rewrite(path, target, lambda record, topic: [record], enable_data_crcs=False)
-    assert "a data section with check sum" in refusal(target)
 
 
 @pytest.mark.parametrize(

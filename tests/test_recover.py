@@ -21,7 +21,7 @@ from copolicy.collect.recover import recover, recover_file
 from copolicy.collect.wall_clock import WallClockAnchor
 from copolicy.collect.world import TableWorld
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError
+from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.log import read_episode, read_metadata
 from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput, TableState
 from copolicy.dataset.task import MAP_SETS
@@ -237,9 +237,9 @@ def test_a_map_that_is_not_what_was_written_is_refused(tmp_path, whole):
 def test_other_files_are_refused(tmp_path):
     part = tmp_path / "notes.mcap.part"
     part.write_bytes(b"not an MCAP file at all")
-    with pytest.raises(FileFormatError, match="metadata and map, found another beginning at byte 8"):
+    with pytest.raises(FileFormatError, match="metadata and map, found a text file"):
         recover_file(part)
-    with pytest.raises(InvalidValueError, match="folder of recordings: expected a folder, found"):
+    with pytest.raises(FileFormatError, match="expected a folder of recordings, found nothing there"):
         recover(tmp_path / "none")
 
 

@@ -40,7 +40,7 @@ def truncate(path: Path) -> None:
         (shutil.rmtree, "{root}: expected the folder of a LeRobot v3 data set, found no such folder"),
         (
             lambda root: (root / "meta" / "info.json").unlink(),
-            "{root}: expected a LeRobot v3 data set with meta/info.json, found none",
+            "{root}: expected a LeRobot v3 data set with meta/info.json, found a folder of other files",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text("{", encoding="utf-8"),

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.commandline import add_command, command_parser, run
-from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.file_kinds import kind_of
+from copolicy.dataset.files import visible_files
 from copolicy.dataset.task import MAP_SETS
 
 from .demonstration.command import add_demo_command
@@ -98,7 +100,12 @@ def _simulate(arguments: argparse.Namespace) -> dict:
 
 
 def _recover(arguments: argparse.Namespace) -> dict:
-    return summary(arguments.folder, recover(arguments.folder, finished=True, damaged=arguments.damaged))
+    folder = arguments.folder
+    recoveries = recover(folder, finished=True, damaged=arguments.damaged)
+    # A session that nobody has recorded in yet is as good as an empty folder.
+    if not visible_files(folder, "*.mcap", "*.mcap.part", "session.json") and any(folder.iterdir()):
+        raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
+    return summary(folder, recoveries)
 
 
 def _devices(arguments: argparse.Namespace) -> dict:

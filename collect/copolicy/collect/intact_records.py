@@ -14,23 +14,27 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
 from copolicy.dataset import episode_records
-from copolicy.dataset.exceptions import CopolicyError, FileFormatError
-from copolicy.dataset.mcap_records import MESSAGE_HEAD, RecordWalk, chunk_data
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
+from copolicy.dataset.mcap_chunks import LARGEST_CHUNK, MESSAGE_HEAD, chunk_records
+from copolicy.dataset.mcap_records import RecordWalk
 from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, TableState
+from copolicy.dataset.recording_checks import CheckSums, channels_text
 from copolicy.dataset.task import MapConfig
-from copolicy.dataset.topics import ACTIONS, ENCODING, EVENT, INTERACTION, LOOP_TIMING, TABLE_STATE, TOPICS
+from copolicy.dataset.topics import ACTIONS, EVENT, INTERACTION, LOOP_TIMING, TABLE_STATE, is_ours
 
 from .ticker import LoopStatistics, Tick
 
 _LARGEST: dict[int, int] = {
+    Opcode.SCHEMA: 1 << 20,
+    Opcode.CHANNEL: 1 << 20,
     Opcode.METADATA: 1 << 20,
     Opcode.ATTACHMENT: 16 << 20,
-    Opcode.CHUNK: 64 << 20,
+    Opcode.CHUNK: LARGEST_CHUNK,
     Opcode.MESSAGE: 1 << 20,
 }
 _HEAD = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_CHUNK_CRC = slice(24, 28)  # of the body of a chunk
+_OUR_METADATA = (*episode_records.COLUMNS_AT_START, episode_records.RESULT)
 _ENDED = "expected an intact and complete MCAP file, found its end"
 
 
@@ -48,6 +52,7 @@ class IntactPart:
         between_records: the file simply ends there, as after a kill, rather than going on with damage.
         total_reward: over the steps.
         events: what happened, the events after the last complete step among them.
+        unverified: what of it carries no check sum, a sentence each.
         loop: how well the loop kept its time over the steps; without ticks where time was simulated.
     """
 
@@ -60,6 +65,7 @@ class IntactPart:
     between_records: bool = False
     total_reward: float = 0.0
     events: list[EpisodeEvent] = field(default_factory=list)
+    unverified: tuple[str, ...] = ()
     loop: LoopStatistics = field(default_factory=LoopStatistics)
     positions: array = field(default_factory=lambda: array("d"), repr=False)
 
@@ -69,24 +75,27 @@ class IntactPart:
         return np.asarray(self.positions).reshape(-1, 2)[: self.steps + 1]
 
 
-def intact_records(path: Path) -> Iterator[McapRecord]:
+def intact_records(path: Path, check_sums: CheckSums | None = None) -> Iterator[McapRecord]:
     """Schemas, channels, messages, metadata and attachments from the beginning of a file, one chunk in memory.
 
-    Messages are taken from chunks only, since nothing vouches for one that stands alone in a file without an end.
+    Args:
+        check_sums: learns what of the file carries one.
 
     Raises:
         FileFormatError: at the first record that fails a check sum or a parser, and where the file breaks off.
     """
+    check_sums = CheckSums() if check_sums is None else check_sums
     with path.open("rb") as file:
         walk = RecordWalk(path, file, path.stat().st_size)
         for opcode, body in walk.records(_LARGEST):
             try:
-                yield from _records_of(opcode, body)
+                yield from _records_of(opcode, body, check_sums)
             except CopolicyError:
                 raise
             except Exception as error:
                 # Damaged bytes fail in as many ways as there are parsers (struct, zstd, UTF-8, ...).
                 raise walk.damage(f"damage ({error or type(error).__name__}) in the record that ends") from None
+        check_sums.data = walk.data_verified
 
 
 def read_intact_part(path: Path) -> IntactPart:
@@ -94,13 +103,15 @@ def read_intact_part(path: Path) -> IntactPart:
 
     Raises:
         FileFormatError: the metadata or the map at its start are not what was written, or it is no recording.
+        ForeignRecordingError: it is a recording of something else.
     """
     part = IntactPart(path)
     count = _StepCount(part)
+    check_sums = CheckSums()
     try:
-        for record in intact_records(path):
+        for record in intact_records(path, check_sums):
             if isinstance(record, Metadata):
-                if record.name in part.metadata:
+                if record.name in part.metadata and record.name in _OUR_METADATA:
                     raise ValueError(f"a second metadata record {record.name!r}")
                 part.metadata[record.name] = record.metadata
             elif isinstance(record, Attachment):
@@ -117,40 +128,52 @@ def read_intact_part(path: Path) -> IntactPart:
         part.stopped_by = f"expected the next step, found {error or type(error).__name__}"
     part.between_records = not part.stopped_by or part.stopped_by.startswith(_ENDED)
     part.steps = count.complete
-    _check_start(part)
+    _check_start(part, count.foreign)
+    part.unverified = check_sums.content_notes()
     count.sum_up()
     return part
 
 
-def _records_of(opcode: int, body: bytes) -> Iterator[McapRecord]:
+def _records_of(opcode: int, body: bytes, check_sums: CheckSums) -> Iterator[McapRecord]:
     if opcode == Opcode.METADATA:
         yield Metadata.read(ReadDataStream(BytesIO(body)))
     elif opcode == Opcode.ATTACHMENT:
-        if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+        expected = int.from_bytes(body[-4:], "little")
+        if expected not in (0, zlib.crc32(body[:-4])):
             raise ValueError("an attachment that fails its check sum")
-        yield Attachment.read(ReadDataStream(BytesIO(body)))
+        attachment = Attachment.read(ReadDataStream(BytesIO(body)))
+        if attachment.name == episode_records.MAP_ATTACHMENT:
+            check_sums.map = expected != 0
+        yield attachment
     elif opcode == Opcode.CHUNK:
-        # A check sum of zero would mean "not computed", which our recorder never writes.
-        if not any(body[_CHUNK_CRC]):
-            raise ValueError("a chunk without check sum")
-        yield from _records_in_chunk(chunk_data(body))
+        data, verified = chunk_records(body)
+        check_sums.chunks += 1
+        check_sums.chunks_without += not verified
+        yield from _records_in_chunk(data)
     else:
-        raise ValueError("a message outside of any chunk")
+        check_sums.lone_messages += opcode == Opcode.MESSAGE
+        yield from _record(opcode, body)
 
 
 def _records_in_chunk(data: bytes) -> Iterator[McapRecord]:
     position = 0
     while position < len(data):
         opcode, length = _HEAD.unpack_from(data, position)
-        body = data[position + _HEAD.size : position + _HEAD.size + length]
-        position += _HEAD.size + length
-        if opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
-            yield Message(channel, log_time, body[MESSAGE_HEAD:], publish_time, sequence)
-        elif opcode == Opcode.SCHEMA:
-            yield Schema.read(ReadDataStream(BytesIO(body)))
-        elif opcode == Opcode.CHANNEL:
-            yield Channel.read(ReadDataStream(BytesIO(body)))
+        begin = position + _HEAD.size
+        position = begin + length
+        if position > len(data):
+            raise ValueError("a record that leaves its chunk")
+        yield from _record(opcode, data[begin:position])
+
+
+def _record(opcode: int, body: bytes) -> Iterator[McapRecord]:
+    if opcode == Opcode.MESSAGE:
+        channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+        yield Message(channel, log_time, body[MESSAGE_HEAD:], publish_time, sequence)
+    elif opcode == Opcode.SCHEMA:
+        yield Schema.read(ReadDataStream(BytesIO(body)))
+    elif opcode == Opcode.CHANNEL:
+        yield Channel.read(ReadDataStream(BytesIO(body)))
 
 
 class _StepCount:
@@ -158,7 +181,9 @@ class _StepCount:
 
     def __init__(self, part: IntactPart):
         self._part = part
-        self._topics: dict[int, str] = {}
+        self._schemas: dict[int, str] = {}
+        self._topics: dict[int, str] = {}  # of channels that are ours; of others nothing follows
+        self._others: set[str] = set()
         self._next = {topic.name: 0 for topic in (TABLE_STATE, *ACTIONS)}
         self._sequence = 0
         self._rewards = array("d")
@@ -170,10 +195,20 @@ class _StepCount:
         states, *actions = self._next.values()
         return min(states - 1, *actions)
 
+    @property
+    def foreign(self) -> tuple[str, ...]:
+        """The topics of a file that has none of ours."""
+        return () if self._topics else tuple(sorted(self._others))
+
     def take(self, record: McapRecord) -> None:
-        if isinstance(record, Channel):
-            self._declare(record)
-        elif isinstance(record, Message):
+        if isinstance(record, Schema):
+            self._schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            if is_ours(record, self._schemas.get(record.schema_id, "")):
+                self._topics[record.id] = record.topic
+            else:
+                self._others.add(record.topic)
+        elif isinstance(record, Message) and record.channel_id in self._topics:
             if record.sequence < self._sequence:
                 raise ValueError(f"step {record.sequence} after step {self._sequence}")
             self._sequence = record.sequence
@@ -189,12 +224,6 @@ class _StepCount:
                 self._part.loop.pause()
             if step < steps:
                 self._part.loop.add(Tick(scheduled, start, skipped))
-
-    def _declare(self, channel: Channel) -> None:
-        known = {topic.name for topic in TOPICS}
-        if channel.topic in known and channel.message_encoding != ENCODING:
-            raise ValueError(f"{channel.topic} encoded as {channel.message_encoding!r}")
-        self._topics[channel.id] = channel.topic
 
     def _follow(self, topic: str, message: Message) -> None:
         if topic == TABLE_STATE.name:
@@ -217,10 +246,12 @@ class _StepCount:
         self._next[topic] += 1
 
 
-def _check_start(part: IntactPart) -> None:
-    told = part.metadata.get("dataset_info", {}).get(episode_records.START_DIGEST)
-    if part.map_config is None or told is None:
+def _check_start(part: IntactPart, foreign: tuple[str, ...]) -> None:
+    digest = part.metadata.get("dataset_info", {}).get(episode_records.START_DIGEST)
+    if digest is None and foreign:
+        raise ForeignRecordingError(part.path, "a recording of this task", channels_text(foreign))
+    if part.map_config is None or digest is None:
         found = part.stopped_by.rpartition("found ")[2] or "none"
         raise FileFormatError(part.path, "the start of a recording of this task: metadata and map", found)
-    if told != episode_records.start_digest(part.metadata):
+    if digest != episode_records.start_digest(part.metadata):
         raise FileFormatError(part.path, "the metadata that was written at the start", "another")

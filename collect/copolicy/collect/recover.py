@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import Literal
 
 from copolicy.dataset.commandline import progress
-from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, OutputExistsError
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError, OutputExistsError
+from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import distinct_files
 from copolicy.dataset.log import read_episode, read_metadata
+from copolicy.dataset.recording_checks import RECOVERY
 
 from .episode_file import PART_SUFFIX
 from .file_lock import hold
 from .intact_records import read_intact_part
-from .recovered_file import RECORD, RECOVERED, write_recovered
+from .recovered_file import RECOVERED, write_recovered
 
-Status = Literal["recovered", "already_recovered", "empty", "running", "damaged"]
+Status = Literal["recovered", "already_recovered", "empty", "running", "damaged", "foreign"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Recovery:
         source: the file that broke off or is damaged; it is never changed.
         status: `recovered`, or recovered by an earlier run (`already_recovered`); it broke off before the first
             complete step was on the disk (`empty`); a living process records it (`running`); nothing of it can be
-            trusted, or it is a finished recording that is damaged (`damaged`).
+            trusted, or it is a finished recording that is damaged (`damaged`); it is a recording of something else,
+            or of a later version (`foreign`).
         output: the recovered episode.
         steps: of the recovered episode.
         detail: what ended the recording, or what is wrong with the file.
@@ -56,11 +59,11 @@ def recover(folder: Path | str, finished: bool = False, damaged: bool = False) -
         One entry a file that is not a sound, finished recording, by name.
 
     Raises:
-        InvalidValueError: no such folder.
+        FileFormatError: no such folder.
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InvalidValueError("folder of recordings", "a folder", str(folder))
+        raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
     parts = distinct_files(folder, f"*.mcap{PART_SUFFIX}")
     found = [_try_recover(part) for part in progress(parts, len(parts), "broken off")]
     if finished or damaged:
@@ -68,6 +71,8 @@ def recover(folder: Path | str, finished: bool = False, damaged: bool = False) -
         for file in progress(files, len(files), "finished"):
             try:
                 read_episode(file)
+            except ForeignRecordingError as error:
+                found.append(Recovery(file, "foreign", detail=_without_path(error, file)))
             except FileFormatError as error:
                 found.append(_try_recover(file) if damaged else Recovery(file, "damaged", detail=str(error)))
     return found
@@ -105,7 +110,8 @@ def recover_file(source: Path | str) -> Recovery:
                 raise FileFormatError(source, "at least one complete step", part.stopped_by.rpartition("found ")[2])
             return Recovery(source, "empty", detail="it ends before the first complete step")
         write_recovered(part, output, digest)
-    return Recovery(source, "recovered", output, part.steps, part.stopped_by or "it was complete but for its name")
+    detail = "; ".join((part.stopped_by or "it was complete but for its name", *part.unverified))
+    return Recovery(source, "recovered", output, part.steps, detail)
 
 
 def summary(folder: Path, recoveries: Iterable[Recovery]) -> dict:
@@ -126,8 +132,14 @@ def _line(recovery: Recovery, folder: Path) -> str:
 def _try_recover(source: Path) -> Recovery:
     try:
         return recover_file(source)
+    except ForeignRecordingError as error:
+        return Recovery(source, "foreign", detail=_without_path(error, source))
     except CopolicyError as error:
         return Recovery(source, "damaged", detail=str(error))
+
+
+def _without_path(error: CopolicyError, path: Path) -> str:
+    return str(error).removeprefix(f"{path}: ")
 
 
 def _output_of(source: Path) -> Path:
@@ -137,6 +149,6 @@ def _output_of(source: Path) -> Path:
 
 def _earlier(source: Path, output: Path, digest: str) -> Recovery:
     metadata = read_metadata(output)
-    if metadata.get(RECORD, {}).get("source_sha256") != digest:
+    if metadata.get(RECOVERY, {}).get("source_sha256") != digest:
         raise OutputExistsError(output)
-    return Recovery(source, "already_recovered", output, int(metadata[RECORD]["steps"]))
+    return Recovery(source, "already_recovered", output, int(metadata[RECOVERY]["steps"]))

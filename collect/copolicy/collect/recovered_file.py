@@ -16,9 +16,10 @@ from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import TableState
+from copolicy.dataset.recording_checks import RECOVERY, UNVERIFIED
 from copolicy.dataset.routes import route_class
 from copolicy.dataset.task import RECORD_HZ
-from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE
+from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE, is_ours
 
 from .episode_file import sync_folder
 from .episode_messages import Record, event_record
@@ -28,9 +29,6 @@ from .session.recorded import PRACTICE
 
 RECOVERED = "recovered"
 """Quality flag of a recovered episode, and what its name ends with."""
-
-RECORD = "recovery"
-"""The metadata record that says what a recovered file was made from."""
 
 _UNFINISHED = ".unfinished"  # a recovered file in the making; the next run starts it anew
 
@@ -80,7 +78,9 @@ def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
         "recovered_at": datetime.now(UTC).isoformat(timespec="seconds"),
         "software_version": software,
     }
-    writer.add_metadata(RECORD, recovery)
+    if part.unverified:
+        recovery[UNVERIFIED] = "; ".join(part.unverified)
+    writer.add_metadata(RECOVERY, recovery)
     writer.finish()
 
 
@@ -91,6 +91,7 @@ class _Copy:
         self._writer, self._steps = writer, steps
         self._schemas: dict[int, int] = {0: 0}
         self._channels: dict[int, int] = {}
+        self._names: dict[int, str] = {}
         self._topics: dict[int, str] = {}
         self._final = TableState()
         self._time_ns = 0  # of the final state
@@ -102,14 +103,16 @@ class _Copy:
             self._take_message(record)
         elif isinstance(record, Schema):
             self._schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            self._names[record.id] = record.name
         elif isinstance(record, Channel):
             schema = self._schemas[record.schema_id]
             channel = writer.register_channel(record.topic, record.message_encoding, schema, record.metadata)
             self._channels[record.id] = channel
-            self._topics[record.id] = record.topic
+            if is_ours(record, self._names.get(record.schema_id, "")):
+                self._topics[record.id] = record.topic
         elif isinstance(record, Attachment):
             writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
-        elif isinstance(record, Metadata) and record.name != episode_records.RESULT:
+        elif isinstance(record, Metadata) and record.name not in (episode_records.RESULT, RECOVERY):
             writer.add_metadata(record.name, record.metadata)
 
     def end(self, stopped_by: str) -> None:
@@ -120,11 +123,11 @@ class _Copy:
         self._add_ours(event_record(self._steps, RECOVERED, stopped_by))
 
     def _take_message(self, message: Message) -> None:
-        topic = self._topics[message.channel_id]
+        topic = self._topics.get(message.channel_id)
         # Sequence numbers are steps. Of the step after the last complete one count the state, and the events before
         # it, but not what was chosen in it.
         last = self._steps if topic in (TABLE_STATE.name, EVENT.name) else self._steps - 1
-        if message.sequence > last:
+        if topic is not None and message.sequence > last:
             return
         if topic == TABLE_STATE.name and message.sequence == self._steps:
             self._final, self._time_ns = TableState.FromString(message.data), message.log_time

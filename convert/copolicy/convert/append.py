@@ -134,6 +134,7 @@ def append_recordings(
         "unfinished_recordings": unfinished,
         **({"columns_added": columns_added} if columns_added else {}),
         **mixtures.summary(),
+        "not_verified": written["not_verified"],
     }
 
 

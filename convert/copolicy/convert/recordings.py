@@ -3,7 +3,7 @@
 import functools
 import logging
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -12,6 +12,7 @@ from pathlib import Path
 from copolicy.dataset.clock import stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import broken_links, distinct, distinct_files
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.staging import require_new
@@ -50,13 +51,14 @@ def convert_recordings(
         raise InvalidValueError("workers", "at least 1", workers)
     files, unfinished = find_recordings(folders)
     left_out = LeftOut()
+    notes: list[str] = []
     with _prepared(files, conversion, min(workers, len(files))) as results:
         # Imported while other processes read already.
         from .lerobot_writer import write_dataset
 
         shown = progress(results, len(files), "converting")
         written = write_dataset(
-            admit(shown, skip_damaged, left_out), root, repo_id, conversion.fps, conversion.hold,
+            noted(admit(shown, skip_damaged, left_out), notes), root, repo_id, conversion.fps, conversion.hold,
             lambda: {
                 "converter": "copolicy-convert mcap", "version": version("lerobot_policy_copolicy"),
                 "files": len(files), "left_out": left_out.record(),
@@ -67,7 +69,15 @@ def convert_recordings(
         "damaged_left_out": left_out.messages,
         "discarded_left_out": left_out.discarded,
         "unfinished_recordings": unfinished,
+        "not_verified": notes,
     }
+
+
+def noted(episodes: Iterable[PreparedEpisode], notes: list[str]) -> Iterator[PreparedEpisode]:
+    """The episodes as they pass by; what could not be verified of them is added to `notes`."""
+    for episode in episodes:
+        notes += [f"episode {episode.meta.episode_uuid}: {note}" for note in episode.notes]
+        yield episode
 
 
 def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
@@ -92,12 +102,13 @@ def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
         elif folder.is_symlink():
             raise FileFormatError(folder, "a folder of recordings", "a link that leads nowhere")
         else:
-            raise FileFormatError(folder, "a folder of recordings", "nothing there")
+            raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
     for link in lost:
         logging.warning("warning: %s: a link that leads nowhere; what it led to is left out", link)
     files = distinct(files)
     if not files:
-        raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", "none")
+        kinds = " and ".join(kind_of(folder) for folder in folders)
+        raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", kinds)
     return files, unfinished
 
 

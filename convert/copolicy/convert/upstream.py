@@ -4,7 +4,7 @@ import functools
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +13,7 @@ from copolicy.dataset.clock import Hold, stride
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import broken_links, distinct_files
 from copolicy.dataset.staging import require_new
 
@@ -20,12 +21,13 @@ from .prepare import Conversion, LeftOut, PreparedEpisode, admit, prepare_from
 from .upstream_episode import UpstreamOptions
 from .upstream_processed import read_processed
 from .upstream_raw import read_raw
-from .upstream_zarr import ZARR_HZ, ZarrStore
+from .upstream_zarr import OBSERVATIONS, ZARR_HZ, ZarrStore
+from .zarr_store import array_metadata_files, is_zipped
 
 FORMATS = {
     "raw": "trajectories/ep_N.pkl",
     "processed": "ep_N/ep_N.npz",
-    "zarr": "data/obs, data/action, data/past_action and meta/episode_ends of a Zarr v2 store",
+    "zarr": "data/obs, data/action, data/past_action and meta/episode_ends of a Zarr store, a folder or zipped",
 }
 
 Reader = tuple[str, Callable[[UpstreamOptions], Episode]]
@@ -46,22 +48,23 @@ def open_upstream(path: Path) -> UpstreamSource:
     Raises:
         FileFormatError: none of the formats, or more than one.
     """
-    if not path.is_dir():
-        raise FileFormatError(path, "a folder of the original program's files", "no folder")
-    files = distinct_files(path, "*")
-    for link in broken_links(path):
+    if not path.is_dir() and not is_zipped(path):
+        raise FileFormatError(path, "a folder of the original program's files or a zipped Zarr store", kind_of(path))
+    files = distinct_files(path, "*") if path.is_dir() else []
+    for link in broken_links(path) if path.is_dir() else ():
         if link.suffix not in (".pkl", ".npz"):
             logging.warning("warning: %s: a link that leads nowhere; what it led to is left out", link)
     raw = sorted((file for file in files if file.match("trajectories/*.pkl")), key=_by_number)
     processed = sorted(
         (file for file in files if file.match("*.npz") and file.stem == file.parent.name), key=_by_number
     )
-    folders = {folder for file in files for folder in file.parents if folder.match("data/obs")}
-    stores = [folder.parents[1] for folder in sorted(folders) if (folder / ".zarray").is_file()]
+    stores = _stores(path, files)
     found = {name: len(files) for name, files in (("raw", raw), ("processed", processed), ("zarr", stores)) if files}
     if len(found) != 1 or len(stores) > 1:
         layouts = "; ".join(f"{name}: {layout}" for name, layout in FORMATS.items())
-        parts = ", ".join(f"{count} {name}" for name, count in found.items()) or "none of them"
+        parts = ", ".join(f"{count} {name}" for name, count in found.items()) or kind_of(path)
+        if not found and parts.startswith("a Zarr store"):
+            parts = f"a Zarr store without an array {OBSERVATIONS}"
         raise FileFormatError(path, f"files of one format ({layouts})", parts)
     if stores:
         store = ZarrStore(stores[0])
@@ -94,7 +97,7 @@ def convert_upstream(
         FileFormatError: `path` holds none of the formats, or more than one.
         InvalidValueError: a Zarr store at another rate than 10 Hz or with another hold.
         DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is left behind.
-        MissingExtraError: lerobot or numcodecs is not installed.
+        MissingExtraError: lerobot or zarr is not installed.
     """
     stride(fps)
     require_new(root)
@@ -145,6 +148,19 @@ class _Noticed:
             origin, *rest = episode.notes
             self.notes += [f"{note} ({origin})" for note in rest]
             yield episode
+
+
+def _stores(path: Path, files: Sequence[Path]) -> list[Path]:
+    """Zarr stores, folders and zip files, at a path and below it."""
+    if path.is_file():
+        return [path]
+    arrays = {folder for file in files for folder in file.parents if folder.match(OBSERVATIONS)}
+    folders = {
+        folder.parents[1]
+        for folder in arrays
+        if any((folder.parents[1] / name).is_file() for name in array_metadata_files(OBSERVATIONS))
+    }
+    return [*sorted(folders), *(file for file in files if file.match("*.zarr.zip"))]
 
 
 def _by_number(file: Path) -> tuple:

@@ -12,6 +12,7 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics
 
 from .dynamics import step_angular, step_linear, undo_angular, undo_linear
@@ -31,6 +32,8 @@ def read_raw(path: Path, options: UpstreamOptions) -> Episode:
     Raises:
         FileFormatError: a damaged file, or one that is not what the original program writes.
     """
+    if not path.is_file():
+        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", kind_of(path))
     content = path.read_bytes()
     rows = load_pickle(content, path)
     after, actions, goal, obstacles, recorded_success = _parse(rows, path)
@@ -69,7 +72,7 @@ def _parse(rows: object, path: Path):
         steps = np.array([row[10] for row in rows], dtype=int)
         periods = np.array([row[11] for row in rows], dtype=float)
         success = bool(rows[-1][9])
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise FileFormatError(path, "rows of numbers as the original program writes them", str(error)) from None
     if actions.shape != (len(rows), 4) or settings.shape != (len(rows), 2 + 2 * (width - _FIXED_FIELDS)):
         raise FileFormatError(

@@ -1,4 +1,4 @@
-"""Imports the 10 Hz Zarr v2 store of the original's `process_data_zarr.py`, the form of the released data.
+"""Imports the 10 Hz Zarr store of the original's `process_data_zarr.py`, the form of the released data.
 
 Row i of an episode (k = 3 i) holds the state after action u_k, that action, and the action before it at 30 Hz; the
 two actions in between are not stored. The state in which u_k was taken is found by undoing the step. Undoing the
@@ -19,10 +19,13 @@ from copolicy.dataset.task import Physics
 from .dynamics import undo_angular, undo_linear
 from .upstream_episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
 from .upstream_map import check_by_path, rounded
-from .zarr_array import read_zarr_array
+from .zarr_store import ZarrArrays
 
 ZARR_HZ = 10
 """Rows a second of the store."""
+
+OBSERVATIONS = "data/obs"
+"""The array by which a store of this kind is found."""
 
 _FOLLOWS = 1e-3  # px, rad
 
@@ -36,11 +39,12 @@ class ZarrStore:
 
     def __init__(self, path: Path):
         self.path = path
+        arrays = ZarrArrays(path, OBSERVATIONS)
         obs, self.actions, self.past = (
-            read_zarr_array(path / "data" / name).astype(float) for name in ("obs", "action", "past_action")
+            arrays.read(name).astype(float) for name in (OBSERVATIONS, "data/action", "data/past_action")
         )
-        ends = read_zarr_array(path / "meta" / "episode_ends").astype(int).ravel()
-        rows = len(obs)
+        ends = _whole_numbers(arrays.read("meta/episode_ends"), path)
+        rows = len(np.atleast_1d(obs))
         if obs.ndim != 2 or obs.shape[1] not in (18, 19):
             raise FileFormatError(path / "data" / "obs", "18 columns, or 19 with a reward", f"shape {obs.shape}")
         for name, array in (("action", self.actions), ("past_action", self.past)):
@@ -64,6 +68,11 @@ class ZarrStore:
         obs, actions, past = self.obs[rows], self.actions[rows], self.past[rows]
         if not (np.isfinite(obs).all() and np.isfinite(actions).all() and np.isfinite(past).all()):
             raise FileFormatError(f"{self.path} (episode {index})", "finite numbers", "nan or inf")
+        # A chunk of an array that is not stored reads as zeros.
+        if (np.abs(np.hypot(obs[:, 2], obs[:, 3]) - 1) > _FOLLOWS).any():
+            raise FileFormatError(
+                f"{self.path} (episode {index})", "cosine and sine of an angle in columns 2 and 3", "others"
+            )
         content = np.column_stack((obs, actions, past)).astype("<f8").tobytes()
         actions, past = np.clip(actions, -1, 1), np.clip(past, -1, 1)
         trajectory = best_fit(lambda physics: _undo(obs, actions, past, physics), options.angular_limit)
@@ -84,6 +93,12 @@ class ZarrStore:
             notes += (f"a row differs from the dynamics by {trajectory.residual:.2g} px or rad",)
         origin = f"{self.path.name}, episode {index}"
         return build_episode(trajectory, finding.config, content, ZARR_HZ, origin, flags, notes)
+
+
+def _whole_numbers(ends: np.ndarray, path: Path) -> np.ndarray:
+    if ends.dtype.kind == "f" and not (np.abs(ends) < 1 << 53).all():
+        raise FileFormatError(path / "meta" / "episode_ends", "row numbers", "others")
+    return ends.astype(int).ravel()
 
 
 def _undo(obs: np.ndarray, actions: np.ndarray, past: np.ndarray, physics: Physics) -> Trajectory:

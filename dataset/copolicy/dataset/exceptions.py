@@ -46,6 +46,10 @@ class FileFormatError(CopolicyError):
         super().__init__(f"{path}: expected {expected}, found {found}")
 
 
+class ForeignRecordingError(FileFormatError):
+    """A sound file that holds no recording of this task, or one of a version that this reader does not know."""
+
+
 class OutputExistsError(CopolicyError):
     """An output that would overwrite something."""
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from .messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, PlayerInput, TableState
@@ -13,6 +14,9 @@ from .task import PLAYERS
 
 ENCODING = "protobuf"
 """Encoding of every message and of every schema."""
+
+SCHEMA_PACKAGE = "copolicy."
+"""What the name of every message of ours begins with, in every version."""
 
 SCREEN_FRAME = "screen: origin top left, x right, y down, theta counter-clockwise on screen"
 SCENE_FRAME = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
@@ -62,11 +66,29 @@ SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
 TOPICS = (TABLE_STATE, *INPUTS, *ACTIONS, INTERACTION, LOOP_TIMING, EVENT, SCENE_MAP, SCENE)
 """Every topic of a recording, in the order of its channels."""
 
+_SCHEMA_NAMES = {(topic.name, topic.schema_name) for topic in TOPICS}
+
 
 @functools.cache
 def schema_data(message: Any) -> bytes:
     """The FileDescriptorSet of a message and all it needs, the `data` of its schema record."""
     return build_file_descriptor_set(message).SerializeToString(deterministic=True)
+
+
+def is_ours(channel: Channel, schema_name: str) -> bool:
+    """Whether a channel has the topic of one of ours, and its encoding and schema."""
+    return channel.message_encoding == ENCODING and (channel.topic, schema_name) in _SCHEMA_NAMES
+
+
+def channel_difference(channel: Channel, schema: Schema | None, topic: Topic) -> str:
+    """What keeps messages of a file's channel from being read as those of a topic; empty where nothing does."""
+    if schema is None:
+        return f"{topic.name} without a schema"
+    kind = (channel.message_encoding, schema.encoding, schema.name)
+    if kind != (ENCODING, ENCODING, topic.schema_name):
+        return f"{topic.name} with encodings and schema {kind}"
+    difference = schema_difference(schema.data, topic.message)
+    return difference and f"{topic.name} with {difference}"
 
 
 @functools.cache

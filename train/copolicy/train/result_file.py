@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+from copolicy.dataset.file_kinds import kind_of
 
 
 def require_new(*paths: Path, overwrite: bool = False) -> None:
@@ -41,11 +42,15 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
     Raises:
         FileFormatError: no such file, or no JSON object.
     """
+    if path.exists() and not path.is_file():
+        raise FileFormatError(path, what, kind_of(path))
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise FileFormatError(path, what, kind_of(path)) from None
     except OSError as error:
         raise FileFormatError(path, what, error.strerror or str(error)) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise FileFormatError(path, what, f"no JSON ({error})") from None
     if not isinstance(content, dict):
         raise FileFormatError(path, what, f"a JSON {type(content).__name__}")

@@ -80,5 +80,5 @@ class StickCalibration:
             raise InvalidValueError("calibration", f"the entries {sorted(names)}", entries)
         try:
             return cls(**entries)
-        except TypeError:
+        except (TypeError, ValueError, IndexError):
             raise InvalidValueError("calibration", "numbers", entries) from None

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
+from copolicy.dataset.file_kinds import kind_of
 
 from .calibration import StickCalibration
 
@@ -33,12 +34,14 @@ class CalibrationStore:
         """
         self.path = folder / _FILE
         self._by_guid: dict[str, StickCalibration] = {}
+        if folder.exists() and not folder.is_dir():
+            raise FileFormatError(folder, "a folder of calibrations", kind_of(folder))
         if not self.path.exists():
             return
         try:
             entries = json.loads(self.path.read_text(encoding="utf-8"))
             self._by_guid = {str(guid): StickCalibration.from_json(one) for guid, one in entries.items()}
-        except (ValueError, AttributeError) as error:
+        except (ValueError, AttributeError, RecursionError) as error:
             raise FileFormatError(self.path, "calibrations as JSON", str(error)) from None
         except CopolicyError as error:
             raise FileFormatError(self.path, "calibrations", str(error)) from None

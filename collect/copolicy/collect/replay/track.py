@@ -5,18 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mcap.records import Channel, Message
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import theta_of
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent
+from copolicy.dataset.log import Recording, read_recording
 from copolicy.dataset.task import RECORD_HZ
-from copolicy.dataset.topics import EVENT
 
-from ..intact_records import intact_records
 from ..screen import between
 
 Pose = tuple[float, float, float]
@@ -86,8 +82,8 @@ def read_track(path: Path | str) -> Track:
     path = Path(path)
     if path.name.endswith(".part"):
         raise FileFormatError(path, "a finished recording", "one that broke off (copolicy-collect recover helps)")
-    episode = read_episode(path)
-    return track_of(path, episode, _moments(path))
+    recording = read_recording(path)
+    return track_of(path, recording.episode, _moments(recording))
 
 
 def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> Track:
@@ -99,15 +95,9 @@ def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> 
     return Track(path, episode, poses, forces, interaction_force(theta[1:], episode.actions), moments)
 
 
-def _moments(path: Path) -> tuple[Moment, ...]:
-    channels = set()
-    events = []
-    for record in intact_records(path):
-        if isinstance(record, Channel) and record.topic == EVENT.name:
-            channels.add(record.id)
-        elif isinstance(record, Message) and record.channel_id in channels:
-            events.append(EpisodeEvent.FromString(record.data))
-    return tuple(Moment(event.step, event.kind, event.detail) for event in events if event.kind not in ("start", "end"))
+def _moments(recording: Recording) -> tuple[Moment, ...]:
+    events = (event for event in recording.events if event.kind not in ("start", "end"))
+    return tuple(Moment(event.step, event.kind, event.detail) for event in events)
 
 
 def sampled(track: Track, frames_per_second: float, speed: float) -> list[float]:

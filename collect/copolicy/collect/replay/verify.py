@@ -40,7 +40,8 @@ def verify(
 
     Returns:
         Largest and last drift in px and rad, the first step beyond the limit, whether the world ends the episode
-        where and as the recording says, and `reproduced`; JSON-able, with exit status 1 where it is not.
+        where and as the recording says, `reproduced`, and what of the file carries no check sum; JSON-able, with exit
+        status 1 where it is not reproduced.
 
     Raises:
         InvalidValueError: an unknown bound, or a limit that is no positive number.
@@ -73,6 +74,7 @@ def verify(
         "recorded_end": f"{recorded} after {track.steps} steps",
         "simulated_end": f"{outcome.reason} after {ended} steps" if outcome.done else "none",
         "reproduced": bool(reproduced),
+        "not_verified": list(track.episode.notes),
         "exit_status": int(not reproduced),
     }
 

@@ -9,6 +9,7 @@ from copolicy.dataset import episode_records
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files import broken_links, distinct_files
 from copolicy.dataset.log import read_metadata
+from copolicy.dataset.recording_checks import require_version
 
 PRACTICE = "practice"
 """Quality flag of an episode to try things out; it is marked discarded too."""
@@ -42,6 +43,8 @@ def recordings(folder: Path) -> Iterator[Recorded]:
     for path in distinct_files(folder, "*.mcap"):
         try:
             records = read_metadata(path)
+            if episode_records.START_DIGEST in records.get("dataset_info", {}):  # else it is not ours
+                require_version(path, records)
             result = records[episode_records.RESULT]
             players, flags = records["players"], result["quality_flags"].split(",")
             yield Recorded(
@@ -56,4 +59,5 @@ def recordings(folder: Path) -> Iterator[Recorded]:
         except FileFormatError as error:
             logging.warning("not counted: %s", error)
         except KeyError as error:
-            logging.warning("not counted: %s: expected the metadata of a recording, found no %s", path, error)
+            message = "not counted: %s: expected a recording of this task, found no metadata entry %s"
+            logging.warning(message, path, error)

@@ -47,7 +47,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         left_out.messages += record["left_out"]["messages"]
     with new_folder(plan.root, "merging") as partial:
         info = aggregate(roots, plan.repo_id, partial, plan.folder / "cache")
-        _write_record(plan, partial, roots, left_out)
+        notes = _write_record(plan, partial, roots, left_out)
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
@@ -66,6 +66,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         "damaged_left_out": left_out.messages,
         "discarded_left_out": left_out.discarded,
         "unfinished_recordings": list(plan.unfinished),
+        "not_verified": [f"episode {uuid}: {note}" for uuid, texts in notes.items() for note in texts],
         "shards": len(plan),
         "found": {severity: counts[severity] for severity in SEVERITIES},
         "findings": [str(finding) for finding in findings],
@@ -80,7 +81,8 @@ def _require_once(uuids: list[str]) -> None:
         seen[uuid] = index
 
 
-def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> None:
+def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> dict[str, list[str]]:
+    """Writes what is known of the conversion; returns the notes by episode."""
     notes: dict[str, list[str]] = {}
     for part in roots:
         notes |= json.loads((part / RECORD_FILE).read_text(encoding="utf-8"))["notes"]
@@ -94,6 +96,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "notes": notes,
     }
     (root / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    return notes
 
 
 def _write_statistics(root: Path) -> None:

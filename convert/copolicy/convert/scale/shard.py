@@ -6,7 +6,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 
 from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
-from copolicy.dataset.checks.read_recordings import recordings_table
+from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.staging import new_folder
@@ -87,4 +87,7 @@ def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[E
         return {"applied": [], "findings": []}
     labels = [str(place) for place in range(len(prepared))]
     result = check_table(recordings_table(plan.root, labels, episodes), RECORDING_RULES)
-    return {"applied": list(result.applied), "findings": [finding.to_dict() for finding in result.findings]}
+    findings = list(result.findings)
+    for label, episode in zip(labels, episodes, strict=True):
+        findings += not_verified(label, episode)
+    return {"applied": list(result.applied), "findings": [finding.to_dict() for finding in findings]}

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
+from ..file_kinds import kind_of
 from ..files import broken_links, distinct_files
 from . import (
     balance,
@@ -90,9 +91,9 @@ def read_table(root: Path) -> EpisodeTable:
         from .read_lerobot import read_lerobot
 
         return read_lerobot(root)
-    if not distinct_files(root, "*.mcap", "*.mcap.part"):
-        broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)]
-        found = broken[0] if broken else "neither"
+    if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
+        broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)] if root.is_dir() else []
+        found = broken[0] if broken else kind_of(root)
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
     return read_recordings(root)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..commandline import progress
 from ..episode import EPISODE_COLUMNS, Episode
-from ..exceptions import CopolicyError
+from ..exceptions import CopolicyError, ForeignRecordingError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
 from ..files import broken_links, distinct_files
 from ..log import read_episode
@@ -17,7 +17,7 @@ from .finding import Finding
 
 
 def read_recordings(root: Path) -> EpisodeTable:
-    """Every `*.mcap` below a folder; a file that fails its check sums becomes a finding, as does one that broke off."""
+    """Every `*.mcap` below a folder; a file that cannot be read becomes a finding, as does one that broke off."""
     paths = distinct_files(root, "*.mcap")
     episodes: list[Episode] = []
     labels: list[str] = []
@@ -37,14 +37,21 @@ def read_recordings(root: Path) -> EpisodeTable:
             episode = read_episode(path)
         except CopolicyError as error:
             message = str(error).removeprefix(f"{path}: ")
-            damage.append(Finding(label, "check_sum", None, None, "error", message))
+            rule = "foreign" if isinstance(error, ForeignRecordingError) else "check_sum"
+            damage.append(Finding(label, rule, None, None, "error", message))
             continue
+        damage += not_verified(label, episode)
         if len(episode.actions):
             episodes.append(episode)
             labels.append(label)
         else:
             damage.append(Finding(label, "empty", 0, 1, "error", "a recording without a single step"))
     return recordings_table(root, labels, episodes, tuple(damage))
+
+
+def not_verified(label: str, episode: Episode) -> list[Finding]:
+    """What of a recording carries no check sum, so that nobody can know whether it is what was written."""
+    return [Finding(label, "not_verified", None, None, "warning", note) for note in episode.notes]
 
 
 def recordings_table(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError
+from ..file_kinds import kind_of
 from ..files import visible_files
 from ..json_file import read_json
 
@@ -85,13 +86,7 @@ def _other_version(version: str) -> str:
 
 def _instead(root: Path) -> str:
     """What is at a path that is no data set."""
-    if root.is_file():
-        return "a file"
-    if not root.is_dir():
-        return "no such folder"
-    if next(iter(visible_files(root, "*.mcap")), None) is not None:
-        return "a folder of recordings; copolicy-convert mcap makes a data set of them"
     inside = sorted((*root.glob("*/meta/info.json"), *root.glob("*/*/meta/info.json")))
     if inside:
         return f"none, but one in {inside[0].parent.parent}"
-    return "none"
+    return kind_of(root)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.file_kinds import kind_of
+from copolicy.dataset.files import visible_files
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import require_new, write_json
@@ -174,8 +176,8 @@ def _summarise(arguments: argparse.Namespace) -> dict:
         require_new(arguments.out, overwrite=arguments.overwrite)
     if arguments.ratings and not arguments.plan:
         raise InvalidValueError("--ratings", "--plan beside it, which tells the robot of each block", "none")
-    if not arguments.recordings.is_dir():
-        raise FileFormatError(arguments.recordings, "a folder of recordings", "no such folder")
+    if not arguments.recordings.is_dir() or not visible_files(arguments.recordings, "*.mcap"):
+        raise FileFormatError(arguments.recordings, "a folder of recordings", kind_of(arguments.recordings))
     plan = StudyPlan.read(arguments.plan) if arguments.plan else None
     ratings = read_ratings(arguments.ratings, plan) if arguments.ratings and plan else []
     rows, left_out = study_rows(arguments.recordings, plan)

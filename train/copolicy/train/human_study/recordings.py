@@ -5,17 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.reader import make_reader
 
 from copolicy.collect.session import recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.features import theta_of
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent
+from copolicy.dataset.log import Recording, read_recording
 from copolicy.dataset.task import RECORD_HZ
-from copolicy.dataset.topics import EVENT
 
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX
@@ -37,12 +34,12 @@ def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any
     left_out: dict[str, int] = {}
     paths: dict[tuple[str, str], Path] = {}
     for one in recordings(folder):
-        episode = read_episode(one.path)
-        reason = _left_out(episode, one.counts, plan)
+        recording = read_recording(one.path)
+        reason = _left_out(recording.episode, one.counts, plan)
         if reason:
             left_out[reason] = left_out.get(reason, 0) + 1
             continue
-        row = _row(one.path, episode, plan)
+        row = _row(one.path, recording, plan)
         place = (row["participant"], row["trial"])
         if plan and place in paths:
             raise FileFormatError(one.path, f"one kept recording of {' '.join(place)}", f"another in {paths[place]}")
@@ -63,7 +60,8 @@ def _left_out(episode: Episode, counts: bool, plan: StudyPlan | None) -> str:
     return ""
 
 
-def _row(path: Path, episode: Episode, plan: StudyPlan | None) -> dict[str, Any]:
+def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, Any]:
+    episode = recording.episode
     meta = episode.meta
     after = np.vstack((episode.states[1:], episode.final_state))
     force = np.abs(interaction_force(theta_of(after), episode.actions))
@@ -83,7 +81,7 @@ def _row(path: Path, episode: Episode, plan: StudyPlan | None) -> dict[str, Any]
         "time_s": len(episode.actions) / RECORD_HZ,
         "interaction_mean": float(force.mean()),
         "interaction_p95": float(np.quantile(force, 0.95)),
-        "planning_ms": _planning_ms(path),
+        "planning_ms": _planning_ms(recording),
         "quality_flags": meta.quality_flags,
         "recording": path.name,
         "session_id": meta.session_id,
@@ -102,12 +100,10 @@ def _row(path: Path, episode: Episode, plan: StudyPlan | None) -> dict[str, Any]
     return {**row, "trial": code, "block": trial.block, "robot": trial.robot}
 
 
-def _planning_ms(path: Path) -> float | None:
+def _planning_ms(recording: Recording) -> float | None:
     """Median of the episode's plans, as the recording tells it; None where it tells nothing."""
-    with path.open("rb") as file:
-        for _, _, message in make_reader(file).iter_messages([EVENT.name]):
-            event = EpisodeEvent.FromString(message.data)
-            found = _PLANS.search(event.detail) if event.kind == "plans" else None
-            if found:
-                return float(found[1])
+    for event in recording.events:
+        median = _PLANS.search(event.detail) if event.kind == "plans" else None
+        if median:
+            return float(median[1])
     return None

@@ -1,0 +1,86 @@
+"""What is not what a command takes, or is broken, gives one line and exit status 1 or 2, in every command.
+
+Samples of tests/benchmarks/foreign_sweep.py.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+from benchmarks import foreign_sweep
+from foreign_files import FOREIGN
+from reading_commands import COMMANDS, call
+
+from copolicy.collect.inputs.calibration_store import CalibrationStore
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.file_kinds import kind_of
+
+KINDS = {
+    "nothing": "nothing there",
+    "empty file": "an empty file",
+    "text": "a text file",
+    "zeros": "zeros",
+    "magic alone": "an MCAP file",
+    "hdf5": "an HDF5 file",
+    "npz": "a NumPy archive (.npz)",
+    "npy": "a NumPy array (.npy)",
+    "pickle": "a pickle",
+    "parquet": "a Parquet file",
+    "json": "a JSON file",
+    "zip": "a zip archive",
+    "damaged zip": "a damaged zip archive",
+    "zarr zip of another project": "a zipped Zarr store (copolicy-convert upstream takes the original program's)",
+    "pipe": "a pipe, socket or device",
+    "empty folder": "an empty folder",
+    "folder of text": "a folder of other files",
+    "recordings of another project": "a folder of recordings (copolicy-convert mcap takes it)",
+    "folder of hdf5": "a folder of other files (.hdf5)",
+    "lerobot of another task": "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)",
+    "zarr v2 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
+    "zarr v3 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_and_folders_are_called_what_they_are(tmp_path, kind):
+    assert kind_of(FOREIGN[kind](tmp_path)) == KINDS[kind]
+
+
+OWN_READERS = ("collect replay", "collect recover", "convert mcap", "convert upstream", "dataset check")
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_each_gives_one_line_in_each_command(tmp_path, kind, monkeypatch):
+    commands = {name: COMMANDS[name] for name in OWN_READERS}
+    if kind in ("text", "lerobot of another task", "recordings of another project", "zarr v3 of another project"):
+        commands = {name: build for name, build in COMMANDS.items() if name != "dataset stats"}
+    monkeypatch.setattr(foreign_sweep, "COMMANDS", commands)
+    for command, _, verdict, words in foreign_sweep.foreign(tmp_path, {kind: FOREIGN[kind]}):
+        assert verdict in ("refused", "passed"), (command, words)
+        if verdict == "refused" and command != "dataset check":
+            assert "place" in words, (command, words)  # the path
+            assert "expected" in words
+
+
+def test_damaged_files_give_one_line_or_pass(tmp_path):
+    verdicts = [verdict for *_, verdict, _ in foreign_sweep.mutated(tmp_path, 2, 5)]
+    assert set(verdicts) <= {"refused", "passed"}
+    assert verdicts.count("refused") > len(verdicts) / 3
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="nothing is forbidden to this user")
+def test_what_may_not_be_read_is_said_so(tmp_path):
+    for path in (tmp_path / "a.mcap", tmp_path / "a.zarr.zip"):
+        path.write_bytes(b"PK")
+        path.chmod(0)
+        for command in ("collect replay", "convert mcap", "convert upstream"):
+            verdict, words = call(*COMMANDS[command](path, tmp_path))
+            assert verdict == "refused"
+            assert "Permission denied" in words
+
+
+def test_a_file_in_place_of_the_folder_of_calibrations(tmp_path):
+    (tmp_path / "config").write_text("x", encoding="utf-8")
+    with pytest.raises(FileFormatError, match=r"config: expected a folder of calibrations, found a text file"):
+        CalibrationStore(tmp_path / "config")
+    assert Path(tmp_path / "config").read_text(encoding="utf-8") == "x"
