@@ -69,7 +69,8 @@ def read_info(root: Path) -> dict[str, Any]:
 
 
 def require_episodes(root: Path, info: dict[str, Any]) -> None:
-    """
+    """Refuses a data set into which nothing was recorded yet.
+
     Raises:
         FileFormatError: a data set that says of itself that it has no episode, and has none.
     """
