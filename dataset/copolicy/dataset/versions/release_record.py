@@ -7,6 +7,7 @@ from pathlib import Path
 from ..exceptions import FileFormatError, UnknownNameError
 from .content import Content
 from .data_version import DataVersion
+from .withdrawals import is_anonymous
 
 RELEASE_FILE = "meta/copolicy_release.json"
 """The newest release."""
@@ -26,6 +27,7 @@ class ReleaseRecord:
         changes: what changed since the release before, a line each.
         files_sha256: digest of all other files, which tells that a card or the layout changed.
         content: digests of each episode, feature and episode column.
+        withdrawn: episodes that people had withdrawn by then.
     """
 
     version: str
@@ -35,6 +37,7 @@ class ReleaseRecord:
     content_hash: str
     files_sha256: str
     content: Content
+    withdrawn: int = 0
 
     @property
     def data_version(self) -> DataVersion:
@@ -43,6 +46,8 @@ class ReleaseRecord:
     def to_text(self) -> str:
         """The text of the file."""
         fields = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
+        if not self.withdrawn:
+            del fields["withdrawn"]  # as readers of earlier versions expect it
         return json.dumps(fields, indent=1) + "\n"
 
     @classmethod
@@ -72,7 +77,9 @@ class ReleaseRecord:
             raise ValueError("another schema")
         fields.pop("tag")
         record = cls(**{**fields, "content": Content.from_json(fields["content"])})
-        if record.content.hash != record.content_hash:
+        # What was withdrawn after the release has no digest any more.
+        anonymous = any(is_anonymous(episode) for episode in record.content.episodes)
+        if not anonymous and record.content.hash != record.content_hash:
             raise ValueError("a content hash that is not that of the episodes listed")
         return record
 
