@@ -15,6 +15,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.versions.withdrawals import WITHDRAWALS_FILE, withdrawals_text
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,17 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
         assert f"](figures/{name}.png)" in text
         assert (dataset / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((dataset / "figures").iterdir())) == 2
+
+
+def test_the_datasheet_names_the_command_that_withdraws(dataset):
+    _set_column(dataset, "source", ["human"] * len(DatasetFacts.read(dataset).episodes))
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "copolicy-dataset withdraw CONSENT_ID PATH... --yes" in text
+    assert "Withdrawn so far" not in text
+    entries = [{"date": "2026-03-01", "episodes": 2}, {"date": "2026-04-01", "episodes": 1}]
+    (dataset / WITHDRAWALS_FILE).write_text(withdrawals_text(entries), encoding="utf-8")
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "Withdrawn so far: 3 episodes, which are in no file of this version." in text
 
 
 def test_figures_can_be_left_out(dataset):

@@ -1,5 +1,6 @@
 """Excluded episodes: flagged, kept, listed, carried along, and left out of training."""
 
+import errno
 import json
 import os
 import shutil
@@ -134,7 +135,7 @@ def test_a_crash_before_the_renaming_leaves_the_old_file(root, monkeypatch):
     before = contents(root)
 
     def crash(*_):
-        raise OSError("the power went")
+        raise OSError(errno.EIO, "the power went")
 
     monkeypatch.setattr(os, "replace", crash)
     with pytest.raises(OSError, match="the power went"):

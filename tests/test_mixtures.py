@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, FRAMES, make_data_set, set_columns, set_frames
+from copolicy.convert.zarr_array import read_zarr_array
 from loaded_sets import load
 
 from copolicy.cards.cli import main as cards
@@ -23,7 +24,6 @@ from copolicy.collect.simulate import simulate
 from copolicy.collect.world import TableWorld
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.zarr_array import read_zarr_array
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.features import theta_of

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from copolicy.dataset.documents import ConversionRecord
 from copolicy.dataset.features import ACTION
+from copolicy.dataset.versions.withdrawals import read_withdrawals
 
 from .artefacts import CONVERSION_FILE, newest_release, read_json
 from .facts import DatasetFacts
@@ -138,12 +139,16 @@ def _maintenance(facts: DatasetFacts) -> list[str]:
 
 def _consent(facts: DatasetFacts) -> list[str]:
     people = [episode for episode in facts.episodes if episode["source"] == "human"]
+    withdrawn = sum(entry["episodes"] for entry in read_withdrawals(facts.root))
+    gone = [f"Withdrawn so far: {withdrawn} episodes, which are in no file of this version."] if withdrawn else []
     if not people:
-        return ["No episode is marked as played by people, so there is no consent to state."]
+        return ["No episode is marked as played by people, so there is no consent to state.", *gone]
     named = sum(bool(episode["consent_id"]) for episode in people)
     return [
         f"Consent: {share(named, len(people))} episodes played by people name a consent record (by its identifier; the "
         "record itself is kept by whoever recorded)",
-        "Withdrawal: a person's episodes are found by their pseudonym and left out of the next version; copies that "
-        "were downloaded before cannot be called back.",
+        "Withdrawal: whoever recorded deletes a person's episodes by their consent id "
+        "(`copolicy-dataset withdraw CONSENT_ID PATH... --yes`: recordings, data set, raw copies and the records of "
+        "earlier releases) and publishes the next version; copies that were downloaded before cannot be called back.",
+        *gone,
     ]

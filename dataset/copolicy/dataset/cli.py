@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from .checks.command import add_check_command
 from .commandline import command_parser, run
+from .edit.commands import add_amend_command, add_select_command, add_split_command, add_withdraw_command
 from .exclusions import add_exclude_command
 from .hub.commands import add_publish_command, add_pull_command
 from .statistics import add_stats_command
@@ -15,6 +16,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser, commands = command_parser("copolicy-dataset", "Check, measure, version and publish a data set.")
     add_check_command(commands)
     add_exclude_command(commands)
+    add_select_command(commands)
+    add_split_command(commands)
+    add_withdraw_command(commands)
+    add_amend_command(commands)
     add_stats_command(commands)
     add_release_command(commands)
     add_diff_command(commands)

@@ -7,17 +7,14 @@ and resuming with LeRobot carry them along; a file beside them would be lost at 
 """
 
 import argparse
-import os
-import re
-import secrets
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from .commandline import add_command
-from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
-from .files import visible_files
+from .episode_rows import chosen_episodes, episode_tables, with_column, write_tables
+from .exceptions import InvalidValueError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -54,7 +51,7 @@ def excluded_episodes(root: Path) -> list[ExcludedEpisode]:
     Raises:
         FileFormatError: no LeRobot data set with the episode columns.
     """
-    rows = [row for table in _tables(root).values() for row in _rows(table)]
+    rows = [row for table in episode_tables(root, _NEEDED).values() for row in _rows(table)]
     return sorted(ExcludedEpisode(row.episode, row.episode_uuid, row.reason) for row in rows if row.discarded)
 
 
@@ -151,68 +148,19 @@ def _without(flags: Iterable[str]) -> tuple[str, ...]:
 
 
 def _change(root: Path, episodes: Sequence[str], change: Callable[[_Row], _Row]) -> None:
-    """Rewrites the files of meta/episodes that hold chosen episodes.
-
-    All new files are complete on the disk before the first takes its place, each in one step: a crash leaves old or
-    new files, never half of one, and the same call again completes what it began.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    tables = _tables(root)
-    chosen = _chosen(episodes, [row for table in tables.values() for row in _rows(table)])
-    staged: dict[Path, Path] = {}
-    try:
-        for path, table in tables.items():
-            rows = _rows(table)
-            after = [change(row) if row.episode in chosen else row for row in rows]
-            if after == rows:
-                continue
-            for name, values in (
-                ("discarded", [row.discarded for row in after]),
-                ("quality_flags", [",".join(row.flags) for row in after]),
-            ):
-                place = table.schema.get_field_index(name)
-                # A column of nulls alone has no type yet, as after a merge with a set that lacks it.
-                field = pa.field(name, pa.bool_() if name == "discarded" else pa.string())
-                table = table.set_column(place, field, pa.array(values, field.type))
-            staged[path] = partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-            with partial.open("xb") as file:
-                pq.write_table(table, file, compression="snappy")
-                file.flush()
-                os.fsync(file.fileno())
-        for path, partial in staged.items():
-            os.replace(partial, path)
-    finally:
-        for partial in staged.values():
-            partial.unlink(missing_ok=True)
-
-
-def _tables(root: Path) -> "dict[Path, pa.Table]":
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyarrow") from None
-    # The types of all columns, before any of them is rewritten.
-    from .lerobot_folder.folder import LeRobotFolder
-
-    LeRobotFolder.open(root).rows(_NEEDED[1:])
-    files = visible_files(root / "meta" / "episodes", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
-    tables = {}
-    for path in files:
-        try:
-            # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
-            with pq.ParquetFile(path) as file:
-                tables[path] = file.read()
-        except (pa.ArrowException, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
-        missing = [name for name in _NEEDED if name not in tables[path].column_names]
-        if missing:
-            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
-    return tables
+    """Rewrites the files of meta/episodes that hold chosen episodes."""
+    tables = episode_tables(root, _NEEDED)
+    everything = [row for table in tables.values() for row in _rows(table)]
+    names = {row.episode_uuid: row.episode for row in everything if row.episode_uuid}
+    chosen = chosen_episodes(episodes, (row.episode for row in everything), names)
+    changed: dict[Path, pa.Table] = {}
+    for path, table in tables.items():
+        rows = _rows(table)
+        after = [change(row) if row.episode in chosen else row for row in rows]
+        if after != rows:
+            table = with_column(table, "discarded", [row.discarded for row in after], "bool")
+            changed[path] = with_column(table, "quality_flags", [",".join(row.flags) for row in after], "str")
+    write_tables(changed)
 
 
 def _rows(table: "pa.Table") -> list[_Row]:
@@ -225,22 +173,3 @@ def _rows(table: "pa.Table") -> list[_Row]:
         )
         for row in table.select(_NEEDED).to_pylist()
     ]
-
-
-def _chosen(episodes: Sequence[str], rows: Sequence[_Row]) -> set[int]:
-    numbers = {row.episode for row in rows}
-    names = {row.episode_uuid: row.episode for row in rows if row.episode_uuid}
-    chosen: set[int] = set()
-    for text in episodes:
-        if text in names:
-            chosen.add(names[text])
-            continue
-        match = re.fullmatch(r"(\d+)(?:-(\d+))?", text)
-        # The end is cut first: a range may name more numbers than fit into memory.
-        first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, -1)
-        wanted = set(range(first, min(last, first + len(numbers)) + 1))
-        if not wanted or not wanted <= numbers:
-            span = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or episode_uuids of the data set"
-            raise InvalidValueError("--episodes", span, text)
-        chosen |= wanted
-    return chosen

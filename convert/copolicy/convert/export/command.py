@@ -30,6 +30,16 @@ def add_export_command(commands: argparse._SubParsersAction) -> None:
         "the original's store)",
     )  # fmt: skip
     parser.add_argument(
+        "--valid", type=float, metavar="PROPORTION",
+        help="robomimic only: episodes for its filter key `valid`, the others are `train` (default: the splits of the "
+        "data set, which copolicy-dataset split --as-splits writes)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--valid-by", choices=("pairs", "maps", "episodes"),
+        help="with --valid: what is never in both, as in copolicy-dataset split (default: pairs)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, help="with --valid: of the choice (default: 0)")
+    parser.add_argument(
         "--keep-discarded", action="store_true", help="export discarded and excluded episodes, too; they stay flagged"
     )
 
@@ -37,6 +47,11 @@ def add_export_command(commands: argparse._SubParsersAction) -> None:
 def _export(arguments: argparse.Namespace) -> dict:
     if arguments.alignment and arguments.format != "zarr":
         raise InvalidValueError("--alignment", "--format zarr beside it", arguments.format)
+    for flag, value in (("--valid", arguments.valid), ("--valid-by", arguments.valid_by), ("--seed", arguments.seed)):
+        if value is not None and (arguments.format != "robomimic" or arguments.valid is None):
+            raise InvalidValueError(flag, "--format robomimic and --valid beside it", value)
+    if arguments.seed is not None and arguments.seed < 0:
+        raise InvalidValueError("--seed", "at least 0", arguments.seed)
     require_new(arguments.out)
 
     from .source import ExportSource
@@ -47,9 +62,11 @@ def _export(arguments: argparse.Namespace) -> dict:
 
         written = export_replay_buffer(source, arguments.out, arguments.alignment or "ours")
     elif arguments.format == "robomimic":
-        from .robomimic import export_robomimic
+        from .robomimic import Validation, export_robomimic
 
-        written = export_robomimic(source, arguments.out)
+        asked = arguments.valid, arguments.valid_by or "pairs", arguments.seed or 0
+        validation = None if arguments.valid is None else Validation(*asked)
+        written = export_robomimic(source, arguments.out, validation)
     else:
         from .minari import export_minari
 

@@ -2,18 +2,22 @@
 
 `data/demo_i` with `actions`, `obs/*`, `next_obs/*`, `rewards`, `dones` and `states`; its attributes are the episode
 columns, `source` among them. Filter keys under `mask`: each split of the data set (`val` and `validation` as
-robomimic's `valid`), `success` and `failure`, and one for each source.
+robomimic's `valid`), or `train` and `valid` as asked for, `success` and `failure`, and one for each source.
 Format: https://robomimic.github.io/docs/datasets/overview.html
 """
 
+import hashlib
 import json
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.exceptions import MissingExtraError
+from copolicy.dataset.edit.groups import By, groups
+from copolicy.dataset.edit.parts import Part, deal
+from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.staging import new_file
 from copolicy.dataset.task import Physics
 
@@ -29,20 +33,51 @@ _ENVIRONMENT = "copolicy/TableCarrying-v0"  # registered by importing lerobot_po
 _SPLITS = {"val": "valid", "validation": "valid"}
 
 
-def export_robomimic(source: ExportSource, out: Path) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Validation:
+    """Episodes to set apart as `valid`.
+
+    Attributes:
+        proportion: of the exported episodes, in (0, 1).
+        by: what is never in both `train` and `valid` (`copolicy.dataset.edit.parts`).
+        seed: of the choice.
+    """
+
+    proportion: float
+    by: By = "pairs"
+    seed: int = 0
+
+    def __post_init__(self):
+        if not 0 < self.proportion < 1:
+            raise InvalidValueError("--valid", "a proportion between 0 and 1", self.proportion)
+
+
+def export_robomimic(source: ExportSource, out: Path, validation: Validation | None = None) -> dict[str, Any]:
     """Writes the file at `out`; returns facts for the summary.
+
+    Args:
+        validation: what the filter keys `train` and `valid` hold, where the data set names no splits itself.
 
     Raises:
         OutputExistsError: there is something at `out`.
+        InvalidValueError: the data set names several splits, and others are asked for.
+        RunError: nothing can be set apart without being in both.
     """
+    if validation is not None and len(source.splits) > 1:
+        found = f"the splits {', '.join(source.splits)} in {source.root}"
+        raise InvalidValueError("--valid", "a data set without a split of its own", found)
+    motions: list[str] = []
     with new_file(out) as partial, h5py.File(partial, "w") as file:
         data = file.create_group("data")
         masks: dict[str, list[str]] = defaultdict(list)
         for number, episode in enumerate(source.episodes()):
             name = f"demo_{number}"
             _write_demo(data.create_group(name), episode)
-            for mask in _masks(source, episode):
+            motions.append(hashlib.sha256(episode.states.tobytes() + episode.actions.tobytes()).hexdigest())
+            for mask in _masks(source, episode, splits=validation is None):
                 masks[mask].append(name)
+        if validation is not None:
+            masks |= _set_apart(source, motions, validation)
         kwargs = {"fps": source.fps, **_physics_kwargs(source.physics)}
         environment = {"env_name": _ENVIRONMENT, "type": _GYM, "env_kwargs": kwargs}
         data.attrs.update({"total": source.frames, "env_args": json.dumps(environment)})
@@ -82,6 +117,14 @@ def _physics_kwargs(physics: Physics | None) -> dict[str, float]:
     return {} if limit == default else {"angular_acceleration_limit": limit}
 
 
-def _masks(source: ExportSource, episode: ExportEpisode) -> list[str]:
-    splits = [_SPLITS.get(name, name) for name, indices in source.splits.items() if episode.index in indices]
-    return [*splits, "success" if episode.meta["success"] else "failure", f"source_{episode.meta['source']}"]
+def _masks(source: ExportSource, episode: ExportEpisode, splits: bool) -> list[str]:
+    inside = [name for name, indices in source.splits.items() if splits and episode.index in indices]
+    names = [_SPLITS.get(name, name) for name in inside]
+    return [*names, "success" if episode.meta["success"] else "failure", f"source_{episode.meta['source']}"]
+
+
+def _set_apart(source: ExportSource, motions: list[str], validation: Validation) -> dict[str, list[str]]:
+    parts = [Part("train", 1 - validation.proportion), Part("valid", validation.proportion)]
+    together = groups(source.rows, motions, validation.by)
+    dealt = deal(source.rows, together, parts, validation.by, validation.seed, "--valid")
+    return {name: [f"demo_{place}" for place in places] for name, places in dealt.items()}

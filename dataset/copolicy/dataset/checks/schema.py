@@ -6,6 +6,7 @@ from typing import get_args
 import numpy as np
 
 from ..episode import EPISODE_COLUMNS, Source, TerminationReason
+from ..episode_rows import stripped_hint
 from ..features import ACTION, FEATURES, HUMAN_ACTION
 from ..task import RECORD_HZ
 from .episode_table import EpisodeTable
@@ -66,7 +67,8 @@ def _features(table: EpisodeTable) -> Iterator[Finding]:
 def _columns(table: EpisodeTable) -> Iterator[Finding]:
     missing = [name for name in EPISODE_COLUMNS if name not in table.columns]
     if missing:
-        message = f"meta/episodes has no usable columns {', '.join(missing)}"
+        hint = stripped_hint(table.info, table.root) if "episode_uuid" in missing and table.kind == "lerobot" else ""
+        message = f"meta/episodes has no usable columns {', '.join(missing)}{hint}"
         yield Finding("", "schema", len(missing), 0, "error", message)
     for name, choices in _CHOICES.items():
         if name in table.columns:

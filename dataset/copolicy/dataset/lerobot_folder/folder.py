@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
+from ..episode_rows import stripped_hint
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
@@ -87,7 +88,8 @@ class LeRobotFolder:
         path = self.root / "meta" / "episodes"
         missing = [name for name in columns if name not in self.episodes.column_names and name not in LATER_COLUMNS]
         if missing:
-            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}")
+            hint = stripped_hint(self.info, self.root) if "episode_uuid" in missing else ""
+            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}{hint}")
         values: dict[str, list[Any]] = {name: self.episodes.column(name).to_pylist() for name in POSITIONS[:2]}
         for name in columns:
             if name in self.episodes.column_names:

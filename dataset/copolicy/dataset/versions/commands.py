@@ -69,7 +69,7 @@ def _diff(arguments: argparse.Namespace) -> dict:
     difference = compare(a.content, b.content)
     summary: dict = {
         "same": difference.same,
-        "content_hash": {"a": a.content.hash, "b": b.content.hash},
+        "content_hash": {"a": a.content_hash, "b": b.content_hash},
         "exit_status": 0,
     }
     statistics = None

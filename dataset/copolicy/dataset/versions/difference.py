@@ -13,6 +13,7 @@ from typing import Any
 
 from .content import Content, EpisodeContent
 from .data_version import BUMPS, Bump
+from .withdrawals import is_anonymous
 
 EXCLUSION = "discarded"
 """The episode column that tells training to leave an episode out."""
@@ -39,6 +40,7 @@ class Difference:
         renumbered: episodes in both whose number differs.
         frames_changed: those of `episodes_changed` with other frames, not only other episode columns.
         exclusions_changed: those of `episodes_changed` that `copolicy-dataset exclude` excluded or included.
+        withdrawn: those of `episodes_removed` that nothing names any more (`withdrawals`).
     """
 
     schema: tuple[Change, ...]
@@ -48,6 +50,7 @@ class Difference:
     renumbered: tuple[str, ...]
     frames_changed: tuple[str, ...]
     exclusions_changed: tuple[str, ...]
+    withdrawn: tuple[str, ...] = ()
 
     @property
     def same(self) -> bool:
@@ -60,9 +63,11 @@ class Difference:
         told = {*self.frames_changed, *self.exclusions_changed}
         metadata = [uuid for uuid in self.episodes_changed if uuid not in told]
         columns = {name for uuid in metadata for name in self.episodes_changed[uuid]}
+        removed = [uuid for uuid in self.episodes_removed if uuid not in self.withdrawn]
         found = [
             *self.schema,
-            *_counted("major", "removed", self.episodes_removed),
+            *_withdrawn(len(self.withdrawn)),
+            *_counted("major", "removed", removed),
             *_counted("major", "with other frames", self.frames_changed),
             *_counted("major", "with another number", self.renumbered),
             *_counted("minor", "added", self.episodes_added),
@@ -102,6 +107,7 @@ def compare(before: Content, after: Content) -> Difference:
         renumbered=tuple(uuid for uuid in common if old[uuid][0] != new[uuid][0]),
         frames_changed=tuple(frames),
         exclusions_changed=tuple(uuid for uuid, names in changed.items() if EXCLUSION in names),
+        withdrawn=tuple(uuid for uuid, (_, episode) in old.items() if uuid not in new and is_anonymous(episode)),
     )
 
 
@@ -118,7 +124,7 @@ def _schema_changes(before: Content, after: Content) -> Iterable[Change]:
             parts = (f"{key} {a.get(key)} -> {b.get(key)}" for key in sorted({*a, *b}) if a.get(key) != b.get(key))
             yield Change("major", f"feature {name}: {', '.join(parts)}")
     yield from _set_changes("task", before.tasks, after.tasks)
-    if before.episodes and after.episodes:
+    if any(_columns(before.episodes)) and any(_columns(after.episodes)):
         yield from _set_changes("episode column", _columns(before.episodes), _columns(after.episodes))
 
 
@@ -130,11 +136,22 @@ def _set_changes(kind: str, before: Iterable[str], after: Iterable[str]) -> Iter
 
 
 def _columns(episodes: tuple[EpisodeContent, ...]) -> Iterable[str]:
-    return episodes[0].columns  # the same in all
+    return next((episode.columns for episode in episodes if episode.columns), {})  # the same in all
 
 
 def _differing(a: dict[str, str], b: dict[str, str], names: Iterable[str]) -> list[str]:
     return sorted(name for name in names if a.get(name) != b.get(name))
+
+
+def _withdrawn(count: int) -> Iterable[Change]:
+    if count:
+        yield Change("major", withdrawal_text(count))
+
+
+def withdrawal_text(count: int) -> str:
+    """The line of a change log for withdrawn episodes: how many, not which."""
+    what = "episode" if count == 1 else "episodes"
+    return f"{count} {what} removed: withdrawn by people who took part"
 
 
 def _counted(bump: Bump, what: str, uuids: Iterable[str]) -> Iterable[Change]:

@@ -10,9 +10,10 @@ from ..exceptions import InvalidValueError, RunError
 from .changelog import CHANGELOG_FILE, with_release
 from .content import Content, read_content
 from .data_version import BUMPS, Bump, DataVersion
-from .difference import Change, compare
+from .difference import Change, compare, withdrawal_text
 from .manifest import MANIFEST_FILE, FileEntry, Manifest, file_entry
 from .release_record import EARLIER_FOLDER, RELEASE_FILE, ReleaseRecord, read_release
+from .withdrawals import read_withdrawals
 
 
 def release(root: Path, bump: Bump, notes: str, date: datetime.date | None = None) -> ReleaseRecord:
@@ -36,7 +37,8 @@ def release(root: Path, bump: Bump, notes: str, date: datetime.date | None = Non
     manifest = Manifest.of_folder(root)
     files_sha256 = manifest.digest(without=_own_files(manifest))
     last = read_release(root) if (root / RELEASE_FILE).exists() else None
-    changes = _changes(last, content, files_sha256)
+    withdrawn = sum(entry["episodes"] for entry in read_withdrawals(root))
+    changes = _changes(last, content, files_sha256, withdrawn)
     if last is not None:
         if not changes:
             raise RunError(f"{root}: expected a change since release {last.version}, found none; nothing was written")
@@ -47,19 +49,26 @@ def release(root: Path, bump: Bump, notes: str, date: datetime.date | None = Non
     version = str((last.data_version if last else DataVersion(0, 0, 0)).bumped(bump))
     day = (date or datetime.datetime.now(datetime.UTC).date()).isoformat()
     lines = [change.text for change in changes]
-    record = ReleaseRecord(version, day, notes, lines, content.hash, files_sha256, content)
+    record = ReleaseRecord(version, day, notes, lines, content.hash, files_sha256, content, withdrawn)
     _write(root, record, changes, last, manifest)
     return record
 
 
-def _changes(last: ReleaseRecord | None, content: Content, files_sha256: str) -> tuple[Change, ...]:
+def _changes(last: ReleaseRecord | None, content: Content, files_sha256: str, withdrawn: int) -> tuple[Change, ...]:
     if last is None:
         frames = sum(episode.frames for episode in content.episodes)
-        return (Change("minor", f"{len(content.episodes)} episodes added, {frames} frames"),)
-    changes = compare(last.content, content).changes
+        changes = (Change("minor", f"{len(content.episodes)} episodes added, {frames} frames"),)
+        return (*changes, *_never_released(withdrawn))
+    difference = compare(last.content, content)
+    # Of what was withdrawn since, the last release may have held a part.
+    changes = (*difference.changes, *_never_released(withdrawn - last.withdrawn - len(difference.withdrawn)))
     if not changes and files_sha256 != last.files_sha256:
         return (Change("patch", "files changed beside the content (card, statistics, figures or layout)"),)
     return changes
+
+
+def _never_released(count: int) -> tuple[Change, ...]:
+    return (Change("patch", f"{withdrawal_text(count)}; no release held them"),) if count > 0 else ()
 
 
 def _own_files(manifest: Manifest) -> set[str]:

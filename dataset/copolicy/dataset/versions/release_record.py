@@ -3,13 +3,14 @@
 import json
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError, UnknownNameError
 from ..files import visible_files
 from ..json_file import read_json
 from .content import Content, ContentFields
 from .data_version import DataVersion
+from .withdrawals import is_anonymous
 
 RELEASE_FILE = "meta/copolicy_release.json"
 """The newest release."""
@@ -32,6 +33,7 @@ class _Record(TypedDict):
     content_hash: str
     files_sha256: str
     content: ContentFields
+    withdrawn: NotRequired[int]
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class ReleaseRecord:
         changes: what changed since the release before, a line each.
         files_sha256: digest of all other files, which tells that a card or the layout changed.
         content: digests of each episode, feature and episode column.
+        withdrawn: episodes that people had withdrawn by then.
     """
 
     version: str
@@ -52,6 +55,7 @@ class ReleaseRecord:
     content_hash: str
     files_sha256: str
     content: Content
+    withdrawn: int = 0
 
     @property
     def data_version(self) -> DataVersion:
@@ -60,6 +64,8 @@ class ReleaseRecord:
     def to_text(self) -> str:
         """The text of the file."""
         record = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
+        if not self.withdrawn:
+            del record["withdrawn"]  # as readers of earlier versions expect it
         return json.dumps(record, indent=1) + "\n"
 
     @classmethod
@@ -73,9 +79,11 @@ class ReleaseRecord:
         stored = read_json(path, _Record, what)
         if stored["schema"] != _SCHEMA:
             raise FileFormatError(path, what, f"schema {stored['schema']!r}")
-        values: dict[str, Any] = {column.name: stored[column.name] for column in fields(cls)}
+        values: dict[str, Any] = {column.name: stored[column.name] for column in fields(cls) if column.name in stored}
         record = cls(**{**values, "content": Content.from_json(stored["content"])})
-        if record.content.hash != record.content_hash:
+        # What was withdrawn after the release has no digest any more.
+        anonymous = any(is_anonymous(episode) for episode in record.content.episodes)
+        if not anonymous and record.content.hash != record.content_hash:
             raise FileFormatError(path, what, "a content hash that is not that of the episodes listed")
         _ = record.data_version
         return record

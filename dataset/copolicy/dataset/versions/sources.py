@@ -24,6 +24,11 @@ class Side:
     name: str
     content: Content
     statistics: dict[str, Any] | None
+    released_hash: str = ""  # of a release, which is known even where episodes were withdrawn from its record
+
+    @property
+    def content_hash(self) -> str:
+        return self.released_hash or self.content.hash
 
 
 def read_side(text: str) -> Side:
@@ -41,7 +46,8 @@ def read_side(text: str) -> Side:
         return Side(text, read_content(Path(text)), read_statistics(Path(text)))
     name, _, revision = text.rpartition("@") if "@" in text else (text, "", "")
     if revision and Path(name).is_dir():
-        return Side(text, read_release(Path(name), revision).content, None)
+        record = read_release(Path(name), revision)
+        return Side(text, record.content, None, record.content_hash)
     if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
         from ..hub.download import download, resolve
         from ..hub.raw_recordings import RAW_FOLDER

@@ -1,0 +1,80 @@
+"""Which episodes of a data set belong together: those of a pair and its partners, of a map, or copies alone."""
+
+import re
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
+from typing import Literal
+
+from .selection import Row, consents_of
+
+By = Literal["pairs", "maps", "episodes"]
+"""What stays together: people who carried together or with the same partner; a map; nothing but copies."""
+
+_VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
+
+
+def groups(rows: Sequence[Row], motions: Sequence[Hashable], by: By, same_consent: bool = False) -> list[list[int]]:
+    """The places of the episodes that must stay together, each group ascending, in the order of their first.
+
+    Episodes that are copies of each other (the same recording or motion) stay together in any case. `pairs`: a person
+    who carried with two partners joins both pairs; scripted agents are meant to be met again, so that simulated
+    episodes are joined by their pair alone; episodes of people who are not named stay together, as nobody can tell
+    them apart. `maps`: a map with its start orientations and displaced copies.
+
+    Args:
+        motions: a digest of each episode's states and actions.
+        same_consent: `pairs` only; a consent id in two pairs is the same person.
+    """
+    joined = _Joined(len(rows))
+    for place, (row, motion) in enumerate(zip(rows, motions, strict=True)):
+        joined.join(place, ("motion", motion))
+        if row.get("source_sha256"):
+            joined.join(place, ("recording", row["source_sha256"]))
+        for key in _keys(row, by, same_consent):
+            joined.join(place, key)
+    return joined.groups()
+
+
+def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
+    if by == "maps":
+        yield "map", base_map(row)
+    elif by == "pairs":
+        pair = row.get("pair_id") or ""
+        if row.get("source") == "simulated":
+            yield "simulated pair", pair
+            return
+        names = [row[column] for column in ("player_0_id", "player_1_id") if row.get(column)]
+        yield from (("person", name) for name in names)
+        if pair or not names:
+            yield "pair", pair
+        if same_consent:
+            yield from (("consent", consent) for consent in consents_of(row))
+
+
+def base_map(row: Row) -> str:
+    """The map of an episode, whatever its start orientation."""
+    return _VARIANT.sub("", row.get("map_id") or "")
+
+
+class _Joined:
+    """Places joined by the keys that they share (union-find)."""
+
+    def __init__(self, count: int):
+        self._parents = list(range(count))
+        self._seen: dict[Hashable, int] = {}
+
+    def join(self, place: int, key: Hashable) -> None:
+        a, b = self._root(place), self._root(self._seen.setdefault(key, place))
+        self._parents[max(a, b)] = min(a, b)
+
+    def _root(self, place: int) -> int:
+        while self._parents[place] != place:
+            self._parents[place] = self._parents[self._parents[place]]
+            place = self._parents[place]
+        return place
+
+    def groups(self) -> list[list[int]]:
+        found: dict[int, list[int]] = defaultdict(list)
+        for place in range(len(self._parents)):
+            found[self._root(place)].append(place)
+        return list(found.values())

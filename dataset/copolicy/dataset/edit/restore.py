@@ -1,0 +1,201 @@
+"""`amend --restore-from`: episode columns that other tools left out, from recordings or an earlier version.
+
+LeRobot's delete and split write meta/episodes without them. Episodes are told by their motion: states and actions of
+every frame, bit for bit as a data set stores them.
+"""
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from ..checks.duplicates import motion_digests
+from ..checks.episode_table import EpisodeTable
+from ..checks.read_lerobot import read_lerobot
+from ..clock import Hold, frame_actions, frame_states
+from ..commandline import progress
+from ..episode import EPISODE_COLUMNS, Episode
+from ..episode_rows import episode_tables, read_info, with_column, write_tables
+from ..exceptions import CopolicyError, FileFormatError, RunError
+from ..features import ACTION
+from ..files import visible_files
+from ..log import read_episode
+from .amend import today
+from .subset.replace_folder import finish_interrupted
+from .subset.stored_set import RECORD_FILE, record_text, stored_record
+
+_SHOWN = 5
+
+
+@dataclass
+class Originals:
+    """Episodes whose columns are known.
+
+    Attributes:
+        kind: what they were read from.
+        rows: the episode columns by the digest of the motion; several where episodes have the same one.
+        unread: recordings that cannot be read.
+        record: `meta/copolicy.json` of a data set.
+    """
+
+    kind: str
+    rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: defaultdict(list))
+    unread: list[str] = field(default_factory=list)
+    record: dict[str, Any] = field(default_factory=dict)
+
+
+def restore(root: Path, originals: Path) -> dict[str, Any]:
+    """Fills in the episode columns of every episode at `root` that has no `episode_uuid`.
+
+    Args:
+        originals: a data set that has the columns, or a folder of recordings.
+
+    Returns:
+        Summary.
+
+    Raises:
+        FileFormatError: a folder is not what it should be.
+        RunError: there is nothing to restore, or an episode has none or several originals; nothing was changed.
+    """
+    finish_interrupted(root)
+    tables = episode_tables(root, ("episode_index", "length"))
+    lacking = _lacking(tables.values())
+    if not lacking:
+        raise RunError(f"{root}: expected an episode without the episode columns, found that each has an episode_uuid")
+    motions = _motions(read_lerobot(root), root)
+    known = _of_data_set(originals, root) if (originals / "meta").is_dir() else _of_recordings(originals, root)
+    restored = _matched(root, originals, known, {number: motions[number] for number in lacking})
+    names = {name: None for row in restored.values() for name in row}
+    for path, table in tables.items():
+        numbers = table.column("episode_index").to_pylist()
+        for name in names:
+            there = name in table.column_names
+            before = table.column(name).to_pylist() if there else [None] * len(numbers)
+            pairs = zip(numbers, before, strict=True)
+            values = [restored[number].get(name) if number in restored else value for number, value in pairs]
+            table = with_column(table, name, values, EPISODE_COLUMNS[name])
+        tables[path] = table
+    record = stored_record(root) or _record(known, restored)
+    note = {"date": today(), "episodes": len(restored), "from": known.kind}
+    text = record_text({**record, "restored": [*record.get("restored", []), note]})
+    write_tables(tables, {root / RECORD_FILE: text})
+    unlicensed = not all(row.get("license") for row in restored.values())
+    licence = f"copolicy-dataset amend {root} --set license=ID, which no original states, then " if unlicensed else ""
+    return {
+        "root": str(root),
+        "restored": len(restored),
+        "from": f"{known.kind} {originals}",
+        **({"not_measured": "replay_drift_px, which conversion measures"} if known.kind == "recordings" else {}),
+        **({"unread": known.unread} if known.unread else {}),
+        "next": f"{licence}copolicy-dataset check {root}",
+    }
+
+
+def _lacking(tables: Any) -> list[int]:
+    """Numbers of the episodes without an `episode_uuid`."""
+    numbers = []
+    for table in tables:
+        there = "episode_uuid" in table.column_names
+        uuids = table.column("episode_uuid").to_pylist() if there else [None] * table.num_rows
+        rows = zip(table.column("episode_index").to_pylist(), uuids, strict=True)
+        numbers += [number for number, uuid in rows if not uuid]
+    return numbers
+
+
+def _motions(table: EpisodeTable, root: Path) -> dict[int, str]:
+    """The digest of each episode's motion by its number."""
+    if len(table.framed) != len(table.labels):
+        missing = next(iter(set(range(len(table.labels))) - set(table.framed.tolist())))
+        raise FileFormatError(root, "every frame of each episode", f"others in episode {table.labels[missing]}")
+    try:
+        digests = motion_digests(table)
+    except KeyError as error:
+        raise FileFormatError(root, "states and actions in every frame", f"no usable column {error}") from None
+    return {int(table.labels[place]): digest for place, digest in zip(table.framed, digests, strict=True)}
+
+
+def _of_data_set(path: Path, root: Path) -> Originals:
+    info, wanted = read_info(path), read_info(root)
+    if info.get("fps") != wanted.get("fps"):
+        raise FileFormatError(path, f"a data set at {wanted.get('fps')} Hz, as {root}", f"{info.get('fps')} Hz")
+    originals = Originals("data set", record=stored_record(path))
+    motions = _motions(read_lerobot(path), path)
+    for table in episode_tables(path, ("episode_index", "episode_uuid")).values():
+        names = [name for name in table.column_names if name in EPISODE_COLUMNS]
+        for row in table.select(["episode_index", *names]).to_pylist():
+            digest = motions[row.pop("episode_index")]
+            if row["episode_uuid"]:
+                originals.rows[digest].append(row)
+    return originals
+
+
+def _of_recordings(path: Path, root: Path) -> Originals:
+    files = visible_files(path, "*.mcap") if path.is_dir() else [path]
+    if not files or not files[0].is_file():
+        raise FileFormatError(path, "a data set or a folder of recordings (*.mcap)", "neither")
+    info = read_info(root)
+    try:
+        fps, hold = int(info["fps"]), info["features"][ACTION]["hold"]
+    except (KeyError, TypeError, ValueError):
+        raise FileFormatError(root, "fps and the hold of the feature action in meta/info.json", "none") from None
+    if hold not in get_args(Hold):
+        raise FileFormatError(root, f"a hold of {' or '.join(get_args(Hold))} in meta/info.json", str(hold))
+    originals = Originals("recordings")
+    for file in progress(files, len(files), "reading"):
+        try:
+            episode = read_episode(file)
+        except CopolicyError as error:
+            originals.unread.append(str(error))
+            continue
+        originals.rows[_motion(episode, fps, hold)].append(asdict(episode.meta))
+    return originals
+
+
+def _motion(episode: Episode, fps: int, hold: Hold) -> str:
+    """The digest that the frames of a recording have in a data set (`checks.duplicates.motion_digests`)."""
+    columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
+    rows = np.hstack([column.astype(np.float32) for column in columns])
+    return hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest()
+
+
+def _matched(root: Path, originals: Path, known: Originals, lacking: Mapping[int, str]) -> dict[int, dict[str, Any]]:
+    """The columns of each episode, whose original must be one alone."""
+    restored: dict[int, dict[str, Any]] = {}
+    wrong: dict[str, list[int]] = {"none": [], "several": []}
+    for number, digest in lacking.items():
+        rows = {row["episode_uuid"]: row for row in known.rows.get(digest, [])}
+        if len(rows) == 1:
+            restored[number] = next(iter(rows.values()))
+        else:
+            wrong["several" if rows else "none"].append(number)
+    if any(wrong.values()):
+        found = "; ".join(f"{what} for episode {_listed(numbers)}" for what, numbers in wrong.items() if numbers)
+        unread = f" ({len(known.unread)} recordings cannot be read)" if known.unread else ""
+        raise RunError(
+            f"{originals}: expected one episode with the motion of each of {root}, found {found}{unread}; nothing was "
+            "changed"
+        )
+    by_uuid: dict[str, list[int]] = defaultdict(list)
+    for number, row in restored.items():
+        by_uuid[row["episode_uuid"]].append(number)
+    twice = [numbers for numbers in by_uuid.values() if len(numbers) > 1]
+    if twice:
+        raise RunError(f"{root}: expected each episode once, found the same motion in episodes {_listed(twice[0])}")
+    return restored
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:_SHOWN])) + (", ..." if len(numbers) > _SHOWN else "")
+
+
+def _record(known: Originals, restored: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
+    """The record of the conversion, which goes with the columns, with the notes on these episodes alone."""
+    record = dict(known.record)
+    if isinstance(record.get("notes"), dict):
+        uuids = {row["episode_uuid"] for row in restored.values()}
+        record["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid in uuids}
+    return record

@@ -1,0 +1,70 @@
+"""Puts a rewritten data set in the place of the old one, so that an interruption leaves the old or the new."""
+
+import os
+import re
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ...staging import sync_folder, sync_tree
+
+_BEFORE = "before-edit"
+_LEFT = re.compile(rf"\.(?P<name>.+)\.(?:{_BEFORE}|before-append)")
+_UNFINISHED = re.compile(r"\..+\.(?:(?:[0-9a-f]{8}|[0-9a-f]{12})\.partial|merging)")
+
+
+@contextmanager
+def replaced_folder(root: Path) -> Iterator[Path]:
+    """A path beside `root` to build its new content at; at the end of the block it takes the place of `root`.
+
+    Between the two renamings the old content lies under a hidden name, from where `finish_interrupted` brings it
+    back. The old content is deleted at the end.
+    """
+    place = root.resolve()
+    partial = place.parent / f".{place.name}.{secrets.token_hex(4)}.partial"
+    try:
+        yield partial
+        sync_tree(partial)
+        place.rename(_before(place))
+        partial.rename(place)
+        sync_folder(place.parent)
+    except BaseException as error:
+        shutil.rmtree(partial, ignore_errors=True)
+        finish_interrupted(root)
+        if isinstance(error, OSError) and error.errno is not None:
+            # Nobody finds the hidden folder when they read this.
+            error.filename = str(error.filename or root).replace(str(partial), str(root))
+        raise
+    shutil.rmtree(_before(place))
+
+
+def finish_interrupted(root: Path) -> None:
+    """Undoes or completes what an interrupted edit, or an interrupted append, left of a data set."""
+    place = root.resolve()
+    if not place.parent.is_dir():
+        return
+    for before in sorted(place.parent.glob(".*.before-*")):
+        match = _LEFT.fullmatch(before.name)
+        if match and match["name"] == place.name and before.is_dir():
+            if os.path.lexists(place):
+                shutil.rmtree(before)
+            else:
+                before.rename(place)
+
+
+def finish_all_interrupted(folder: Path) -> None:
+    """The same for every data set in a folder."""
+    for entry in sorted(folder.iterdir()):
+        if match := _LEFT.fullmatch(entry.name):
+            finish_interrupted(folder / match["name"])
+
+
+def is_unfinished(name: str) -> bool:
+    """Whether a folder of this name is in the making, or is what a killed command left of one."""
+    return _UNFINISHED.fullmatch(name) is not None
+
+
+def _before(place: Path) -> Path:
+    return place.parent / f".{place.name}.{_BEFORE}"

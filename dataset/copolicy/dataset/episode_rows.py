@@ -1,0 +1,138 @@
+"""The rows of meta/episodes as tables: read, chosen by number or name, and written back whole."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .episode import EPISODE_COLUMNS
+from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from .files import visible_files
+from .staging import replacement
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+ROBOT_TYPE = "copolicy_table"
+"""The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
+
+
+def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Table]":
+    """The files of meta/episodes, each as a table, in the order of their paths.
+
+    Args:
+        needed: columns that each file must have.
+
+    Raises:
+        FileFormatError: no LeRobot data set, a damaged file, or one that lacks a needed column.
+        MissingExtraError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ModuleNotFoundError:
+        raise MissingExtraError("pyarrow") from None
+    # The types of all columns, before any of them is rewritten.
+    from .lerobot_folder.folder import LeRobotFolder
+
+    LeRobotFolder.open(root).rows([name for name in needed if name in EPISODE_COLUMNS])
+    files = visible_files(root / "meta" / "episodes", "*.parquet")
+    if not files:
+        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
+    tables = {}
+    for path in files:
+        try:
+            # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
+            with pq.ParquetFile(path) as file:
+                tables[path] = file.read()
+        except (pa.ArrowException, OSError) as error:
+            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+        missing = [name for name in needed if name not in tables[path].column_names]
+        if missing:
+            hint = stripped_hint(read_info(root), root) if "episode_uuid" in missing else ""
+            raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}{hint}")
+    return tables
+
+
+def read_info(root: Path) -> dict[str, Any]:
+    """`meta/info.json`, empty where there is none that can be read as an object."""
+    try:
+        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return info if isinstance(info, dict) else {}
+
+
+def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
+    """What to do with a data set of ours whose episode columns are gone; empty for any other one.
+
+    LeRobot's delete and split write meta/episodes without them. What the feature `action` holds stays.
+    """
+    features = info.get("features")
+    action = features.get("action") if isinstance(features, dict) else None
+    if info.get("robot_type") != ROBOT_TYPE and not (isinstance(action, dict) and "hold" in action):
+        return ""
+    return (
+        f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "
+        "back from recordings or an earlier version, and copolicy-dataset select takes episodes out with all columns"
+    )
+
+
+def chosen_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping[str, int]) -> set[int]:
+    """The episodes that `12`, `3-5` or an `episode_uuid` stand for.
+
+    Args:
+        numbers: of all episodes.
+        names: number of each `episode_uuid`.
+
+    Raises:
+        InvalidValueError: an episode that is not there, or a text of another form.
+    """
+    numbers = set(numbers)
+    chosen: set[int] = set()
+    for text in texts:
+        if text in names:
+            chosen.add(names[text])
+            continue
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", text)
+        # The end is cut first: a range may name more numbers than fit into memory.
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, -1)
+        wanted = set(range(first, min(last, first + len(numbers)) + 1))
+        if not wanted or not wanted <= numbers:
+            span = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or episode_uuids of the data set"
+            raise InvalidValueError("--episodes", span, text)
+        chosen |= wanted
+    return chosen
+
+
+def with_column(table: "pa.Table", name: str, values: Sequence[Any], kind: str) -> "pa.Table":
+    """The table with other values in an episode column.
+
+    Args:
+        kind: `str`, `int`, `float` or `bool`. A column of nulls alone has no type yet, as after a merge with a set
+            that lacks it.
+    """
+    import pyarrow as pa
+
+    arrow = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}[kind]
+    position = table.schema.get_field_index(name)
+    field = pa.field(name, arrow)
+    array = pa.array(values, arrow)
+    return table.append_column(field, array) if position < 0 else table.set_column(position, field, array)
+
+
+def write_tables(tables: "Mapping[Path, pa.Table]", texts: Mapping[Path, str] | None = None) -> None:
+    """Puts tables in the place of the files of meta/episodes, and texts in that of others.
+
+    All new files are complete on the disk before the first takes its place, each in one step: a crash leaves old or
+    new files, never half of one, and the same call again completes what it began.
+    """
+    import pyarrow.parquet as pq
+
+    with ExitStack() as staged:
+        for path, text in (texts or {}).items():
+            staged.enter_context(replacement(path)).write_text(text, encoding="utf-8")
+        for path, table in tables.items():
+            pq.write_table(table, staged.enter_context(replacement(path)), compression="snappy")

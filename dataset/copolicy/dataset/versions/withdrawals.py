@@ -1,0 +1,58 @@
+"""That episodes were withdrawn by the people who played them, and when; not which: `meta/copolicy_withdrawals.json`.
+
+Earlier releases keep an entry without name or digest in the place of each, so that the next release can count what
+went; their content hash can no longer be worked out from their entries.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..exceptions import FileFormatError
+from .content import Content, EpisodeContent
+
+WITHDRAWALS_FILE = Path("meta/copolicy_withdrawals.json")
+_SCHEMA = "copolicy-withdrawals-1"
+_ANONYMOUS = re.compile(r"withdrawn-\d+")
+
+
+def read_withdrawals(root: Path) -> list[dict[str, Any]]:
+    """Date and number of episodes of each withdrawal, oldest first; none where there is no record.
+
+    Raises:
+        FileFormatError: a record of another form.
+    """
+    path = root / WITHDRAWALS_FILE
+    if not path.is_file():
+        return []
+    try:
+        fields = json.loads(path.read_text(encoding="utf-8"))
+        entries = [{"date": str(entry["date"]), "episodes": int(entry["episodes"])} for entry in fields["withdrawals"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileFormatError(path, f"a record of withdrawals ({_SCHEMA})", f"{type(error).__name__} {error}") from None
+    return entries
+
+
+def withdrawals_text(entries: Iterable[dict[str, Any]]) -> str:
+    """The text of the file."""
+    return json.dumps({"schema": _SCHEMA, "withdrawals": list(entries)}, indent=2) + "\n"
+
+
+def is_anonymous(episode: EpisodeContent) -> bool:
+    """Whether an entry only says that an episode was there."""
+    return _ANONYMOUS.fullmatch(episode.episode_uuid) is not None
+
+
+def anonymised(content: Content, gone: Callable[[EpisodeContent], bool]) -> Content:
+    """A content with entries without name, length and digests in the place of some episodes."""
+    number = sum(is_anonymous(episode) for episode in content.episodes)
+    episodes: list[EpisodeContent] = []
+    for episode in content.episodes:
+        if gone(episode):
+            number += 1
+            episode = EpisodeContent(f"withdrawn-{number}", "", 0, {}, {})
+        episodes.append(episode)
+    return replace(content, episodes=tuple(episodes))

@@ -1,0 +1,322 @@
+"""`copolicy-dataset withdraw`: nothing of a consent id is left anywhere, and everything else is what it was."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from checked_data import contents, set_columns
+from edited_data import columns, digests, info, load, make_people
+
+from copolicy.dataset.checks.checking import check_dataset
+from copolicy.dataset.cli import main
+from copolicy.dataset.edit.subset import replace_folder
+from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
+from copolicy.dataset.edit.withdrawal.traces import Traces
+from copolicy.dataset.edit.withdrawal.withdraw import withdraw
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.manifest import Manifest, file_entry
+from copolicy.dataset.versions.release import release
+from copolicy.dataset.versions.release_record import read_release
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    return make_people(tmp_path_factory.mktemp("withdraw"))
+
+
+@pytest.fixture
+def folder(made, tmp_path) -> Path:
+    """`set` with raw copies, two releases and describing files; `recordings` behind it."""
+    shutil.copytree(made.parent / "recordings", tmp_path / "recordings")
+    root = Path(shutil.copytree(made, tmp_path / "set"))
+    raw = root / "raw"
+    shutil.copytree(tmp_path / "recordings", raw)
+    entries = {path.relative_to(root).as_posix(): file_entry(path) for path in raw.glob("*.mcap")}
+    (raw / "manifest.json").write_text(Manifest(entries).to_text(), encoding="utf-8")
+    rows = columns(root)
+    record = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
+    record["notes"] = {rows[0]["episode_uuid"]: ["mended"], rows[2]["episode_uuid"]: ["doubtful"]}
+    record["left_out"]["discarded"] = ["episode_000000.mcap", "episode_000099.mcap"]
+    (root / "meta/copolicy.json").write_text(json.dumps(record), encoding="utf-8")
+    release(root, "major", "Sessions of P01 and P02.")
+    set_columns(root, license=["cc0-1.0"] * 8)
+    release(root, "patch", f"Episode {rows[1]['episode_uuid']} under another licence.")
+    (root / "README.md").write_text("P01 played two episodes", encoding="utf-8")
+    (root / "figures").mkdir()
+    (root / "figures" / "paths.png").write_bytes(b"paths of everybody")
+    (root / "report.html").write_text("all trajectories", encoding="utf-8")
+    (root / "meta/copolicy_stats.json").write_text('{"P01": 1}', encoding="utf-8")
+    (root / "meta/copolicy_check.json").write_text('{"findings": []}', encoding="utf-8")
+    (root / "LICENSE").write_text("a licence", encoding="utf-8")
+    (root / "notes.txt").write_text("lab notes", encoding="utf-8")
+    return tmp_path
+
+
+def everything(folder: Path) -> bytes:
+    return b"\n".join(name.encode() + value for name, value in contents(folder).items())
+
+
+def test_a_call_without_yes_changes_nothing(folder, capsys):
+    before = contents(folder)
+    assert main(["withdraw", "C-1", str(folder / "recordings"), str(folder / "set")]) == 0
+    out = capsys.readouterr().out
+    assert contents(folder) == before
+    assert ["would_be_withdrawn", "2"] in [line.split() for line in out.splitlines()]
+    assert "nothing was changed; --yes deletes" in out
+    assert "super_squash_history" in out
+    assert "2 of 8" in out
+
+
+def test_nothing_is_left_of_what_is_withdrawn(folder, capsys):
+    root = folder / "set"
+    rows, before = columns(root), digests(root)
+    gone, kept = rows[:2], rows[2:]
+    assert main(["withdraw", "C-1", str(folder), "--yes"]) == 0
+    out = capsys.readouterr().out
+    for text in ("copolicy-cards dataset", "copolicy-cards report", "copolicy-dataset check", "copolicy-dataset stats"):
+        assert text in out
+    left = everything(folder)
+    for row in gone:
+        for name in ("episode_uuid", "source_sha256"):
+            assert row[name].encode() not in left
+    for name in (b"C-1", b"P01"):
+        assert name not in left
+    assert [row["episode_uuid"] for row in columns(root)] == [row["episode_uuid"] for row in kept]
+    assert {uuid: entry.digest for uuid, entry in digests(root).items()} == {
+        row["episode_uuid"]: before[row["episode_uuid"]].digest for row in kept
+    }
+    assert len(list((folder / "recordings").glob("*.mcap"))) == len(list((root / "raw").glob("*.mcap"))) == 6
+    manifest = Manifest.read(root / "raw" / "manifest.json").files
+    assert manifest == {path.relative_to(root).as_posix(): file_entry(path) for path in (root / "raw").glob("*.mcap")}
+    record = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
+    assert record["notes"] == {kept[0]["episode_uuid"]: ["doubtful"]}
+    assert record["left_out"]["discarded"] == ["episode_000099.mcap"]
+    assert (root / "LICENSE").read_text(encoding="utf-8") == "a licence"
+    assert (root / "notes.txt").read_text(encoding="utf-8") == "lab notes"
+    for name in ("README.md", "figures", "report.html", "meta/copolicy_stats.json", "meta/copolicy_check.json"):
+        assert not (root / name).exists()
+    assert sorted(path.name for path in folder.iterdir()) == ["recordings", "set"]
+
+
+def test_lerobot_and_the_checks_take_what_is_left(folder):
+    withdraw("C-1", [folder / "set"], really=True)
+    set_columns(folder / "set", consent_id=["C-3"] * 6)
+    assert not check_dataset(folder / "set").failed()
+    assert load(folder / "set").num_episodes == info(folder / "set")["total_episodes"] == 6
+    assert info(folder / "set")["splits"] == {"train": "0:6"}
+
+
+def test_the_next_release_says_that_and_not_what(folder):
+    root = folder / "set"
+    released = read_release(root).content_hash
+    withdraw("C-1", [root], really=True)
+    withdrawals = json.loads((root / "meta/copolicy_withdrawals.json").read_text(encoding="utf-8"))
+    (entry,) = withdrawals["withdrawals"]
+    assert (entry.keys(), entry["episodes"]) == ({"date", "episodes"}, 2)
+    assert read_release(root).content_hash == released  # still readable, and says what was released
+    assert read_release(root, "1.0.0").version == "1.0.0"
+    with pytest.raises(InvalidValueError, match="major or larger"):
+        release(root, "minor", "Fewer.")
+    record = release(root, "major", "Fewer.")
+    assert record.version == "2.0.0"
+    assert "2 episodes removed: withdrawn by people who took part" in record.changes
+    log = (root / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "### Removed\n- 2 episodes removed: withdrawn by people who took part" in log
+    assert "Sessions of (withdrawn) and P02." in log
+    set_columns(root, license=["mit"] * 6)
+    assert "withdrawn" not in " ".join(release(root, "patch", "Another licence.").changes)
+    withdraw("C-3", [root], really=True)
+    assert "2 episodes removed: withdrawn by people who took part" in release(root, "major", "Fewer.").changes
+
+
+def test_a_release_is_compared_with_what_is_left(folder, capsys):
+    root = folder / "set"
+    withdraw("C-1", [root], really=True)
+    assert main(["diff", f"{root}@1.0.1", str(root)]) == 1
+    out = capsys.readouterr().out
+    assert "2 episodes removed: withdrawn by people who took part (major)" in out
+    assert "added" not in out
+
+
+def test_what_was_never_released_is_told_at_the_first_release(made, tmp_path):
+    root = Path(shutil.copytree(made, tmp_path / "set"))
+    withdraw("C-9", [root], really=True)
+    changes = release(root, "minor", "The first.").changes
+    assert changes[1] == "1 episode removed: withdrawn by people who took part; no release held them"
+
+
+def test_a_consent_id_covers_several_pairs_and_stands_beside_others(folder):
+    withdraw("C-2", [folder / "set", folder / "recordings"], really=True)
+    assert [row["pair_id"] for row in columns(folder / "set")] == ["P02", "P02", "P04", "P04"]
+    assert len(list((folder / "recordings").glob("*.mcap"))) == 4
+
+
+def test_an_amended_consent_id_leads_to_copies_that_lack_it(folder, made):
+    """The recordings were made without consent ids, and so was the other data set."""
+    other = Path(shutil.copytree(made, folder / "other"))
+    set_columns(other, consent_id=[""] * 8)
+    uuids = [row["episode_uuid"] for row in columns(folder / "set")]
+    summary = withdraw("C-9", [folder], really=True)
+    assert (summary["withdrawn"], summary["recordings"], len(summary["data_sets"])) == (1, 1, 2)
+    assert uuids[6] not in {row["episode_uuid"] for row in columns(other)}
+    assert not (folder / "recordings" / "episode_000006.mcap").exists()
+
+
+def test_recordings_in_every_state(folder):
+    recordings = folder / "recordings"
+    files = [recordings / f"episode_00000{number}.mcap" for number in range(4)]
+    os_part = files[0].rename(f"{files[0]}.part")
+    undone = files[1].rename(f"{files[1]}.undone")
+    (recordings / "deeper").mkdir()
+    moved = files[2].rename(recordings / "deeper" / "any name.mcap")
+    (recordings / "._episode_000003.mcap").write_bytes(b"macOS")
+    shutil.rmtree(folder / "set" / "raw")
+    withdraw("C-1", [folder], really=True)
+    assert not os_part.exists()
+    assert not undone.exists()
+    assert moved.exists()
+    withdraw("C-3", [folder], really=True)
+    assert not moved.exists()
+    assert not files[3].exists()
+    assert not (recordings / "._episode_000003.mcap").exists()
+
+
+def test_linked_recordings_are_deleted_where_they_lie(folder):
+    elsewhere = folder / "disk"
+    (folder / "recordings").rename(elsewhere)
+    (folder / "recordings").symlink_to(elsewhere)
+    withdraw("C-3", [folder / "set", folder / "recordings"], really=True)
+    assert len(list(elsewhere.glob("*.mcap"))) == 6
+
+
+def test_a_session_goes_with_its_last_recording(folder):
+    out = folder / "sessions"
+    for pair, numbers in (("P01", (0, 1)), ("P02", (2, 6))):
+        session = out / f"{pair}-01"
+        session.mkdir(parents=True)
+        for number in numbers:
+            shutil.copy(folder / "recordings" / f"episode_00000{number}.mcap", session / f"episode_{number:03d}.mcap")
+        (session / "session.json").write_text(json.dumps({"pair_id": pair}), encoding="utf-8")
+        lines = [
+            {"event": "ready", "player": f"{pair}-a", "consent": "C-3"},
+            {"event": "keep", "file": f"episode_{numbers[0]:03d}.mcap"},
+            {"event": "keep", "file": f"episode_{numbers[1]:03d}.mcap"},
+        ]
+        text = "".join(json.dumps(line) + "\n" for line in lines)
+        (session / "journal.jsonl").write_text(text, encoding="utf-8")
+    withdraw("C-1", [folder / "set", out], really=True)
+    assert [path.name for path in out.iterdir()] == ["P02-01"]
+    withdraw("C-3", [folder / "set", out], really=True)
+    journal = (out / "P02-01" / "journal.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
+
+
+def test_a_set_without_an_episode_left_goes(folder):
+    set_columns(folder / "set", consent_id=["C-5"] * 8)
+    summary = withdraw("C-5", [folder / "set"], really=True)
+    assert "no episode is left" in str(summary)
+    assert not (folder / "set").exists()
+
+
+def test_files_of_somebody_else_are_named_and_left(folder):
+    notes = folder / "recordings" / "notes.md"
+    notes.write_text("C-1 was tired", encoding="utf-8")
+    (folder / "set" / "notes.txt").write_text("pair P01 again", encoding="utf-8")
+    summary = withdraw("C-1", [folder], really=True)
+    assert summary["still_named_in"] == [str(notes)]
+    assert summary["data_sets"][str(folder / "set")]["still_named_in"] == ["notes.txt"]
+    assert notes.read_text(encoding="utf-8") == "C-1 was tired"
+
+
+def test_an_unreadable_recording_is_named(folder, capsys):
+    (folder / "recordings" / "broken.mcap").write_bytes(b"no recording")
+    assert main(["withdraw", "C-1", str(folder), "--yes"]) == 1
+    assert str(folder / "recordings" / "broken.mcap") in capsys.readouterr().out
+    assert len(columns(folder / "set")) == 6
+
+
+@pytest.mark.parametrize(
+    ("consent", "paths", "error", "line"),
+    [
+        ("C-77", ["set", "recordings"], RunError, "expected an episode with consent id C-77, found none"),
+        ("", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
+        ("C-1,C-2", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
+        ("C-1", ["set", "nowhere"], FileFormatError, "found nothing there"),
+    ],
+)
+def test_a_wrong_call_changes_nothing(folder, consent, paths, error, line):
+    before = contents(folder)
+    with pytest.raises(error, match=line):
+        withdraw(consent, [folder / path for path in paths], really=True)
+    assert contents(folder) == before
+
+
+def test_a_stripped_set_stops_everything(folder):
+    import pyarrow.parquet as pq
+    from checked_data import EPISODES
+
+    other = Path(shutil.copytree(folder / "set", folder / "other"))
+    table = pq.ParquetFile(other / EPISODES).read()
+    pq.write_table(table.drop_columns(["episode_uuid", "consent_id"]), other / EPISODES)
+    before = contents(folder)
+    with pytest.raises(FileFormatError, match="--restore-from ORIGINAL"):
+        withdraw("C-1", [folder], really=True)
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("stop", ["first", "second"])
+def test_an_interruption_leaves_the_old_or_the_new(folder, monkeypatch, stop):
+    """Killed between the two renamings, or before the old content is deleted."""
+    root = folder / "set"
+    before = read_content(root).hash
+    calls = []
+
+    class Killed(BaseException):
+        pass
+
+    def killed(path):
+        calls.append(path)
+        raise Killed
+
+    monkeypatch.setattr(replace_folder, "finish_interrupted", lambda root: None)
+    if stop == "first":
+        monkeypatch.setattr(replace_folder, "sync_tree", lambda path: None)
+        real = Path.rename
+        monkeypatch.setattr(
+            Path, "rename", lambda self, to: killed(self) if self.name.endswith(".partial") else real(self, to)
+        )
+    else:
+        monkeypatch.setattr(replace_folder.shutil, "rmtree", killed)
+    with pytest.raises(Killed):
+        withdraw("C-1", [root], really=True)
+    monkeypatch.undo()
+    finish_interrupted(root)
+    assert (read_content(root).hash == before) is (stop == "first")
+    if stop == "first":
+        withdraw("C-1", [root], really=True)
+    assert len(columns(root)) == 6
+    assert sorted(path.name for path in folder.iterdir()) == ["recordings", "set"]
+
+
+def test_what_killed_commands_left_beside_a_set_goes_with_it(folder):
+    """Also where the parent folder is named, in which an interrupted replacement lies under a hidden name."""
+    root = folder / "set"
+    shutil.copytree(root, folder / ".set.0123abcd.partial")
+    shutil.copytree(root, folder / ".gone.89abcdef.partial")
+    root.rename(folder / ".set.before-edit")
+    summary = withdraw("C-1", [folder], really=True)
+    assert len(columns(root)) == 6
+    assert summary["unfinished"] == [str(folder / ".gone.89abcdef.partial")]
+    assert sorted(path.name for path in folder.iterdir()) == [".gone.89abcdef.partial", "recordings", "set"]
+
+
+def test_names_are_found_as_words():
+    traces = Traces(frozenset({"C-1", "P01", "12"}), frozenset({"episode_001.mcap"}))
+    assert traces.without("C-1 and C-10, P01-a, P01, P012, 12") == "(withdrawn) and C-10, P01-a, (withdrawn), P012, 12"
+    assert traces.without_json({"P01": 1, "asked": ["C-1", "12", "13"], "id": "12", "text": "by P01"}) == {
+        "asked": ["13"],
+        "id": "(withdrawn)",
+        "text": "by (withdrawn)",
+    }
