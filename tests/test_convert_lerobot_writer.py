@@ -143,7 +143,8 @@ def test_an_episode_is_there_once(tmp_path):
     episodes = prepared(2)
     with pytest.raises(RunError) as error:
         write([*episodes, episodes[0]], tmp_path / "set")
-    assert str(error.value) == "episode_uuid uuid-0: expected every episode once, found it at 0 and 2"
+    expected = "expected every episode once, found episode uuid-0 also in episode 0; nothing was written"
+    assert str(error.value) == f"episode 2: {expected}"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -156,7 +156,10 @@ def test_players_are_compared_across_the_seats(roots, tmp_path, capsys):
         (["--prefix-people", "kth"], "--prefix-people: expected 2 different names, one for each data set, found"),
         (["--prefix-people", "a", "a"], "--prefix-people: expected 2 different names, one for each data set, found"),
         (["--prefix-people", "a", "b/c"], "--prefix-people: expected names of letters, digits and underscores"),
-        (["--repo-id", "both"], "--repo-id: expected USER/NAME, found 'both'"),
+        (
+            ["--repo-id", "both"],
+            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'both'",
+        ),
     ],
 )
 def test_a_call_that_cannot_be_met_says_why(made, tmp_path, capsys, flags, message):

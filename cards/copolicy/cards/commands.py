@@ -5,6 +5,8 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.licences import checked_licence
+from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
 
 from .new_file import require_new, write_whole
 
@@ -55,6 +57,8 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _dataset(arguments: argparse.Namespace) -> dict:
+    if arguments.repo_id is not None:
+        checked_repo_id(arguments.repo_id)
     from .croissant import CROISSANT_FILE, croissant_text
     from .dataset_card import render
     from .facts import DatasetFacts
@@ -64,7 +68,7 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     require_new(path, arguments.overwrite)
     if arguments.croissant and not arguments.repo_id:
         raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
-    repo_id = arguments.repo_id or f"local/{arguments.root.resolve().name}"
+    repo_id = arguments.repo_id or local_repo_id(arguments.root)
     render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
     figures = []
     if not arguments.no_figures:
@@ -80,6 +84,8 @@ def _dataset(arguments: argparse.Namespace) -> dict:
 
 
 def _model(arguments: argparse.Namespace) -> dict:
+    checked_repo_id(arguments.repo_id)
+    checked_licence(arguments.license or "")
     from .checkpoint import Checkpoint
     from .model_card import render_model_card
 

@@ -5,6 +5,8 @@ metadata at every episode, and loses the set when it is interrupted. The files a
 """
 
 import json
+import logging
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -16,11 +18,12 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.licences import licence_identifier
 from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import RECORD_HZ
 
 from .frame_files import FrameFiles
-from .prepare import PreparedEpisode
+from .prepare import PreparedEpisode, RepeatedEpisodeError
 from .scene_video import SCENE, scene_encoder, scene_feature
 from .statistics import episode_statistics
 from .video_files import VideoFiles
@@ -105,8 +108,19 @@ def write_dataset(
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
+    _warn_of_licences(root, rows)
     successes = sum(row["success"] for row in rows)
     return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
+
+
+def _warn_of_licences(root: Path, rows: list[dict]) -> None:
+    """Recordings say what they say; that a card will refuse it is told before the data set is worked with."""
+    unlisted = Counter(row["license"] for row in rows if row["license"] and not licence_identifier(row["license"]))
+    for licence, count in unlisted.items():
+        logging.warning(
+            "warning: %s: %d episodes state the licence %r, which is none of the Hub's identifiers: "
+            "a card will refuse it", root, count, licence,
+        )  # fmt: skip
 
 
 def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
@@ -120,7 +134,7 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
     rows: list[dict] = []
     statistics: list[dict] = []
     notes: dict[str, list[str]] = {}
-    seen: dict[str, int] = {}
+    origins: dict[str, str] = {}
     start = 0
     with (
         FrameFiles(meta.root, meta.features, meta.data_files_size_in_mb, meta.chunks_size) as frames,
@@ -128,11 +142,9 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
     ):
         for index, episode in enumerate(episodes):
             uuid = episode.meta.episode_uuid
-            if uuid in seen:
-                raise RunError(
-                    f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}"
-                )
-            seen[uuid] = index
+            if uuid in origins:
+                raise RepeatedEpisodeError(uuid, origins[uuid], episode.origin or f"episode {index}")
+            origins[uuid] = episode.origin or f"episode {index}"
             clock = _clock_columns(index, start, episode.frames, meta.fps)
             end = start + episode.frames
             rows.append(

@@ -17,6 +17,8 @@ from copolicy.dataset.exceptions import (
     OutputExistsError,
     RunError,
 )
+from copolicy.dataset.local_path import require_hub_name, similar_path
+from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
 
 from .policy_commands import policy_parser
 
@@ -85,7 +87,7 @@ def with_defaults(flags: Sequence[str]) -> list[str]:
             added.append("--policy.push_to_hub=false")
         root = _value("dataset.root", flags)
         if root and "dataset.repo_id" not in given:
-            added.append(f"--dataset.repo_id=local/{Path(root).resolve().name}")
+            added.append(f"--dataset.repo_id={local_repo_id(Path(root))}")
     return [*added, *flags]
 
 
@@ -113,6 +115,8 @@ def _train(arguments: argparse.Namespace) -> dict:
     flags = with_defaults(arguments.flags)
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))
+    for name in ("dataset.repo_id", "policy.repo_id"):
+        _check_repo_id(name, _value(name, flags))
     # LeRobot and its libraries print here and there; stdout is for the summary.
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
         from .local_dataset import check_local_dataset
@@ -196,11 +200,20 @@ def _validate(config) -> None:
 
 
 def _check_local_path(name: str, value: str | None) -> None:
-    """A path that is not there must not be taken for the name of a Hub repository, which has one slash at most."""
+    """A path that is not there must not be taken for the name of a Hub repository."""
     if value is None or Path(value).exists():
         return
-    if value.count("/") > 1 or value.startswith((".", "/", "~")) or value.endswith((".json", ".yaml", ".yml")):
-        raise FileFormatError(value, f"a file or folder for --{name}", "none")
+    expected = f"a file or folder for --{name}"
+    if value.endswith((".json", ".yaml", ".yml")):
+        similar = similar_path(value)
+        raise FileFormatError(value, expected, "none" if similar is None else f"none; did you mean {similar}?")
+    require_hub_name(value, expected, "from another folder it is looked up on the Hub")
+
+
+def _check_repo_id(name: str, value: str | None) -> None:
+    """LeRobot takes a name without a user for a local data set; the Hub's other rules hold for it too."""
+    if value not in (None, "", "null", "None"):
+        checked_repo_id(value if "/" in value else f"local/{value}", f"--{name}")
 
 
 def _line(error: BaseException) -> str:

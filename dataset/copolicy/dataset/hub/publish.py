@@ -13,13 +13,14 @@ from pathlib import Path
 from ..checks.checking import check_dataset
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
+from ..repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.data_version import newest
 from ..versions.manifest import MANIFEST_FILE, Manifest
 from ..versions.release_record import RELEASE_FILE, ReleaseRecord, read_release
 from .client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
 from .raw_recordings import RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings, still_wanted
-from .repository import BRANCH, Repository, read_file, read_repository, require_repo_id
+from .repository import BRANCH, Repository, read_file, read_repository
 
 _CHECKED = ("data/", "meta/", "videos/")
 CARD_FILE = "README.md"
@@ -55,7 +56,7 @@ def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = 
             the Hub.
         HubError: the Hub did not do what was asked.
     """
-    require_repo_id(repo_id)
+    checked_repo_id(repo_id)
     record, manifest = verify_release(root)
     _require_checked(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
