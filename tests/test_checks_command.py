@@ -145,7 +145,7 @@ def test_a_released_file_that_changed(root, check):
     status, lines = check(root)
     assert status == 1
     assert [line.split(";")[0] for line in serious(lines)] == [
-        "error check_sum [] README.md is not in the manifest",
+        "error check_sum [] README.md has other content",
         "error check_sum [] meta/stats.json has other content",
     ]
     (root / "meta" / "manifest.json").write_text("[]", encoding="utf-8")
@@ -155,7 +155,7 @@ def test_a_released_file_that_changed(root, check):
 def test_two_data_sets_that_share_an_episode(root, recordings, tmp_path, check):
     for name in ("episode_000000.mcap", "episode_000001.mcap", "episode_000003.mcap"):
         (recordings / name).unlink()
-    test = make_data_set(recordings, tmp_path / "test", "--license", "CC0-1.0")
+    test = make_data_set(recordings, tmp_path / "test", "--license", "cc0-1.0")
     status, lines = check(root, "--against", test)
     assert status == 1
     assert serious(lines) == [

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from copolicy.dataset.exceptions import MissingExtraError
 from copolicy.dataset.licences import checked_licence, licence_identifier
+from copolicy.dataset.minimal_card import CONFIGS
 from copolicy.dataset.repo_id import checked_repo_id
 
 from .artefacts import RELEASE_FILE, read_json
@@ -85,7 +86,7 @@ def hub_metadata(facts: DatasetFacts, title: str) -> DatasetCardData:
         tags=["LeRobot", "copolicy", "human-robot-collaboration", "table-carrying", *sources],
         size_categories=[next((name for limit, name in _SIZES if facts.info["total_frames"] < limit), "1M<n<10M")],
         pretty_name=title,
-        configs=[{"config_name": "default", "data_files": "data/*/*.parquet"}],
+        configs=[{"config_name": name, "data_files": files} for name, files in CONFIGS],
     )
 
 

@@ -19,6 +19,7 @@ from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
 from copolicy.dataset.licences import licence_identifier
+from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import RECORD_HZ
 
@@ -108,6 +109,8 @@ def write_dataset(
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
+        card = minimal_card({row["license"] for row in rows})
+        (partial / CARD_FILE).write_text(card, encoding="utf-8")
     _warn_of_licences(root, rows)
     successes = sum(row["success"] for row in rows)
     return WrittenDataset(root, repo_id, fps, hold, len(rows), rows[-1]["dataset_to_index"], successes)
@@ -183,7 +186,8 @@ def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> Non
     columns = {}
     for name in rows[0]:
         kind = EPISODE_COLUMNS.get(name)
-        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None)
+        # A number that is not known is no number: every reader of tables takes null for that.
+        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None, from_pandas=True)
     for feature, kinds in statistics[0].items():
         for kind in kinds:
             columns[f"stats/{feature}/{kind}"] = pa.array([entry[feature][kind].tolist() for entry in statistics])

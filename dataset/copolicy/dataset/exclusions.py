@@ -7,9 +7,7 @@ and resuming with LeRobot carry them along; a file beside them would be lost at 
 """
 
 import argparse
-import os
 import re
-import secrets
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from .commandline import add_command
 from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from .staging import replacements
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -160,31 +159,24 @@ def _change(root: Path, episodes: Sequence[str], change: Callable[[_Row], _Row])
 
     tables = _tables(root)
     chosen = _chosen(episodes, [row for table in tables.values() for row in _rows(table)])
-    staged: dict[Path, Path] = {}
-    try:
-        for path, table in tables.items():
-            rows = _rows(table)
-            after = [change(row) if row.episode in chosen else row for row in rows]
-            if after == rows:
-                continue
-            for name, values in (
-                ("discarded", [row.discarded for row in after]),
-                ("quality_flags", [",".join(row.flags) for row in after]),
-            ):
-                place = table.schema.get_field_index(name)
-                # A column of nulls alone has no type yet, as after a merge with a set that lacks it.
-                field = pa.field(name, pa.bool_() if name == "discarded" else pa.string())
-                table = table.set_column(place, field, pa.array(values, field.type))
-            staged[path] = partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-            with partial.open("xb") as file:
-                pq.write_table(table, file, compression="snappy")
-                file.flush()
-                os.fsync(file.fileno())
-        for path, partial in staged.items():
-            os.replace(partial, path)
-    finally:
-        for partial in staged.values():
-            partial.unlink(missing_ok=True)
+    changed: dict[Path, pa.Table] = {}
+    for path, table in tables.items():
+        rows = _rows(table)
+        after = [change(row) if row.episode in chosen else row for row in rows]
+        if after == rows:
+            continue
+        for name, values in (
+            ("discarded", [row.discarded for row in after]),
+            ("quality_flags", [",".join(row.flags) for row in after]),
+        ):
+            place = table.schema.get_field_index(name)
+            # A column of nulls alone has no type yet, as after a merge with a set that lacks it.
+            field = pa.field(name, pa.bool_() if name == "discarded" else pa.string())
+            table = table.set_column(place, field, pa.array(values, field.type))
+        changed[path] = table
+    with replacements(list(changed)) as partials:
+        for table, partial in zip(changed.values(), partials, strict=True):
+            pq.write_table(table, partial, compression="snappy")
 
 
 def _tables(root: Path) -> "dict[Path, pa.Table]":

@@ -5,6 +5,7 @@ import contextlib
 import io
 import logging
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from copolicy.dataset.exceptions import (
 )
 from copolicy.dataset.local_path import require_hub_name, similar_path
 from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
+from copolicy.dataset.staging import about, refusal
 
 from .policy_commands import policy_parser
 
@@ -127,16 +129,33 @@ def _train(arguments: argparse.Namespace) -> dict:
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
-            train_from_memory(config)
+            with about(Path(config.output_dir or "")):
+                train_from_memory(config)
         except CopolicyError:
             raise
         except Exception as error:
+            if refusal(error) is not None:
+                _remove_unfinished(Path(config.output_dir or ""), config.resume)
             if isinstance(error, OSError) and error.errno is not None:
                 raise  # the system's own, of a file; the Hub client's have pages of advice instead
             raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
     output = Path(config.output_dir or "")
     checkpoint = output / "checkpoints" / "last" / "pretrained_model"
     return {"output_dir": str(output), "steps": config.steps, "checkpoint": str(checkpoint)}
+
+
+def _remove_unfinished(output: Path, resumed: bool) -> None:
+    """Half a checkpoint that a full disk left, and a run that came to none: nobody can go on with either."""
+    checkpoints = output / "checkpoints"
+    if resumed and not (checkpoints / "last").is_symlink():
+        return  # which of them is whole cannot be told
+    last = (checkpoints / "last").resolve()
+    numbered = [folder for folder in checkpoints.glob("*") if folder.name.isdigit() and not folder.is_symlink()]
+    whole = [folder for folder in numbered if last.name.isdigit() and int(folder.name) <= int(last.name)]
+    for folder in set(numbered) - set(whole):
+        shutil.rmtree(folder, ignore_errors=True)
+    if not whole and not resumed and output != Path():
+        shutil.rmtree(output, ignore_errors=True)
 
 
 @contextlib.contextmanager

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
+from copolicy.dataset.staging import replace_text
 
 from .calibration import StickCalibration
 
@@ -59,7 +60,4 @@ class CalibrationStore:
         """
         self._by_guid[guid] = calibration
         entries = {key: one.to_json() for key, one in sorted(self._by_guid.items())}
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self.path.with_suffix(".json.new")
-        fresh.write_text(json.dumps(entries, indent=2) + "\n", encoding="utf-8")
-        os.replace(fresh, self.path)
+        replace_text(self.path, json.dumps(entries, indent=2) + "\n")

@@ -16,6 +16,7 @@ import numpy as np
 from copolicy.dataset.exceptions import MissingExtraError
 from copolicy.dataset.staging import new_file
 
+from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
 
 try:
@@ -34,12 +35,13 @@ def export_robomimic(source: ExportSource, out: Path) -> dict[str, Any]:
     Raises:
         OutputExistsError: there is something at `out`.
     """
-    with new_file(out) as partial, h5py.File(partial, "w") as file:
+    with new_file(out) as partial, new_hdf5(partial) as (file, storage):
         data = file.create_group("data")
         masks: dict[str, list[str]] = defaultdict(list)
         for number, episode in enumerate(source.episodes()):
             name = f"demo_{number}"
             _write_demo(data.create_group(name), episode)
+            storage.check()
             for mask in _masks(source, episode):
                 masks[mask].append(name)
         environment = {"env_name": _ENVIRONMENT, "type": _GYM, "env_kwargs": {"fps": source.fps}}

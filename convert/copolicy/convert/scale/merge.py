@@ -8,6 +8,7 @@ from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 
 from ..lerobot_writer import RECORD_FILE, WrittenDataset
@@ -50,6 +51,8 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         if plan.statistics:
             _write_statistics(partial)
         tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
+        licences = {text or "" for table in tables for text in table.column("license").to_pylist()}
+        (partial / CARD_FILE).write_text(minimal_card(licences), encoding="utf-8")
         successes = sum(sum(table.column("success").to_pylist()) for table in tables)
     document = json.dumps([finding.to_dict() for finding in findings], indent=1)
     (plan.folder / FINDINGS_FILE).write_text(document + "\n", encoding="utf-8")

@@ -13,10 +13,12 @@ figures, `meta/copolicy.json`). A manifest covers those.
 """
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..episode import EPISODE_COLUMNS
 from ..exceptions import FileFormatError
 from . import parquet
 from .canonical import digest
@@ -156,7 +158,12 @@ def _read_episodes(root: Path) -> list[dict[str, Any]]:
         raise FileFormatError(root / "meta" / "episodes", "an episode_uuid of its own for each episode", "others")
     # A file of a merge may lack a column that another has; LeRobot reads it as null.
     names = {name: None for row in rows for name in row}
-    return [{name: row.get(name) for name in names} for row in rows]
+    return [{name: _known(name, row.get(name)) for name in names} for row in rows]
+
+
+def _known(name: str, value: Any) -> Any:
+    """A number that is not known is null in a table, NaN in those of earlier versions: one content."""
+    return math.nan if value is None and EPISODE_COLUMNS.get(name) == "float" else value
 
 
 def _read_tasks(root: Path) -> dict[int, str]:
