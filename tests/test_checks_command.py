@@ -145,7 +145,7 @@ def test_a_released_file_that_changed(root, check):
     status, lines = check(root)
     assert status == 1
     assert [line.split(";")[0] for line in serious(lines)] == [
-        "error check_sum [] README.md is not in the manifest",
+        "error check_sum [] README.md has other content",
         "error check_sum [] meta/stats.json has other content",
     ]
     (root / "meta" / "manifest.json").write_text("[]", encoding="utf-8")
@@ -155,7 +155,7 @@ def test_a_released_file_that_changed(root, check):
 def test_two_data_sets_that_share_an_episode(root, recordings, tmp_path, check):
     for name in ("episode_000000.mcap", "episode_000001.mcap", "episode_000003.mcap"):
         (recordings / name).unlink()
-    test = make_data_set(recordings, tmp_path / "test", "--license", "CC0-1.0")
+    test = make_data_set(recordings, tmp_path / "test", "--license", "cc0-1.0")
     status, lines = check(root, "--against", test)
     assert status == 1
     assert serious(lines) == [
@@ -172,7 +172,10 @@ def test_the_call_is_wrong(tmp_path, capsys):
 
     nowhere, empty = tmp_path / "nowhere", tmp_path / "empty"
     empty.mkdir()
-    assert error(str(nowhere)) == f"{nowhere}: expected a folder, or USER/NAME of a data set on the Hub, found neither"
+    assert (
+        error(str(nowhere))
+        == f"{nowhere}: expected a folder, or USER/NAME of a data set on the Hub, found no such file or folder"
+    )
     found = "expected recordings (*.mcap) or a LeRobot data set (meta/info.json), found neither"
     assert error(str(empty)) == f"{empty}: {found}"
     assert error() == "PATH: expected a folder, or USER/NAME of a data set on the Hub, found None"

@@ -37,7 +37,7 @@ def root(made, tmp_path) -> Path:
 
 
 def add(folder: Path, root: Path, *flags: str) -> int:
-    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "CC-BY-4.0"]
+    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     return main([*arguments, "--append", "--json", *flags])
 
 

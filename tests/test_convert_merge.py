@@ -1,7 +1,6 @@
 """`copolicy-convert merge`: nothing of an episode is lost, and nobody becomes somebody else."""
 
 import json
-import math
 import shutil
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from copolicy.convert.cli import main
 from copolicy.convert.merge import merging
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.exclusions import exclude, excluded_episodes
+from copolicy.dataset.minimal_card import is_minimal_card
 from copolicy.dataset.versions.content import read_content
 
 PEOPLE = {
@@ -64,7 +64,7 @@ def test_the_result_is_that_of_one_conversion(made, tmp_path, capsys):
     assert_same_statistics(merged, whole)
     ours, theirs = episodes(tmp_path / "out"), episodes(made / "both")
     assert {field.name: field.type for field in ours.schema} == {field.name: field.type for field in theirs.schema}
-    assert all(math.isnan(drift) for drift in ours.column("replay_drift_px").to_pylist())
+    assert ours.column("replay_drift_px").to_pylist() == [None] * 6
     data = "data/chunk-000/file-000.parquet"
     assert pq.read_schema(tmp_path / "out" / data).equals(pq.read_schema(made / "both" / data), check_metadata=False)
     assert pq.read_metadata(tmp_path / "out" / data).num_row_groups == 6
@@ -93,7 +93,7 @@ def test_exclusions_and_records_are_kept_and_what_is_about_one_part_stays_behind
     assert record["hold"] == "mean"
     assert str(tmp_path) not in json.dumps(record)
     assert not (out / "meta" / "copolicy_stats.json").exists()
-    assert not (out / "README.md").exists()
+    assert is_minimal_card(out / "README.md")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "out"]
 
 
@@ -156,7 +156,10 @@ def test_players_are_compared_across_the_seats(roots, tmp_path, capsys):
         (["--prefix-people", "kth"], "--prefix-people: expected 2 different names, one for each data set, found"),
         (["--prefix-people", "a", "a"], "--prefix-people: expected 2 different names, one for each data set, found"),
         (["--prefix-people", "a", "b/c"], "--prefix-people: expected names of letters, digits and underscores"),
-        (["--repo-id", "both"], "--repo-id: expected USER/NAME, found 'both'"),
+        (
+            ["--repo-id", "both"],
+            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'both'",
+        ),
     ],
 )
 def test_a_call_that_cannot_be_met_says_why(made, tmp_path, capsys, flags, message):
@@ -207,10 +210,11 @@ def test_an_episode_in_both_is_refused(roots, tmp_path, capsys):
 
 def test_what_comes_out_changed_is_not_written(roots, tmp_path, capsys, monkeypatch):
     before = contents(tmp_path)
-    monkeypatch.setattr(merging, "_restore_episodes", lambda root, expected: None)
+    changed = {"late_ticks": lambda values: [7] * len(values)}
+    monkeypatch.setattr(merging, "_restore_episodes", lambda root, expected: set_columns(root, **changed))
     assert merge(tmp_path / "out", *roots) == 1
     error = capsys.readouterr().err
-    assert "expected achieved_hz unchanged by the merge, found otherwise; nothing was written" in error
+    assert "expected late_ticks unchanged by the merge, found otherwise; nothing was written" in error
     assert contents(tmp_path) == before
 
 

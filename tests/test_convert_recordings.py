@@ -54,7 +54,7 @@ def contents(root: Path) -> dict[str, bytes]:
 
 
 def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
-    assert convert(recordings, tmp_path / "set", "--license", "CC-BY-4.0", "--json") == 0
+    assert convert(recordings, tmp_path / "set", "--license", "cc-by-4.0", "--json") == 0
     captured = capsys.readouterr()
     assert json.loads(captured.out) == {
         "root": str(tmp_path / "set"),
@@ -96,7 +96,7 @@ def test_flags_do_what_they_say(recordings, tmp_path):
     dataset = load(root)
     assert (dataset.fps, dataset.num_episodes, dataset.num_frames) == (30, 4, 4 * 31)
     assert dataset.meta.episodes["discarded"] == [False, False, True, False]
-    assert np.isnan(dataset.meta.episodes["replay_drift_px"]).all()
+    assert dataset.meta.episodes["replay_drift_px"] == [None] * 4
     assert dataset.meta.features["action"]["hold"] == "first"
 
 
@@ -133,10 +133,12 @@ def test_damaged_files_are_left_out_on_demand(recordings, tmp_path, capsys, work
 
 
 def test_the_same_episode_twice_is_an_error(recordings, tmp_path, capsys):
-    (recordings / "b" / "copy.mcap").write_bytes((recordings / "a" / "episode_0.mcap").read_bytes())
+    # In another folder, under the same name.
+    first, copy = recordings / "a" / "episode_0.mcap", recordings / "b" / "episode_0.mcap"
+    copy.write_bytes(first.read_bytes())
     assert convert(recordings, tmp_path / "set") == 1
-    expected = "copolicy-convert: episode_uuid uuid-0: expected every episode once, found it at 0 and 2\n"
-    assert capsys.readouterr().err == expected
+    expected = f"expected every episode once, found episode uuid-0 also in {first}; nothing was written"
+    assert capsys.readouterr().err == f"copolicy-convert: {copy}: {expected}\n"
     assert not (tmp_path / "set").exists()
 
 
@@ -144,7 +146,10 @@ def test_the_same_episode_twice_is_an_error(recordings, tmp_path, capsys):
     ("flags", "error"),
     [
         (("--fps", "7"), "fps: expected a divisor of 30 [1, 2, 3, 5, 6, 10, 15, 30], found 7"),
-        (("--repo-id", "table"), "--repo-id: expected USER/NAME, found 'table'"),
+        (
+            ("--repo-id", "table"),
+            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'table'",
+        ),
         (("--workers", "0"), "workers: expected at least 1, found 0"),
     ],
 )

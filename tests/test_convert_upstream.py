@@ -210,7 +210,7 @@ def convert(path: Path, root: Path, *flags: str) -> int:
     ],
 )  # fmt: skip
 def test_each_format_becomes_a_data_set(examples, tmp_path, capsys, name, form, episodes, frames, flags):
-    assert convert(examples / name, tmp_path / "set", "--json", "--license", "CC-BY-4.0") == 0
+    assert convert(examples / name, tmp_path / "set", "--json", "--license", "cc-by-4.0") == 0
     captured = capsys.readouterr()
     summary = json.loads(captured.out)
     assert captured.err == ""

@@ -162,7 +162,7 @@ def test_the_content_does_not_depend_on_what_stands_beside_an_episode(made):
 
 
 def append(folder: Path, root: Path, *flags: str) -> int:
-    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "CC-BY-4.0"]
+    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     return main([*arguments, "--append", "--no-drift", *flags])
 
 

@@ -349,5 +349,6 @@ def test_a_name_that_is_none_is_refused(hub, user, dataset):
     done = user.run("publish", dataset, "--repo-id", "table")
     assert (done.status, hub.requests) == (2, [])
     assert done.err == (
-        "copolicy-dataset: repo id: expected user/name in letters, digits, '-', '_' and '.', found 'table'\n"
+        "copolicy-dataset: --repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), "
+        "found 'table'\n"
     )

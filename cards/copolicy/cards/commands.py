@@ -5,8 +5,12 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.licences import checked_licence
+from copolicy.dataset.minimal_card import is_minimal_card
+from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
+from copolicy.dataset.staging import replace_text
 
-from .new_file import require_new, write_whole
+from .new_file import require_new
 
 
 def add_dataset_command(commands: argparse._SubParsersAction) -> None:
@@ -55,16 +59,18 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _dataset(arguments: argparse.Namespace) -> dict:
+    if arguments.repo_id is not None:
+        checked_repo_id(arguments.repo_id)
     from .croissant import CROISSANT_FILE, croissant_text
     from .dataset_card import render
     from .facts import DatasetFacts
 
     facts = DatasetFacts.read(arguments.root)
     path = arguments.root / "README.md"
-    require_new(path, arguments.overwrite)
+    require_new(path, arguments.overwrite or is_minimal_card(path))
     if arguments.croissant and not arguments.repo_id:
         raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
-    repo_id = arguments.repo_id or f"local/{arguments.root.resolve().name}"
+    repo_id = arguments.repo_id or local_repo_id(arguments.root)
     render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
     figures = []
     if not arguments.no_figures:
@@ -73,13 +79,15 @@ def _dataset(arguments: argparse.Namespace) -> dict:
         figures = save_figures(facts)
     summary = {"card": str(path), "figures": [figure for figure, _ in figures]}
     if arguments.croissant:
-        write_whole(arguments.root / CROISSANT_FILE, croissant_text(facts, repo_id, arguments.pretty_name))
+        replace_text(arguments.root / CROISSANT_FILE, croissant_text(facts, repo_id, arguments.pretty_name))
         summary["croissant"] = str(arguments.root / CROISSANT_FILE)
-    write_whole(path, render(facts, repo_id, arguments.pretty_name, figures))
+    replace_text(path, render(facts, repo_id, arguments.pretty_name, figures))
     return {**summary, "episodes": len(facts.episodes), "sources": facts.counts("source")}
 
 
 def _model(arguments: argparse.Namespace) -> dict:
+    checked_repo_id(arguments.repo_id)
+    checked_licence(arguments.license or "")
     from .checkpoint import Checkpoint
     from .model_card import render_model_card
 
@@ -87,6 +95,6 @@ def _model(arguments: argparse.Namespace) -> dict:
     path = checkpoint.folder / "README.md"
     require_new(path, arguments.overwrite)
     evaluations = checkpoint.evaluations(arguments.eval)
-    write_whole(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
+    replace_text(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
     sources = checkpoint.data.sources or "not stated: the data set is not at hand"
     return {"card": str(path), "evaluations": len(evaluations), "trained_on": sources}

@@ -1,10 +1,12 @@
 """The card of a data set: Hub metadata in YAML, and a README that states only what the data set's metadata holds."""
 
-import re
 from collections.abc import Iterable
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.licences import checked_licence, licence_identifier
+from copolicy.dataset.minimal_card import CONFIGS
 from copolicy.dataset.physics_text import physics_counts
+from copolicy.dataset.repo_id import checked_repo_id
 
 from .artefacts import newest_release
 from .datasheet import datasheet
@@ -60,8 +62,7 @@ def render(
         InvalidValueError: `repo_id` or a licence is not in the Hub's form.
         FileFormatError: statistics, findings, release or another file in `meta/` cannot be read.
     """
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo_id):
-        raise InvalidValueError("--repo-id", "user/name in letters, digits, '-', '_' and '.'", repo_id)
+    checked_repo_id(repo_id)
     title = pretty_name or repo_id.split("/")[1]
     sections = (
         _overview(facts, title),
@@ -86,21 +87,19 @@ def hub_metadata(facts: DatasetFacts, title: str) -> DatasetCardData:
         tags=["LeRobot", "copolicy", "human-robot-collaboration", "table-carrying", *sources],
         size_categories=[next((name for limit, name in _SIZES if facts.info["total_frames"] < limit), "1M<n<10M")],
         pretty_name=title,
-        configs=[{"config_name": "default", "data_files": "data/*/*.parquet"}],
+        configs=[{"config_name": name, "data_files": files} for name, files in CONFIGS],
     )
 
 
 def licence(facts: DatasetFacts) -> str:
     """The Hub's identifier: the one licence of all episodes, `other` for several, `unknown` where one has none."""
-    licences = facts.counts("license")
+    # Recordings may have been made where nobody looked at the spelling.
+    licences = {licence_identifier(text) or text for text in facts.counts("license")}
     if "" in licences:
         return "unknown"
     if len(licences) > 1:
         return "other"
-    licence = next(iter(licences)).lower()
-    if not re.fullmatch(r"[a-z0-9][a-z0-9.-]*", licence):
-        raise InvalidValueError("license", "a Hub licence identifier such as cc-by-4.0", licence)
-    return licence
+    return checked_licence(next(iter(licences)), "license")
 
 
 def _overview(facts: DatasetFacts, title: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from copolicy.dataset.exceptions import MissingExtraError
+from copolicy.dataset.staging import replacement
 from copolicy.dataset.task import GOAL_SIZE, WINDOW
 
 from .facts import DatasetFacts
@@ -37,7 +38,6 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
     Raises:
         FileFormatError: the frames or the stored statistics cannot be read.
     """
-    (facts.root / FOLDER).mkdir(exist_ok=True)
     sources = " and ".join(facts.values("source"))
     total, groups = _by_obstacles(facts)
     most = f", the {len(groups)} most frequent of {total} sets of obstacles" if len(groups) < total else ""
@@ -51,9 +51,8 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
         pictures.append(("human_routes.png", people[1], people[0]))
     saved = []
     for name, caption, figure in pictures:
-        partial = facts.root / FOLDER / f".{name}.part"
-        figure.savefig(partial, format="png")
-        partial.replace(facts.root / FOLDER / name)
+        with replacement(facts.root / FOLDER / name) as partial:
+            figure.savefig(partial, format="png")
         saved.append(((FOLDER / name).as_posix(), caption))
     return saved
 

@@ -8,10 +8,11 @@ from copolicy.dataset.exceptions import MissingExtraError
 from .checkpoint import Checkpoint
 from .dataset_card import CITATION, SOURCES
 from .markdown import listing, share, table
+from .model_index import eval_results
 from .model_results import results
 
 try:
-    from huggingface_hub import EvalResult, ModelCardData
+    from huggingface_hub import ModelCardData
 except ModuleNotFoundError:
     raise MissingExtraError("huggingface_hub") from None
 
@@ -64,29 +65,12 @@ def hub_metadata(
         ],
         datasets=[repo_id] if _on_hub(repo_id) else None,
         model_name=name.rpartition("/")[2],
-        eval_results=[_eval_result(evaluation) for evaluation in evaluations] or None,
+        eval_results=eval_results(evaluations) or None,
     )  # fmt: skip
 
 
 def _on_hub(repo_id: str) -> bool:
     return "/" in repo_id and not repo_id.startswith("local/")
-
-
-def _eval_result(evaluation: dict[str, Any]) -> EvalResult:
-    settings, success = evaluation["settings"], evaluation["summary"]["success"]
-    return EvalResult(
-        task_type="robotics",
-        task_name=f"table carrying, {evaluation['study']} (simulation)",
-        dataset_type=f"copolicy-maps-{settings['maps']}",
-        dataset_name=f"{settings['maps']} maps{'' if settings.get('complete_set', True) else ', a part of them'}",
-        dataset_args={
-            key: settings[key] for key in ("map_count", "orientations", "repeats", "seed") if key in settings
-        },
-        metric_type="success_rate",
-        metric_name=f"success rate over {success['episodes']} episodes",
-        metric_value=round(success["mean"], 6),
-        metric_args={"standard_error": round(success["standard_error"], 6), "episodes": success["episodes"]},
-    )
 
 
 def _overview(checkpoint: Checkpoint, name: str) -> str:

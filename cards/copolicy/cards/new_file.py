@@ -1,6 +1,5 @@
-"""A file that appears complete or not at all."""
+"""Files that are not overwritten unless asked."""
 
-import os
 from pathlib import Path
 
 from copolicy.dataset.exceptions import OutputExistsError
@@ -14,11 +13,3 @@ def require_new(path: Path, overwrite: bool) -> None:
     """
     if path.exists() and not overwrite:
         raise OutputExistsError(path)
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Writes beside `path` and renames."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)

@@ -16,6 +16,7 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunErr
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
 from copolicy.dataset.routes import route_class
+from copolicy.dataset.staging import about
 from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics
 from copolicy.dataset.topics import SCENE, SCENE_MAP
 
@@ -103,7 +104,8 @@ class EpisodeRecorder:
         """
         self._file = EpisodeFile(self._path)
         try:
-            self._write_start()
+            with about(self._path):
+                self._write_start()
         except BaseException:
             self._file.close()
             raise
@@ -121,12 +123,16 @@ class EpisodeRecorder:
             with contextlib.suppress(CopolicyError):
                 read_episode(self._file.part)
                 self._file.publish()
-        except OSError:
+        except OSError as failure:
             # A full disk: what there is stays in the .part file, and the first error is the one to show.
             if kind is None:
+                failure.filename = failure.filename or str(self._path)
                 raise
         finally:
-            self._file.close()
+            if isinstance(error, OSError):
+                error.filename = error.filename or str(self._path)
+            with contextlib.suppress(OSError):
+                self._file.close()
 
     def step(
         self,

@@ -18,6 +18,7 @@ from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import TableState
 from copolicy.dataset.recording_checks import RECOVERY, UNVERIFIED
 from copolicy.dataset.routes import route_class
+from copolicy.dataset.staging import about
 from copolicy.dataset.task import RECORD_HZ
 from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE, is_ours
 
@@ -42,7 +43,7 @@ def write_recovered(part: IntactPart, output: Path, source_sha256: str) -> None:
     """
     unfinished = output.with_name(output.name + _UNFINISHED)
     try:
-        with unfinished.open("wb") as file:
+        with about(output, unfinished), unfinished.open("wb") as file:
             _write(part, file, source_sha256)
             file.flush()
             os.fsync(file.fileno())

@@ -1,5 +1,6 @@
 """Records episodes of scripted pairs, as fast as the machine goes."""
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -69,6 +70,7 @@ def simulate(
         OutputExistsError: the folder holds recordings already, or is none; nothing was written.
         UnknownNameError: no such map set or pair.
         InvalidValueError: less than one episode or worker, or a negative seed.
+        OSError: the disk refuses; no recording of this call is left.
     """
     out = Path(out)
     workers = _processors() if workers is None else workers
@@ -96,9 +98,14 @@ def simulate(
             config = displaced_start(config, start_noise, np.random.default_rng((seed, index)))
             meta = replace(meta, map_id=f"{meta.map_id}-displaced")
         jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", config, physics, meta, anchor, clearance))
+    new = not out.exists()
     out.mkdir(parents=True, exist_ok=True)
     started = time.perf_counter()
-    results = list(progress(_record_all(jobs, workers), len(jobs), "episodes"))
+    try:
+        results = list(progress(_record_all(jobs, workers), len(jobs), "episodes"))
+    except OSError:
+        _remove(jobs, out if new else None)
+        raise
     return _summary(out, results, time.perf_counter() - started)
 
 
@@ -164,6 +171,16 @@ def _start_worker(stop: Event) -> None:
 
 def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
     return [job.record() for job in jobs if _stop is None or not _stop.is_set()]
+
+
+def _remove(jobs: list[EpisodeJob], folder: Path | None) -> None:
+    """What was recorded before the disk refused: the same call makes it again, to the byte, where there is room."""
+    for job in jobs:
+        for path in (job.path, job.path.with_name(job.path.name + PART_SUFFIX)):
+            path.unlink(missing_ok=True)
+    if folder is not None:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 def _refuse_recordings(out: Path) -> None:

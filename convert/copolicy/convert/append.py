@@ -15,7 +15,8 @@ from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidV
 from copolicy.dataset.lerobot_folder.info import INFO_FILE, read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.log import read_metadata
-from copolicy.dataset.staging import sync_folder, sync_tree
+from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card, minimal_card
+from copolicy.dataset.staging import about, sync_folder, sync_tree
 
 from .lerobot_writer import RECORD_FILE
 from .linked_copy import add_later_columns, copy_as_links
@@ -110,13 +111,14 @@ def append_recordings(
     with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
         added, whole = Path(scratch) / "added", Path(f"{scratch}.whole")
         try:
-            written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
-            copy_as_links(place, whole)
-            columns_added = add_later_columns(whole)
-            info = _join(whole, added)
-            mixtures = _mixtures(whole, rewards)
-            sync_tree(whole)
-            _take_place(whole, place)
+            with about(root, places={added: root, whole: root}):
+                written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
+                copy_as_links(place, whole)
+                columns_added = add_later_columns(whole)
+                info = _join(whole, added)
+                mixtures = _mixtures(whole, rewards)
+                sync_tree(whole)
+                _take_place(whole, place)
         except CopolicyError as error:
             # The folders in the making are gone when somebody reads this.
             error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
@@ -193,12 +195,24 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     notes = {**record.get("notes", {}), **part.pop("notes")}
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
+    _renew_minimal_card(whole)
     for name in (_INFO, _STATS, RECORD_FILE):
         (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
     write_stats(aggregate_stats(statistics), whole)
     (whole / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     (whole / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     return info
+
+
+def _renew_minimal_card(root: Path) -> None:
+    """The licence may hold no longer for all; a card is left as it is."""
+    path = root / CARD_FILE
+    if path.exists() and not is_minimal_card(path):
+        return
+    tables = [read_table(file) for file in numbered_files(root / "meta" / "episodes").values()]
+    path.unlink(missing_ok=True)  # a link
+    licences = {text or "" for table in tables for text in table.column("license").to_pylist()}
+    path.write_text(minimal_card(licences), encoding="utf-8")
 
 
 def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:

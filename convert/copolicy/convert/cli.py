@@ -8,12 +8,13 @@ from typing import get_args
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.licences import checked_licence
+from copolicy.dataset.repo_id import checked_repo_id
 
 from .export.command import add_export_command
 from .merge.command import add_merge_command
 from .prepare import Conversion
 from .recordings import convert_recordings
-from .repo_id import checked_repo_id
 from .scale.command import add_scale_flags, convert_in_shards, scale_of
 from .upstream import convert_upstream
 from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
@@ -75,13 +76,19 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
         "--hold", choices=get_args(Hold), default=None,
         help="a frame's action: the mean of its steps or the first (default: mean; first for a zarr store)",
     )  # fmt: skip
-    parser.add_argument("--license", default="", metavar="ID", help="licence of episodes that state none, SPDX")
+    parser.add_argument(
+        "--license",
+        default="",
+        metavar="ID",
+        help="licence of episodes that state none, as the Hub spells it, such as cc-by-4.0",
+    )
     parser.add_argument(
         "--skip-damaged", action="store_true", help="leave damaged files out and name them, instead of stopping"
     )
 
 
 def _mcap(arguments: argparse.Namespace) -> dict:
+    repo_id, licence = checked_repo_id(arguments.repo_id), checked_licence(arguments.license)
     fps, hold = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.hold or "mean"
     convert = convert_recordings
     if arguments.append:
@@ -92,13 +99,12 @@ def _mcap(arguments: argparse.Namespace) -> dict:
     conversion = Conversion(
         fps,
         hold,
-        arguments.license,
+        licence,
         keep_discarded=arguments.keep_discarded,
         drift=not arguments.no_drift,
         video=_video(arguments),
     )
     scale = scale_of(arguments)
-    repo_id = checked_repo_id(arguments.repo_id)
     if scale is not None:
         return convert_in_shards(arguments.folders, arguments.root, repo_id, conversion, arguments.skip_damaged, scale)
     return convert(
@@ -129,6 +135,6 @@ def _upstream(arguments: argparse.Namespace) -> dict:
         _DEFAULT_FPS if arguments.fps is None else arguments.fps,
         arguments.hold,
         UpstreamOptions(arguments.angular_limit, arguments.obstacle_size),
-        arguments.license,
+        checked_licence(arguments.license),
         arguments.skip_damaged,
     )

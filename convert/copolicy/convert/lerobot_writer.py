@@ -5,6 +5,8 @@ metadata at every episode, and loses the set when it is interrupted. The files a
 """
 
 import json
+import logging
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -16,12 +18,14 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.licences import licence_identifier
+from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder
 from copolicy.dataset.task import RECORD_HZ
 
 from .frame_files import FrameFiles
 from .mixtures import Mixtures
-from .prepare import PreparedEpisode
+from .prepare import PreparedEpisode, RepeatedEpisodeError
 from .scene_video import SCENE, scene_encoder, scene_feature
 from .statistics import episode_statistics
 from .video_files import VideoFiles
@@ -108,9 +112,22 @@ def write_dataset(
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
+        card = minimal_card({row["license"] for row in rows})
+        (partial / CARD_FILE).write_text(card, encoding="utf-8")
+    _warn_of_licences(root, rows)
     successes = sum(row["success"] for row in rows)
     frames = rows[-1]["dataset_to_index"]
     return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows))
+
+
+def _warn_of_licences(root: Path, rows: list[dict]) -> None:
+    """Recordings say what they say; that a card will refuse it is told before the data set is worked with."""
+    unlisted = Counter(row["license"] for row in rows if row["license"] and not licence_identifier(row["license"]))
+    for licence, count in unlisted.items():
+        logging.warning(
+            "warning: %s: %d episodes state the licence %r, which is none of the Hub's identifiers: "
+            "a card will refuse it", root, count, licence,
+        )  # fmt: skip
 
 
 def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
@@ -124,7 +141,7 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
     rows: list[dict] = []
     statistics: list[dict] = []
     notes: dict[str, list[str]] = {}
-    seen: dict[str, int] = {}
+    origins: dict[str, str] = {}
     start = 0
     with (
         FrameFiles(meta.root, meta.features, meta.data_files_size_in_mb, meta.chunks_size) as frames,
@@ -132,11 +149,9 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
     ):
         for index, episode in enumerate(episodes):
             uuid = episode.meta.episode_uuid
-            if uuid in seen:
-                raise RunError(
-                    f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}"
-                )
-            seen[uuid] = index
+            if uuid in origins:
+                raise RepeatedEpisodeError(uuid, origins[uuid], episode.origin or f"episode {index}")
+            origins[uuid] = episode.origin or f"episode {index}"
             clock = _clock_columns(index, start, episode.frames, meta.fps)
             end = start + episode.frames
             rows.append(
@@ -175,7 +190,8 @@ def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> Non
     columns = {}
     for name in rows[0]:
         kind = EPISODE_COLUMNS.get(name)
-        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None)
+        # A number that is not known is no number: every reader of tables takes null for that.
+        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None, from_pandas=True)
     for feature, kinds in statistics[0].items():
         for kind in kinds:
             columns[f"stats/{feature}/{kind}"] = pa.array([entry[feature][kind].tolist() for entry in statistics])

@@ -43,13 +43,18 @@ class Conversion:
 
 @dataclass(frozen=True)
 class PreparedEpisode:
-    """Frames, their statistics, the row of meta/episodes, and the film if one was asked for."""
+    """Frames, their statistics, the row of meta/episodes, and the film if one was asked for.
+
+    Attributes:
+        origin: the file that the episode was read from, for messages; no part of the data set.
+    """
 
     columns: dict[str, np.ndarray]
     statistics: dict[str, dict[str, np.ndarray]]
     meta: EpisodeMeta
     notes: tuple[str, ...] = ()
     scene: "SceneClip | None" = None
+    origin: str = ""
 
     @property
     def frames(self) -> int:
@@ -77,6 +82,16 @@ class LeftOut:
     def record(self) -> dict[str, list[str]]:
         """The names alone: messages hold paths of the machine."""
         return {"damaged": self.damaged, "discarded": self.discarded}
+
+
+class RepeatedEpisodeError(RunError):
+    """Two files hold one episode."""
+
+    def __init__(self, episode_uuid: str, first: str, second: str):
+        same = "twice there" if first == second else f"also in {first}"
+        super().__init__(
+            f"{second}: expected every episode once, found episode {episode_uuid} {same}; nothing was written"
+        )
 
 
 class DamagedEpisodeError(RunError):
@@ -113,14 +128,20 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
     return PreparedEpisode(columns, {**statistics, SCENE: clip.statistics}, meta, episode.notes, clip)
 
 
-def prepare_from(name: str, read: Callable[[], Episode], conversion: Conversion) -> PreparedEpisode | NotPrepared:
+def prepare_from(
+    name: str, read: Callable[[], Episode], conversion: Conversion, origin: str | None = None
+) -> PreparedEpisode | NotPrepared:
     """Reads and prepares an episode; a damaged or discarded one is reported, not raised, so that the result can
-    cross from one process to another."""
+    cross from one process to another.
+
+    Args:
+        origin: path of the file, where `name` alone does not tell two files apart.
+    """
     try:
         episode = read()
         if episode.meta.discarded and not conversion.keep_discarded:
             return NotPrepared(name, "discarded")
-        return prepare_episode(episode, conversion)
+        return replace(prepare_episode(episode, conversion), origin=origin or name)
     except CopolicyError as error:
         return NotPrepared(name, "damaged", str(error))
 

@@ -129,4 +129,4 @@ def _prepared(
 
 
 def _read_recording(conversion: Conversion, path: Path) -> PreparedEpisode | NotPrepared:
-    return prepare_from(path.name, lambda: read_episode(path), conversion)
+    return prepare_from(path.name, lambda: read_episode(path), conversion, str(path))

@@ -1,6 +1,7 @@
 """What every command of every room shares: flags, exit status, progress, and errors of one line."""
 
 import argparse
+import io
 import json
 import logging
 import os
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from tqdm import tqdm
 
 from .exceptions import CopolicyError
+from .staging import causes, refusal
 
 Handler = Callable[[argparse.Namespace], dict]
 """A command: takes its parsed flags, returns its summary as a JSON-able dict."""
@@ -46,6 +48,10 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
 
     A summary may hold `exit_status` when the work was done but its result is a finding (1).
     """
+    for stream in (sys.stdout, sys.stderr):
+        # A letter that the terminal's encoding lacks, or a file name of another one, is no reason to stop.
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
+            stream.reconfigure(errors="backslashreplace")
     arguments = parser.parse_args(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
     try:
@@ -55,14 +61,15 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
             raise
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return error.exit_status
-    except OSError as error:
-        if arguments.debug:
-            raise
-        print(f"{parser.prog}: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
-        return 1
     except KeyboardInterrupt:
         print(f"{parser.prog}: stopped", file=sys.stderr)
         return 130
+    except Exception as error:
+        line = system_line(error)
+        if arguments.debug or line is None:
+            raise
+        print(f"{parser.prog}: {line}", file=sys.stderr)
+        return 1
     status = int(summary.pop("exit_status", 0))
     if arguments.json:
         print(json.dumps(summary, indent=2))
@@ -70,6 +77,23 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
         for line in _lines(summary):
             print(line)
     return status
+
+
+def system_line(error: BaseException) -> str | None:
+    """What the system refused in one line with the path, None for an error of another kind.
+
+    Libraries hide it behind errors of their own: h5py and pyarrow have an OSError without number and path, safetensors
+    and torch none at all.
+    """
+    number = refusal(error)
+    if number is None and not isinstance(error, OSError):
+        return None
+    texts = (error.strerror, " ".join(str(error).split())) if isinstance(error, OSError) else ()
+    text = os.strerror(number) if number is not None else next(filter(None, texts), type(error).__name__)
+    chain = causes(error) if number is not None else (error,)
+    paths = (getattr(cause, "filename", None) for cause in chain)
+    path = next((path for path in paths if isinstance(path, (str, bytes, os.PathLike))), None)
+    return text if path is None else f"{os.fsdecode(path)}: {text}"
 
 
 def progress[Item](items: Iterable[Item], total: int | None, what: str) -> Iterable[Item]:

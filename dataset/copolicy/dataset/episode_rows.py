@@ -3,14 +3,13 @@
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .episode import EPISODE_COLUMNS
 from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
 from .files import visible_files
-from .staging import replacement
+from .staging import replacements
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -131,8 +130,9 @@ def write_tables(tables: "Mapping[Path, pa.Table]", texts: Mapping[Path, str] | 
     """
     import pyarrow.parquet as pq
 
-    with ExitStack() as staged:
-        for path, text in (texts or {}).items():
-            staged.enter_context(replacement(path)).write_text(text, encoding="utf-8")
-        for path, table in tables.items():
-            pq.write_table(table, staged.enter_context(replacement(path)), compression="snappy")
+    texts = texts or {}
+    with replacements([*tables, *texts]) as partials:
+        for table, partial in zip(tables.values(), partials, strict=False):
+            pq.write_table(table, partial, compression="snappy")
+        for text, partial in zip(texts.values(), partials[len(tables) :], strict=True):
+            partial.write_text(text, encoding="utf-8")

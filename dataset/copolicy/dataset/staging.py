@@ -1,14 +1,16 @@
 """A folder or file that appears complete or not at all, also where the power fails."""
 
+import errno
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .exceptions import OutputExistsError
 
+_REFUSALS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 _FILE = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only what is open for writing
 
 
@@ -32,17 +34,20 @@ def new_folder(path: Path, suffix: str | None = None) -> Iterator[Path]:
 
     Raises:
         OutputExistsError: there is something at `path`, before the block or after it.
+        OSError: the disk refuses; it names `path` or a file in it.
     """
     require_new(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.{suffix or f'{secrets.token_hex(4)}.partial'}"
+    with about(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.parent / f".{path.name}.{suffix or _unique()}"
     shutil.rmtree(partial, ignore_errors=True)
     try:
-        yield partial
-        sync_tree(partial)
-        require_new(path)
-        partial.rename(path)
-        sync_folder(path.parent)
+        with about(path, partial):
+            yield partial
+            sync_tree(partial)
+            require_new(path)
+            partial.rename(path)
+            sync_folder(path.parent)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
@@ -52,41 +57,112 @@ def new_folder(path: Path, suffix: str | None = None) -> Iterator[Path]:
 def new_file(path: Path) -> Iterator[Path]:
     """The same for one file."""
     require_new(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
-    try:
+    with replacement(path, new=True) as partial:
         yield partial
-        _sync(partial, _FILE)
-        require_new(path)
-        partial.rename(path)
-        sync_folder(path.parent)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 @contextmanager
-def replacement(path: Path) -> Iterator[Path]:
-    """The same for a file that may be there already: the old one stays until the new one takes its place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.partial"
-    try:
+def replacement(path: Path, new: bool = False) -> Iterator[Path]:
+    """The same for a file that may be there already: the old one stays until the new one takes its place.
+
+    Args:
+        new: nothing may be there when the block ends.
+    """
+    with replacements([path]) as (partial,):
         yield partial
-        _sync(partial, _FILE)
-        os.replace(partial, path)
-        sync_folder(path.parent)
-    except OSError as error:
-        # Nobody finds the hidden file when they read this.
-        if error.filename is None or Path(error.filename) == partial:
-            error.filename = str(path)
-        raise
+        if new:
+            require_new(path)
+
+
+@contextmanager
+def replacements(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """The same for several files: all are on the disk before the first takes its place, in the order of `paths`."""
+    partials: list[Path] = []
+    try:
+        for path in paths:
+            with about(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+            partials.append(path.parent / f".{path.name}.{_unique()}")
+        places = dict(zip(partials, paths, strict=True))
+        with about(paths[0] if len(paths) == 1 else None, places=places):
+            yield list(partials)
+        for partial, path in places.items():
+            with about(path, partial):
+                _sync(partial, _FILE)
+        for partial, path in places.items():
+            with about(path, partial):
+                os.replace(partial, path)
+        for folder in dict.fromkeys(path.parent for path in paths):
+            sync_folder(folder)
     finally:
-        partial.unlink(missing_ok=True)
+        for partial in partials:
+            with suppress(OSError):
+                partial.unlink(missing_ok=True)
 
 
 def replace_text(path: Path, text: str) -> None:
     """Writes a text file in UTF-8, whole or not at all."""
     with replacement(path) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, Path] | None = None) -> Iterator[None]:
+    """Gives an error of the system the name of the file that a user knows.
+
+    Libraries leave the name out, or name the hidden file that was in the making; nobody finds that one when they read
+    the message.
+
+    Args:
+        path: what is being written; named where the error names nothing.
+        partial: where it is being written, a file or a folder.
+        places: the same for several files.
+    """
+    places = dict(places or {})
+    if path is not None and partial is not None:
+        places[partial] = path
+    try:
+        yield
+    except OSError as error:
+        for hidden, known in places.items():
+            if isinstance(error.filename, (str, os.PathLike)) and Path(error.filename).is_relative_to(hidden):
+                error.filename = str(known / Path(error.filename).relative_to(hidden))
+        if error.filename is None and path is not None:
+            error.filename = str(path)
+        raise
+    except Exception as error:
+        number = refusal(error)
+        if number is None or path is None:
+            raise
+        # An error of safetensors or torch says it in its text alone.
+        raise OSError(number, os.strerror(number), str(path)) from error
+
+
+def refusal(error: BaseException) -> int | None:
+    """Number of the system's error where the disk is full or takes no more, whatever the error is called.
+
+    What an error was raised from, or while, counts too: libraries put errors of their own around it.
+    """
+    for cause in causes(error):
+        number = getattr(cause, "errno", None)
+        if number in _REFUSALS:
+            return number
+        if isinstance(cause, OSError) and number is not None:
+            return None
+        found = next((number for number in _REFUSALS if os.strerror(number) in str(cause)), None)
+        if found is not None:
+            return found
+    return None
+
+
+def causes(error: BaseException) -> Iterator[BaseException]:
+    """An error, what it was raised from, what that was raised from, and so on."""
+    seen: list[BaseException] = []
+    cause: BaseException | None = error
+    while cause is not None and not any(cause is earlier for earlier in seen):
+        seen.append(cause)
+        yield cause
+        cause = cause.__cause__ or cause.__context__
 
 
 def sync_tree(folder: Path) -> None:
@@ -105,6 +181,10 @@ def sync_folder(folder: Path) -> None:
     """Waits until the names in a folder are on the disk, where the system can (Windows cannot open a folder)."""
     if hasattr(os, "O_DIRECTORY"):
         _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _unique() -> str:
+    return f"{secrets.token_hex(4)}.partial"
 
 
 def _sync(path: Path, flags: int) -> None:

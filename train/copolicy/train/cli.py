@@ -5,6 +5,7 @@ import contextlib
 import io
 import logging
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,6 +18,9 @@ from copolicy.dataset.exceptions import (
     OutputExistsError,
     RunError,
 )
+from copolicy.dataset.local_path import require_hub_name, similar_path
+from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
+from copolicy.dataset.staging import about, refusal
 
 from .policy_commands import policy_parser
 
@@ -85,7 +89,7 @@ def with_defaults(flags: Sequence[str]) -> list[str]:
             added.append("--policy.push_to_hub=false")
         root = _value("dataset.root", flags)
         if root and "dataset.repo_id" not in given:
-            added.append(f"--dataset.repo_id=local/{Path(root).resolve().name}")
+            added.append(f"--dataset.repo_id={local_repo_id(Path(root))}")
     return [*added, *flags]
 
 
@@ -113,6 +117,8 @@ def _train(arguments: argparse.Namespace) -> dict:
     flags = with_defaults(arguments.flags)
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))
+    for name in ("dataset.repo_id", "policy.repo_id"):
+        _check_repo_id(name, _value(name, flags))
     # LeRobot and its libraries print here and there; stdout is for the summary.
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
         from .local_dataset import check_local_dataset
@@ -123,16 +129,33 @@ def _train(arguments: argparse.Namespace) -> dict:
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
-            train_from_memory(config)
+            with about(Path(config.output_dir or "")):
+                train_from_memory(config)
         except CopolicyError:
             raise
         except Exception as error:
+            if refusal(error) is not None:
+                _remove_unfinished(Path(config.output_dir or ""), config.resume)
             if isinstance(error, OSError) and error.errno is not None:
                 raise  # the system's own, of a file; the Hub client's have pages of advice instead
             raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
     output = Path(config.output_dir or "")
     checkpoint = output / "checkpoints" / "last" / "pretrained_model"
     return {"output_dir": str(output), "steps": config.steps, "checkpoint": str(checkpoint)}
+
+
+def _remove_unfinished(output: Path, resumed: bool) -> None:
+    """Half a checkpoint that a full disk left, and a run that came to none: nobody can go on with either."""
+    checkpoints = output / "checkpoints"
+    if resumed and not (checkpoints / "last").is_symlink():
+        return  # which of them is whole cannot be told
+    last = (checkpoints / "last").resolve()
+    numbered = [folder for folder in checkpoints.glob("*") if folder.name.isdigit() and not folder.is_symlink()]
+    whole = [folder for folder in numbered if last.name.isdigit() and int(folder.name) <= int(last.name)]
+    for folder in set(numbered) - set(whole):
+        shutil.rmtree(folder, ignore_errors=True)
+    if not whole and not resumed and output != Path():
+        shutil.rmtree(output, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -196,11 +219,20 @@ def _validate(config) -> None:
 
 
 def _check_local_path(name: str, value: str | None) -> None:
-    """A path that is not there must not be taken for the name of a Hub repository, which has one slash at most."""
+    """A path that is not there must not be taken for the name of a Hub repository."""
     if value is None or Path(value).exists():
         return
-    if value.count("/") > 1 or value.startswith((".", "/", "~")) or value.endswith((".json", ".yaml", ".yml")):
-        raise FileFormatError(value, f"a file or folder for --{name}", "none")
+    expected = f"a file or folder for --{name}"
+    if value.endswith((".json", ".yaml", ".yml")):
+        similar = similar_path(value)
+        raise FileFormatError(value, expected, "none" if similar is None else f"none; did you mean {similar}?")
+    require_hub_name(value, expected, "from another folder it is looked up on the Hub")
+
+
+def _check_repo_id(name: str, value: str | None) -> None:
+    """LeRobot takes a name without a user for a local data set; the Hub's other rules hold for it too."""
+    if value not in (None, "", "null", "None"):
+        checked_repo_id(value if "/" in value else f"local/{value}", f"--{name}")
 
 
 def _line(error: BaseException) -> str:

@@ -20,6 +20,7 @@ from copolicy.collect.controllers.checkpoint import Checkpoint
 from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state, state_vector
+from copolicy.dataset.staging import about, sync_folder, sync_tree
 from copolicy.dataset.task import MAP_SETS
 
 from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe
@@ -140,9 +141,12 @@ def _staged(out: Path, overwrite: bool) -> Iterator[Path]:
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".export-", dir=out.parent) as place:
         folder = Path(place) / out.name
-        folder.mkdir()
-        yield folder
-        _check_output(out, overwrite)
-        if out.exists():
-            shutil.move(out, Path(place) / f"{out.name}.before")
-        folder.rename(out)
+        with about(out, folder):
+            folder.mkdir()
+            yield folder
+            sync_tree(folder)
+            _check_output(out, overwrite)
+            if out.exists():
+                shutil.move(out, Path(place) / f"{out.name}.before")
+            folder.rename(out)
+            sync_folder(out.parent)

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from copolicy.collect.table import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from copolicy.dataset.staging import replacement
 from copolicy.dataset.task import GOAL_SIZE, PLAYERS, WINDOW
 
 from .plans import Decision
@@ -45,7 +46,8 @@ def save_plans(decision: Decision, path: Path, title: str) -> None:
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), frameon=False)
     figure.suptitle(title)
-    figure.savefig(path, pil_kwargs={"optimize": True})
+    with replacement(path) as partial:
+        figure.savefig(partial, format="png", pil_kwargs={"optimize": True})
 
 
 def _paths(axis: Axes, decision: Decision, colours: dict[str | None, str]) -> None:

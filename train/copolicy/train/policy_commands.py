@@ -47,7 +47,7 @@ def _export(arguments: argparse.Namespace) -> dict:
     commands = []
     if arguments.commands is not None:
         try:
-            text = arguments.commands.read_text(encoding="utf-8")
+            text = arguments.commands.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise FileFormatError(arguments.commands, "a text of commands", type(error).__name__) from None
         commands = [line.strip() for line in text.replace("\\\n", " ").splitlines()]

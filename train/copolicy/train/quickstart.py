@@ -19,6 +19,7 @@ from time import perf_counter
 from copolicy.dataset.commandline import add_common_flags, run
 from copolicy.dataset.exceptions import MissingExtraError, OutputExistsError, RunError
 from copolicy.dataset.files import is_hidden
+from copolicy.dataset.staging import replace_text
 
 REPO_ID = "local/quickstart"
 
@@ -74,7 +75,7 @@ def _quickstart(arguments: argparse.Namespace) -> dict:
         _say(f"\n[{number}/{len(steps)}] {step.purpose}\n$ {step.typed}")
         _execute(step, quiet=arguments.json)
     summary = _summary(arguments, perf_counter() - started)
-    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    replace_text(out / "summary.json", json.dumps(summary, indent=1) + "\n")
     _say("\nDone.")
     return summary
 

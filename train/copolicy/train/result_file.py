@@ -1,13 +1,13 @@
 """Result files of studies: new ones, and there whole or not at all."""
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.file_kinds import kind_of
+from copolicy.dataset.staging import replace_text
 
 
 def require_new(*paths: Path, overwrite: bool = False) -> None:
@@ -20,17 +20,9 @@ def require_new(*paths: Path, overwrite: bool = False) -> None:
             raise OutputExistsError(path)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Writes beside and renames; makes the folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
-
-
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """`write_text` of a JSON object."""
-    write_text(path, json.dumps(content, indent=1) + "\n")
+    """Writes a JSON object, whole or not at all; makes the folder."""
+    replace_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:
@@ -45,7 +37,7 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
     if path.exists() and not path.is_file():
         raise FileFormatError(path, what, kind_of(path))
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError:
         raise FileFormatError(path, what, kind_of(path)) from None
     except OSError as error:

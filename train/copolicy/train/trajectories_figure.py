@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from copolicy.dataset.staging import replacement
 from copolicy.dataset.task import GOAL_SIZE, WINDOW
 
 from .coplan import Outcome
@@ -40,7 +41,8 @@ def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> No
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle(title)
-    figure.savefig(path)
+    with replacement(path) as partial:
+        figure.savefig(partial, format="png")
 
 
 def _panel(axis, obstacles, outcomes: Sequence[Outcome]) -> None:

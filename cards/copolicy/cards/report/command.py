@@ -5,6 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.staging import replace_text
 
 from ..artefacts import CHECK_FILE, KeptFindings, kept_findings, stored_statistics
 
@@ -33,7 +34,7 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
 
 def _report(arguments: argparse.Namespace) -> dict:
     from ..facts import DatasetFacts
-    from ..new_file import require_new, write_whole
+    from ..new_file import require_new
     from .page import render_page
     from .payload import build_payload
 
@@ -46,7 +47,7 @@ def _report(arguments: argparse.Namespace) -> dict:
     statistics = stored_statistics(arguments.root)
     payload = build_payload(facts, arguments.title or arguments.root.resolve().name, findings, statistics)
     text = render_page(payload)
-    write_whole(path, text)
+    replace_text(path, text)
     return {
         "report": str(path),
         "episodes": len(facts.episodes),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.file_kinds import kind_of
+from copolicy.dataset.staging import replace_text
 
 from .calibration import StickCalibration
 
@@ -62,7 +63,4 @@ class CalibrationStore:
         """
         self._by_guid[guid] = calibration
         entries = {key: one.to_json() for key, one in sorted(self._by_guid.items())}
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self.path.with_suffix(".json.new")
-        fresh.write_text(json.dumps(entries, indent=2) + "\n", encoding="utf-8")
-        os.replace(fresh, self.path)
+        replace_text(self.path, json.dumps(entries, indent=2) + "\n")

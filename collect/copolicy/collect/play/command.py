@@ -52,7 +52,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--consent-0", default="", metavar="ID", help="record id of player a's consent, no name")
     command.add_argument("--consent-1", default="", metavar="ID", help="record id of player b's consent, no name")
-    command.add_argument("--license", default="", help="of the recordings, an SPDX identifier")
+    command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
     command.add_argument(
         "--angular-limit", choices=_ANGULAR_LIMITS, default="pi/2", help="angular acceleration, rad/s^2 (default pi/2)"
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.task import MAP_SETS, MapConfig, Physics, map_set
 
 from ..pilots import PAIRS
@@ -61,7 +62,7 @@ class PlaySettings:
         seed: of the schedule and of simulated players.
         swap_seats: the players change seats in the middle.
         consents: record id of each player's consent, or an empty text.
-        license: of the recordings (SPDX).
+        license: of the recordings, by the identifier of the Hub, or an empty text.
         angular_limit: bound on the angular acceleration, rad/s^2.
         headless: no window; nobody is asked anything.
         countdown_s: before each episode.
@@ -104,6 +105,7 @@ class PlaySettings:
             raise InvalidValueError("window", "WxH of at least 320x320", "{}x{}".format(*self.window))
         if not 0 <= self.countdown_s <= 60:
             raise InvalidValueError("countdown", "seconds from 0 to 60", self.countdown_s)
+        checked_licence(self.license)
         self.physics  # noqa: B018  (checks the limit)
 
     @property

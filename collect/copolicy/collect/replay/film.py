@@ -1,17 +1,17 @@
 """A replay as a film: H.264 through PyAV or the ffmpeg program, or a GIF through Pillow."""
 
 import contextlib
-import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, MissingExtraError, OutputExistsError, RunError
+from copolicy.dataset.staging import new_file
 
 from ..sdl import pygame
 from .pictures import picture_count, picture_size, pictures
@@ -20,6 +20,7 @@ from .track import Track
 VIDEO_WIDTH, VIDEO_FPS = 1200, 30
 GIF_WIDTH, GIF_FPS = 600, 12
 
+_CONTAINERS = {".mp4": "mp4", ".mkv": "matroska"}
 _QUALITY = "20"  # of x264, 0 (lossless) to 51
 _PRESET = "veryfast"
 
@@ -46,12 +47,12 @@ def write_video(
         RunError: the encoder failed.
     """
     width, fps = width or VIDEO_WIDTH, fps or VIDEO_FPS
-    _check(path, (".mp4", ".mkv"), speed, fps)
+    _check(path, tuple(_CONTAINERS), speed, fps)
     size = picture_size(width)
     frames = _shown_progress(track, size, fps, speed)
     encode = _encoder()
-    with _published(path) as unfinished:
-        encode(unfinished, frames, size, fps)
+    with new_file(path) as unfinished:
+        encode(unfinished, _CONTAINERS[path.suffix.lower()], frames, size, fps)
     return _summary(path, track, size, fps, speed)
 
 
@@ -96,7 +97,7 @@ def save_gif(frames: Iterable[pygame.Surface], path: Path, size: tuple[int, int]
         if palette is None:
             palette = image.quantize(colours)
         images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-    with _published(path) as unfinished:
+    with new_file(path) as unfinished:
         images[0].save(
             unfinished, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
         )
@@ -129,18 +130,6 @@ def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: f
     }
 
 
-@contextlib.contextmanager
-def _published(path: Path) -> Iterator[Path]:
-    """A name to write to, which becomes `path` when all is written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".film-", dir=path.parent) as folder:
-        unfinished = Path(folder) / path.name
-        yield unfinished
-        if path.exists():
-            raise OutputExistsError(path)
-        os.replace(unfinished, path)
-
-
 def _encoder():
     try:
         import av
@@ -155,28 +144,34 @@ def _encoder():
     raise CopolicyError("--video: expected PyAV (pip install av) or the program ffmpeg, found neither")
 
 
-def _encode_with_pyav(path: Path, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int) -> None:
+def _encode_with_pyav(
+    path: Path, container: str, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int
+) -> None:
     import av
     from av.error import FFmpegError
 
     try:
-        with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
-            stream = container.add_stream("libx264", rate=Fraction(fps), options={"crf": _QUALITY, "preset": _PRESET})
+        with av.open(str(path), "w", format=container, options={"movflags": "+faststart"}) as film:
+            stream = film.add_stream("libx264", rate=Fraction(fps), options={"crf": _QUALITY, "preset": _PRESET})
             stream.width, stream.height = size
             stream.pix_fmt = "yuv420p"
             for surface in frames:
                 frame = av.VideoFrame.from_ndarray(pygame.surfarray.array3d(surface).swapaxes(0, 1), format="rgb24")
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode())
+                film.mux(stream.encode(frame))
+            film.mux(stream.encode())
+    except OSError:
+        raise
     except FFmpegError as error:
         raise RunError(f"{path.name}: expected PyAV to encode the video, found {error}") from None
 
 
-def _encode_with_ffmpeg(path: Path, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int) -> None:
+def _encode_with_ffmpeg(
+    path: Path, container: str, frames: Iterable[pygame.Surface], size: tuple[int, int], fps: int
+) -> None:
     command = [
         "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
         "-r", str(fps), "-i", "-", "-c:v", "libx264", "-preset", _PRESET, "-crf", _QUALITY, "-pix_fmt", "yuv420p",
-        "-movflags", "+faststart", str(path),
+        "-movflags", "+faststart", "-f", container, str(path),
     ]  # fmt: skip
     with tempfile.TemporaryFile() as errors:
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors)

@@ -1,8 +1,11 @@
 """The pictures of a film of a replay, drawn without a display."""
 
+import io
 from collections.abc import Iterator
+from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.staging import new_file
 
 from ..sdl import pygame
 from .playback import Playback
@@ -43,3 +46,16 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: float, spee
     view.draw(surface, playback, shown)
     for _ in range(round(_LAST_S * frames_per_second)):
         yield surface
+
+
+def write_png(surface: pygame.Surface, path: Path) -> None:
+    """Writes a picture, whole or not at all.
+
+    Raises:
+        OutputExistsError: the file exists.
+        OSError: it cannot be written.
+    """
+    encoded = io.BytesIO()
+    pygame.image.save(surface, encoded, "picture.png")
+    with new_file(path) as partial:
+        partial.write_bytes(encoded.getvalue())

@@ -7,6 +7,7 @@ from typing import Any
 
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, OutputExistsError
+from copolicy.dataset.staging import about
 from copolicy.dataset.task import GOAL_SIZE, PLAYERS, RECORD_HZ, WINDOW
 
 from ..screen import SEAT_POINTS
@@ -68,8 +69,9 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
     if path is None:
         recording.spawn(default_blueprint=layout)
     else:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        recording.save(str(path), default_blueprint=layout)
+        with about(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            recording.save(str(path), default_blueprint=layout)
     _log_map(rr, recording, track)
     for step in progress(range(track.steps + 1), track.steps + 1, "steps"):
         recording.set_time(_TIMELINE, duration=step / RECORD_HZ)

@@ -4,13 +4,14 @@ import math
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, RunError
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.task import PLAYERS, RECORD_HZ, WINDOW
 
 from ..screen.canvas import Canvas
 from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
 from ..screen.palette import INK, MUTED, TEXT
 from ..sdl import pygame
+from .pictures import write_png
 from .track import Track
 from .view import ReplayView
 
@@ -36,7 +37,6 @@ def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 180
     Raises:
         OutputExistsError: the file exists.
         InvalidValueError: another ending, or a number of pictures or a width that makes no sheet.
-        RunError: it cannot be written.
     """
     if path.suffix.lower() != ".png":
         raise InvalidValueError(str(path), "a name that ends with .png", path.suffix)
@@ -47,11 +47,7 @@ def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 180
     if not 300 <= width <= 10_000:
         raise InvalidValueError("width", "300 to 10000 px", width)
     sheet, positions = draw_sheet(track, frames, width)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        pygame.image.save(sheet, path)
-    except pygame.error as error:
-        raise RunError(f"{path}: expected to write the picture, found {error}") from None
+    write_png(sheet, path)
     return {"out": str(path), "bytes": path.stat().st_size, "size": list(sheet.get_size()), "steps": positions}
 
 

@@ -8,6 +8,7 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import RECORD_HZ
 
 from ..sdl import pygame
+from .pictures import write_png
 from .playback import Playback
 from .track import Track
 from .view import SIZE, ReplayView, Shown
@@ -140,9 +141,9 @@ class Viewer:
         self._view.draw(surface, self.playback, Shown(self.shown.trails, self.shown.forces, hint=False))
         path = _free(self._track.path.with_name(f"{self._track.path.stem}_step_{int(self.playback.position):04d}.png"))
         try:
-            pygame.image.save(surface, path)
+            write_png(surface, path)
             self._say(f"saved {path.name}")
-        except (pygame.error, OSError) as error:
+        except OSError as error:
             self._say(f"not saved: {error}")
 
     def _say(self, message: str) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.staging import replace_text
 
 from ..episode_file import sync_folder
 from ..file_lock import hold
@@ -146,7 +147,7 @@ class SessionFolder:
         self.path.mkdir()
         self.session_id = f"{self.path.name}-{uuid.uuid4().hex[:8]}"
         header = {"session_id": self.session_id, "pair_id": pair, "settings": dict(settings)}
-        (self.path / _HEADER).write_text(json.dumps(header, indent=2) + "\n", encoding="utf-8")
+        replace_text(self.path / _HEADER, json.dumps(header, indent=2) + "\n")
 
     def _read_header(self) -> dict[str, Any]:
         path = self.path / _HEADER

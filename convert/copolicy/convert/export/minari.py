@@ -16,6 +16,7 @@ from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, TASK
 from copolicy.dataset.staging import new_folder
 
+from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
 
 try:
@@ -43,12 +44,13 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
         folder = partial / "data"
         folder.mkdir(parents=True)
         path = folder / "main_data.hdf5"
-        with h5py.File(path, "w", track_order=True) as file:
+        with new_hdf5(path, track_order=True) as (file, storage):
             bounds = {feature: BOUNDS[feature].astype(np.float32) for feature in (*_OBSERVATIONS.values(), ACTION)}
             for number, episode in enumerate(source.episodes()):
                 group = file.create_group(f"episode_{number}")
                 _write_episode(group, number, episode)
                 _widen(bounds, group)
+                storage.check()
         subspaces = {name: _box(bounds[feature]) for name, feature in _OBSERVATIONS.items()}
         metadata = {
             "total_episodes": len(source.rows),

@@ -21,6 +21,7 @@ from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.staging import new_file
 from copolicy.dataset.task import Physics
 
+from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
 
 try:
@@ -67,13 +68,14 @@ def export_robomimic(source: ExportSource, out: Path, validation: Validation | N
         found = f"the splits {', '.join(source.splits)} in {source.root}"
         raise InvalidValueError("--valid", "a data set without a split of its own", found)
     motions: list[str] = []
-    with new_file(out) as partial, h5py.File(partial, "w") as file:
+    with new_file(out) as partial, new_hdf5(partial) as (file, storage):
         data = file.create_group("data")
         masks: dict[str, list[str]] = defaultdict(list)
         for number, episode in enumerate(source.episodes()):
             name = f"demo_{number}"
             _write_demo(data.create_group(name), episode)
             motions.append(hashlib.sha256(episode.states.tobytes() + episode.actions.tobytes()).hexdigest())
+            storage.check()
             for mask in _masks(source, episode, splits=validation is None):
                 masks[mask].append(name)
         if validation is not None:

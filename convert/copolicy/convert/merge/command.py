@@ -5,8 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
-
-from ..repo_id import checked_repo_id
+from copolicy.dataset.repo_id import checked_repo_id
 
 
 def add_merge_command(commands: argparse._SubParsersAction) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 from copolicy.dataset.versions.content import Content, read_content
 
@@ -81,6 +82,8 @@ def merge_datasets(
         _verify(content, sources, set(LOCAL_NAMES) if prefixes else set())
         record = _record(sources, prefixes)
         (partial / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        card = minimal_card({text or "" for text in expected.column("license").to_pylist()})
+        (partial / CARD_FILE).write_text(card, encoding="utf-8")
     left_behind = {str(source.root): names for source in sources if (names := source.left_behind())}
     return {
         "root": str(root),
@@ -120,7 +123,7 @@ def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa
         [
             pa.table(
                 {
-                    name: table.column(name).cast(kind)
+                    name: _without_nan(name, table.column(name).cast(kind))
                     if name in table.column_names
                     else pa.array([LATER_DEFAULTS.get(name)] * table.num_rows, kind)
                     for name, kind in types.items()
@@ -129,6 +132,13 @@ def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa
             for table in tables
         ]
     )
+
+
+def _without_nan(name: str, column: "pa.ChunkedArray") -> "pa.ChunkedArray":
+    """A number that is not known, as data sets of earlier versions have it, is null."""
+    if EPISODE_COLUMNS.get(name) != "float":
+        return column
+    return pa.chunked_array([pa.array(column.to_pylist(), column.type, from_pandas=True)])
 
 
 def _restore_episodes(root: Path, expected: "pa.Table") -> None:

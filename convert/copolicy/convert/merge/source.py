@@ -10,6 +10,7 @@ from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.json_file import read_json
 from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
+from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card
 from copolicy.dataset.versions.content import Content, read_content
 from copolicy.dataset.versions.manifest import data_set_files
 
@@ -68,6 +69,7 @@ class MergeSource:
     def left_behind(self) -> list[str]:
         """Files that are about this data set alone and are not carried over: its statistics, releases, card, ..."""
         names = [name for name in data_set_files(self.root) if name not in _REWRITTEN and not name.startswith(_CARRIED)]
+        names = [name for name in names if name != CARD_FILE or not is_minimal_card(self.root / name)]
         return names + [f"{folder}/" for folder in ("raw",) if (self.root / folder).is_dir()]
 
 

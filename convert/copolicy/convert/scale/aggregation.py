@@ -1,22 +1,14 @@
 """LeRobot's aggregation of data sets, and what it loses put back."""
 
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.exceptions import FileFormatError
 
 from ..joined_sets import join_data_sets
 from ..shifted_tables import numbered_files, read_table, write_like
-
-try:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
 
 _INFO = Path("meta/info.json")
 
@@ -25,8 +17,8 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     """One data set out of several with the same features, in their order.
 
     LeRobot joins them, one file of frames (and of video) a part: to pack thousands of parts into one file it would read
-    and write that file thousands of times. What else it does to them is undone: a number that was not measured (NaN)
-    becomes null, video features lose what names their encoder.
+    and write that file thousands of times. What else it does to them is undone: columns change
+    their type, video features lose what names their encoder.
 
     Args:
         target: a new folder.
@@ -48,13 +40,5 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     (target / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     example = next(iter(numbered_files(roots[0] / "meta" / "episodes").values()))
     for path in numbered_files(target / "meta" / "episodes").values():
-        write_like(_with_nan(read_table(path)), example, path)
+        write_like(read_table(path), example, path)
     return info
-
-
-def _with_nan(table: "pa.Table") -> "pa.Table":
-    for name, kind in EPISODE_COLUMNS.items():
-        if kind == "float" and table.column(name).null_count:
-            filled = pc.fill_null(table.column(name).cast(pa.float64()), math.nan)
-            table = table.set_column(table.column_names.index(name), name, filled)
-    return table

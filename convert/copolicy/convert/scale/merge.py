@@ -9,11 +9,12 @@ from typing import Any
 from copolicy.dataset.checks.finding import SEVERITIES
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 
 from ..lerobot_writer import RECORD_FILE, WrittenDataset
 from ..mixtures import Mixtures
-from ..prepare import LeftOut
+from ..prepare import LeftOut, RepeatedEpisodeError
 from ..shifted_tables import numbered_files, read_table
 from .aggregation import aggregate
 from .findings import all_findings
@@ -36,7 +37,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     records = [record for rank in range(len(plan)) if (record := plan.record(rank)) is not None]
     if len(records) != len(plan):
         raise RunError(f"{plan.folder}: expected {len(plan)} finished shards, found {len(records)}")
-    _require_once([uuid for record in records for uuid in record["episodes"]])
+    _require_once(records)
     roots = [plan.shard(rank) / DATA_SET for rank, record in enumerate(records) if record["episodes"]]
     if not roots:
         raise RunError(f"{plan.root}: expected at least one episode to write, found none")
@@ -53,6 +54,8 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
             _write_statistics(partial)
         tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
         rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
+        card = minimal_card({row["license"] or "" for row in rows})
+        (partial / CARD_FILE).write_text(card, encoding="utf-8")
     document = json.dumps([finding.to_dict() for finding in findings], indent=1)
     (plan.folder / FINDINGS_FILE).write_text(document + "\n", encoding="utf-8")
     conversion = plan.conversion
@@ -73,12 +76,15 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     }
 
 
-def _require_once(uuids: list[str]) -> None:
-    seen: dict[str, int] = {}
-    for index, uuid in enumerate(uuids):
-        if uuid in seen:
-            raise RunError(f"episode_uuid {uuid}: expected every episode once, found it at {seen[uuid]} and {index}")
-        seen[uuid] = index
+def _require_once(records: list[dict[str, Any]]) -> None:
+    origins: dict[str, str] = {}
+    for rank, record in enumerate(records):
+        # A shard of an earlier version does not name its files.
+        files = record.get("origins") or [f"a file of shard {rank}"] * len(record["episodes"])
+        for uuid, origin in zip(record["episodes"], files, strict=True):
+            if uuid in origins:
+                raise RepeatedEpisodeError(uuid, origins[uuid], origin)
+            origins[uuid] = origin
 
 
 def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> dict[str, list[str]]:

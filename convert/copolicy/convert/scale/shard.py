@@ -50,6 +50,7 @@ def convert_shard(plan: ShardPlan, rank: int) -> int:
         document = {
             "digest": digest,
             "episodes": [episode.meta.episode_uuid for episode in prepared],
+            "origins": [episode.origin for episode in prepared],
             "left_out": asdict(left_out),
             **_findings(plan, prepared, episodes),
         }
@@ -65,7 +66,7 @@ def _read(plan: ShardPlan, path, episodes: list[Episode]) -> PreparedEpisode | N
         read.append(read_episode(path))
         return read[0]
 
-    result = prepare_from(path.name, read_once, plan.conversion)
+    result = prepare_from(path.name, read_once, plan.conversion, str(path))
     if isinstance(result, PreparedEpisode):
         episodes += read
     return result

@@ -1,19 +1,21 @@
 """Where the data are: a folder here, or a data set on the Hub that is brought here first."""
 
-import re
 from pathlib import Path
 
-from ..exceptions import FileFormatError, InvalidValueError
-
-_HUB_ID = re.compile(r"[A-Za-z0-9][\w.-]*/[A-Za-z0-9][\w.-]*")
+from ..exceptions import InvalidValueError
+from ..local_path import require_hub_name
+from ..repo_id import checked_repo_id
 
 
 def locate(path: str, revision: str | None = None) -> Path:
     """The folder behind a PATH: itself if it exists, else the data set `USER/NAME` of the Hub, downloaded.
 
+    Args:
+        revision: tag, branch or commit on the Hub; says that PATH is a name there.
+
     Raises:
-        FileFormatError: nothing there, and no name of the Hub either.
-        InvalidValueError: a revision of a folder.
+        FileFormatError: a path that does not exist, or no name of the Hub.
+        InvalidValueError: a revision of a folder, or of what is no name of the Hub.
         HubError: the Hub does not answer, or has no such revision.
         RunError: the Hub has no such data set.
         MissingExtraError: huggingface_hub is not installed.
@@ -23,9 +25,9 @@ def locate(path: str, revision: str | None = None) -> Path:
         if revision is not None:
             raise InvalidValueError("--revision", f"a data set on the Hub, {path} is a folder", revision)
         return folder
-    if not _HUB_ID.fullmatch(path):
-        raise FileFormatError(path, "a folder, or USER/NAME of a data set on the Hub", "neither")
-    return _download(path, revision)
+    if revision is not None and "://" not in path:
+        return _download(checked_repo_id(path, "PATH"), revision)
+    return _download(require_hub_name(path, "a folder, or USER/NAME of a data set on the Hub"), revision)
 
 
 def _download(repo_id: str, revision: str | None) -> Path:

@@ -4,9 +4,10 @@ import shutil
 from pathlib import Path
 
 from ..exceptions import RunError
+from ..repo_id import checked_repo_id
 from ..versions.data_version import newest
 from .client import hub_api, hub_errors, snapshot_download
-from .repository import read_repository, require_repo_id
+from .repository import read_repository
 
 
 def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
@@ -17,7 +18,7 @@ def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
         HubError: the Hub does not answer, or has no such data set or revision.
         RunError: no data set of that name, or none of its versions is tagged.
     """
-    require_repo_id(repo_id)
+    checked_repo_id(repo_id, "data set on the Hub")
     api = hub_api()
     repository = read_repository(api, repo_id)
     if repository is None:

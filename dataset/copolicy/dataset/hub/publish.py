@@ -6,23 +6,24 @@ missing is done.
 """
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..checks.checking import check_dataset
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
+from ..minimal_card import CARD_FILE, is_minimal_card
+from ..repo_id import checked_repo_id
+from ..staging import replace_text
 from ..versions.content import read_content
 from ..versions.data_version import newest
 from ..versions.manifest import MANIFEST_FILE, Manifest
 from ..versions.release_record import RELEASE_FILE, ReleaseRecord, read_release
 from .client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
 from .raw_recordings import RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings, still_wanted
-from .repository import BRANCH, Repository, read_file, read_repository, require_repo_id
+from .repository import BRANCH, Repository, read_file, read_repository
 
 _CHECKED = ("data/", "meta/", "videos/")
-CARD_FILE = "README.md"
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = 
             the Hub.
         HubError: the Hub did not do what was asked.
     """
-    require_repo_id(repo_id)
+    checked_repo_id(repo_id)
     record, manifest = verify_release(root)
     _require_checked(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
@@ -103,8 +104,10 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         RunError: data or metadata changed since the release.
     """
     record = read_release(root)
-    if not (root / CARD_FILE).is_file():
-        raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", "none")
+    minimal = is_minimal_card(root / CARD_FILE)
+    if minimal or not (root / CARD_FILE).is_file():
+        found = "the minimal one of copolicy-convert, which describes nothing" if minimal else "none"
+        raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
     told, found = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
     differences = told.differences(found)
     changed = [line for line in told.differences(found, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)]
@@ -113,9 +116,7 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         reason = changed[0] if changed else f"content hash {content_hash}"
         raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
     if differences:
-        partial = root / "meta" / ".manifest.json.part"
-        partial.write_text(found.to_text(), encoding="utf-8")
-        os.replace(partial, root / MANIFEST_FILE)
+        replace_text(root / MANIFEST_FILE, found.to_text())
     return record, found
 
 

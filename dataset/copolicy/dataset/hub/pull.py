@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..exceptions import FileFormatError, OutputExistsError, RunError
 from ..files import visible_files
+from ..repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release
@@ -40,6 +41,7 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
         HubError: the Hub does not answer, or has no such data set or revision.
         RunError: what arrived is not what its manifest and its release say.
     """
+    checked_repo_id(repo_id, "data set on the Hub")
     if root.exists() or root.is_symlink():
         raise OutputExistsError(root)
     revision, commit = resolve(repo_id, revision)

@@ -1,11 +1,9 @@
 """What the Hub holds of one data set repository: its head and its tags."""
 
-import re
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..exceptions import InvalidValueError
 from .client import HfApi, RemoteEntryNotFoundError, RepositoryNotFoundError, hub_errors
 
 BRANCH = "main"
@@ -24,16 +22,6 @@ class Repository:
     private: bool
     head: str
     tags: dict[str, str]
-
-
-def require_repo_id(repo_id: str) -> None:
-    """Checks a name before anything is asked of the Hub.
-
-    Raises:
-        InvalidValueError: not `user/name`.
-    """
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo_id):
-        raise InvalidValueError("repo id", "user/name in letters, digits, '-', '_' and '.'", repo_id)
 
 
 def read_repository(api: HfApi, repo_id: str) -> Repository | None:

@@ -2,14 +2,13 @@
 
 import argparse
 import json
-import os
-import secrets
 from pathlib import Path
 from typing import Any
 
 from ..commandline import add_command
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
+from ..staging import replace_text
 
 STATISTICS_FILE = Path("meta/copolicy_stats.json")
 """Where the statistics lie in a data set."""
@@ -51,17 +50,7 @@ def _stats(arguments: argparse.Namespace) -> dict:
 
 def write_document(document: dict[str, Any], path: Path) -> None:
     """Writes JSON so that a reader sees the old file or the whole new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        with partial.open("w", encoding="utf-8") as file:
-            json.dump(document, file, indent=2, allow_nan=False)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    replace_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
 def summary(document: dict[str, Any]) -> dict[str, Any]:

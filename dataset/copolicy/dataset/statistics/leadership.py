@@ -39,6 +39,8 @@ def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.nda
     offset = np.arange(count) - data.starts[data.episode]
     inside = (offset >= reach) & (offset + window + reach <= data.lengths[data.episode])
     begin = np.flatnonzero(inside & ((offset - reach) % max(1, round(HOP_S * data.fps)) == 0))
+    if not len(begin):
+        return np.zeros(0, dtype=int), data.episode[begin]
     energy_one = _windowed(one[0] ** 2 + one[1] ** 2, begin, window)
     total_two = np.concatenate(([0.0], np.cumsum(two[0] ** 2 + two[1] ** 2, dtype=float)))
     best, lag_of_best = np.zeros(len(begin)), np.zeros(len(begin), dtype=int)

@@ -12,11 +12,13 @@ numbers of frames and episodes), what is computed from the frames (statistics), 
 figures, `meta/copolicy.json`). A manifest covers those.
 """
 
+import math
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypedDict
 
+from ..episode import EPISODE_COLUMNS
 from ..exceptions import FileFormatError
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.references import read_tasks, video_span
@@ -155,4 +157,9 @@ def _read_episodes(folder: LeRobotFolder) -> list[dict[str, Any]]:
         found = f"{episodes} with {uuid!r}" if episodes > 1 else "one with none"
         raise FileFormatError(root / "meta" / "episodes", "an episode_uuid of its own for each episode", found)
     # A file of a merge may lack a column that another has; LeRobot reads it as null.
-    return folder.episodes.to_pylist()
+    return [{name: _known(name, value) for name, value in row.items()} for row in folder.episodes.to_pylist()]
+
+
+def _known(name: str, value: Any) -> Any:
+    """A number that is not known is null in a table, NaN in those of earlier versions: one content."""
+    return math.nan if value is None and EPISODE_COLUMNS.get(name) == "float" else value

@@ -1,12 +1,12 @@
 """Makes a release of a data set folder."""
 
 import datetime
-import os
-import secrets
 from pathlib import Path
 
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import InvalidValueError, RunError
+from ..staging import replacements
+from ..text_files import read_older_text
 from .changelog import CHANGELOG_FILE, with_release
 from .content import Content, read_content
 from .data_version import BUMPS, Bump, DataVersion
@@ -81,7 +81,7 @@ def _write(
     root: Path, record: ReleaseRecord, changes: tuple[Change, ...], last: ReleaseRecord | None, manifest: Manifest
 ) -> None:
     changelog = root / CHANGELOG_FILE
-    before = changelog.read_text(encoding="utf-8") if changelog.exists() else ""
+    before = read_older_text(changelog) if changelog.exists() else ""
     texts: dict[str, str] = {}
     if last is not None:
         texts[f"{EARLIER_FOLDER}/{last.version}.json"] = last.to_text()
@@ -89,26 +89,13 @@ def _write(
         before, record.version, record.date, record.notes, changes, record.content_hash
     )
     texts[RELEASE_FILE] = record.to_text()
-    staged: dict[str, Path] = {}
+    # The record comes last.
+    names = [*sorted(texts, key=lambda name: name == RELEASE_FILE)]
+    names.insert(-1, MANIFEST_FILE)
     entries: dict[str, FileEntry] = dict(manifest.files)
-    try:
+    with replacements([root / name for name in names]) as partials:
+        staged = dict(zip(names, partials, strict=True))
         for name, text in texts.items():
-            staged[name] = _stage(root / name, text)
+            staged[name].write_text(text, encoding="utf-8")
             entries[name] = file_entry(staged[name])
-        staged[MANIFEST_FILE] = _stage(root / MANIFEST_FILE, Manifest(entries).to_text())
-        for name in sorted(staged, key=lambda name: name == RELEASE_FILE):
-            os.replace(staged[name], root / name)
-    finally:
-        for path in staged.values():
-            path.unlink(missing_ok=True)
-
-
-def _stage(path: Path, text: str) -> Path:
-    """A hidden file beside `path`, on disk before anything is renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
-    with partial.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    return partial
+        staged[MANIFEST_FILE].write_text(Manifest(entries).to_text(), encoding="utf-8")

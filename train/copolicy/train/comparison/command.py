@@ -5,8 +5,9 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.staging import replace_text
 
-from ..result_file import require_new, write_text
+from ..result_file import require_new
 
 
 def add_compare_command(commands: argparse._SubParsersAction) -> None:
@@ -44,7 +45,7 @@ def _compare(arguments: argparse.Namespace) -> dict:
     comparison = compare(read_methods(files))
     text = markdown(comparison)
     if arguments.out:
-        write_text(arguments.out, text)
+        replace_text(arguments.out, text)
     if arguments.json:
         return {**comparison, "markdown": text}
     print(text, end="")

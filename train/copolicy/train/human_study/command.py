@@ -7,6 +7,7 @@ from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import visible_files
+from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import require_new, write_json
@@ -70,7 +71,7 @@ def _add_run(steps: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--practice", type=int, default=2, help="episodes to get used to it, not counted (default: 2)")
     command.add_argument("--consent", default="", metavar="ID", help="record id of the person's consent, no name")
-    command.add_argument("--license", default="", help="of the recordings, an SPDX identifier")
+    command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
     command.add_argument("--countdown", type=float, default=3.0, help="seconds before each episode (default: 3)")
     command.add_argument("--device", default="cpu", help="where the robots plan (default: cpu)")
     command.add_argument("--new-session", action="store_true", help="do not continue the unfinished session")
@@ -143,6 +144,7 @@ def _run(arguments: argparse.Namespace) -> dict:
 
     from .plan import StudyPlan
 
+    checked_licence(arguments.license)
     plan = StudyPlan.read(arguments.plan)
     plan.of(arguments.participant)
     human = PilotSpec.parse(arguments.human)

@@ -7,6 +7,8 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from copolicy.dataset.staging import replacement
+
 # Okabe and Ito's palette: told apart with every kind of colour vision. Markers differ as well.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _MARKERS = "osD^vPX"
@@ -37,7 +39,8 @@ def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, 
         axis.set_ylim(bottom=0)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(summaries), frameon=False)
     figure.suptitle(title)
-    figure.savefig(path)
+    with replacement(path) as partial:
+        figure.savefig(partial, format="png")
 
 
 def _points(summary: Mapping[str, Any]) -> list[tuple[float, float, float]]:

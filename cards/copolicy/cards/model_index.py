@@ -1,0 +1,86 @@
+"""The results of a model as the Hub reads them, the `model-index` of its card.
+
+The Hub's library puts results of equal task type, data set type, config, split and revision together under the name and
+the arguments of the first of them. So no two results here have the same config and split.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from copolicy.dataset.exceptions import MissingExtraError
+
+try:
+    from huggingface_hub import EvalResult
+except ModuleNotFoundError:
+    raise MissingExtraError("huggingface_hub") from None
+
+_SETTINGS = (
+    "map_count", "configurations", "orientations", "repeats", "actions_per_plan", "fps", "step_limit",
+    "angular_acceleration_limit", "seed", "partner_seed",
+)  # fmt: skip
+_POLICY = ("sampler", "num_inference_steps", "initial_noise_scale")
+
+
+def eval_results(evaluations: Sequence[Mapping[str, Any]]) -> list[EvalResult]:
+    """One result an evaluation, this policy's alone: those of the robots beside it in a study are not the model's.
+
+    `dataset_config` is the study, and whatever else tells results apart that would have the same config and split.
+    """
+    groups: dict[tuple, list[int]] = defaultdict(list)
+    results = [_result(evaluation) for evaluation in evaluations]
+    for index, result in enumerate(results):
+        groups[result.unique_identifier].append(index)
+    for members in groups.values():
+        for index, config in zip(members, _configs([results[index] for index in members]), strict=True):
+            results[index] = replace(results[index], dataset_config=config)
+    return results
+
+
+def _result(evaluation: Mapping[str, Any]) -> EvalResult:
+    settings, success = evaluation["settings"], evaluation["summary"]["success"]
+    whole = settings.get("complete_set", True)
+    count = settings.get("configurations", settings.get("map_count"))
+    arguments = {key: settings[key] for key in _SETTINGS if settings.get(key) is not None}
+    arguments |= {key: evaluation["policy"][key] for key in _POLICY if evaluation["policy"].get(key) is not None}
+    if settings.get("partners"):
+        arguments["partners"] = sorted(settings["partners"])
+    return EvalResult(
+        task_type="robotics",
+        task_name=f"table carrying, {evaluation['study']} (simulation)",
+        dataset_type=f"copolicy-maps-{settings['maps']}",
+        dataset_name=f"{settings['maps']} maps{'' if whole else ', a part of them'}",
+        dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
+        dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else 'maps'}",
+        dataset_args=arguments,
+        metric_type="success_rate",
+        metric_name=f"success rate over {success['episodes']} episodes",
+        metric_value=round(success["mean"], 6),
+        metric_args={"standard_error": round(success["standard_error"], 6), "episodes": success["episodes"]},
+    )
+
+
+def _configs(results: Sequence[EvalResult]) -> list[str]:
+    """A config for each of some results with the same one: with the arguments that differ, else with a number."""
+    names = [str(result.dataset_config) for result in results]
+    if len(results) == 1:
+        return names
+    arguments = [result.dataset_args or {} for result in results]
+    differing = [
+        key
+        for key in dict.fromkeys(key for given in arguments for key in given)
+        if any(given.get(key) != arguments[0].get(key) for given in arguments)
+    ]
+    names = [
+        "-".join((name, *(f"{key}-{_word(given[key])}" for key in differing if key in given)))
+        for name, given in zip(names, arguments, strict=True)
+    ]
+    return [
+        name if names.count(name) == 1 else f"{name}-run-{names[: index + 1].count(name)}"
+        for index, name in enumerate(names)
+    ]
+
+
+def _word(value: Any) -> str:
+    return "-".join(str(item) for item in value) if isinstance(value, list) else str(value)

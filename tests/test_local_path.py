@@ -1,0 +1,101 @@
+"""A mistyped path is not asked of the Hub."""
+
+from pathlib import Path
+
+import pytest
+
+from copolicy.dataset.cli import main
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.local_path import named_on_hub, require_hub_name
+from copolicy.train.cli import main as train
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch) -> Path:
+    (tmp_path / "outputs" / "dataset").mkdir(parents=True)
+    (tmp_path / "données").mkdir()
+    monkeypatch.chdir(tmp_path)
+    # Whoever asks the Hub all the same does not get far.
+    monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (
+            "outputs/datset",
+            "did you mean outputs/dataset? (as hf://datasets/outputs/datset it is looked up on the Hub)",
+        ),
+        (
+            "output/dataset",
+            "did you mean outputs/dataset? (as hf://datasets/output/dataset it is looked up on the Hub)",
+        ),
+        ("outputs/other", "no such file or folder (as hf://datasets/outputs/other it is looked up on the Hub)"),
+        ("./outputs/datset", "did you mean outputs/dataset?"),
+        ("outputs/datset/", "did you mean outputs/dataset?"),
+        ("outputs/dataset/meta", "no such file or folder"),
+        ("outptus", "did you mean outputs?"),
+        ("donnees", "did you mean données?"),
+        ("nothing", "no such file or folder"),
+        ("../nothing/here", "no such file or folder"),
+        ("~/nothing", "no such file or folder"),
+        ("lab/a..b", "no such file or folder, and no name that the Hub takes (no '--' and no '..')"),
+        ("lab/täble", "and no name that the Hub takes (letters a to z, digits, '-', '_' and '.' only)"),
+    ],
+)
+def test_a_path_that_does_not_exist_is_said_so(here, text, found, capsys):
+    for flags in ([text], ["outputs/dataset", "--against", text]):
+        if "--against" in flags:
+            (here / "outputs" / "dataset").mkdir(exist_ok=True)
+        assert main(["check", *flags]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"copolicy-dataset: {text}: expected a folder, or USER/NAME of a data set on the Hub, ")
+        assert error.endswith(f"{found}\n")
+        assert error.count("\n") == 1
+
+
+def test_an_absolute_path_is_compared_too(here, capsys):
+    assert main(["check", str(here / "outputs" / "datset")]) == 2
+    assert capsys.readouterr().err.endswith(f"did you mean {here / 'outputs' / 'dataset'}?\n")
+
+
+def test_a_name_of_the_hub_stays_one(here):
+    for text in ("lab/table", "lerobot/pusht", "a/b"):
+        assert require_hub_name(text, "something") == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hf://datasets/outputs/datset", "https://huggingface.co/datasets/outputs/datset",
+        "https://huggingface.co/datasets/outputs/datset/", "hf://outputs/datset",
+    ],
+)  # fmt: skip
+def test_a_name_may_say_that_it_is_on_the_hub(here, text):
+    assert named_on_hub(text) == "outputs/datset"
+    assert require_hub_name(text, "something") == "outputs/datset"
+
+
+def test_a_name_on_the_hub_must_be_one_that_it_takes(here):
+    with pytest.raises(FileFormatError, match=r"something as the Hub takes it \(no '--' and no '\.\.'\)"):
+        require_hub_name("hf://datasets/lab/a..b", "something")
+
+
+@pytest.mark.parametrize(
+    ("flag", "text", "found"),
+    [
+        (
+            "policy.path",
+            "outputs/datset",
+            "did you mean outputs/dataset? (from another folder it is looked up on the Hub)",
+        ),
+        ("policy.path", "outputs/x/last", "found no such file or folder"),
+        ("config_path", "outputs/train_config.json", "found none"),
+    ],
+)
+def test_training_does_not_ask_the_hub_for_a_mistyped_path(here, flag, text, found, capsys):
+    assert train([f"--{flag}={text}"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"copolicy-train: {text}: expected a file or folder for --{flag}, ")
+    assert error.endswith(f"{found}\n")
