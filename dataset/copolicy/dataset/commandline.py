@@ -71,11 +71,13 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
         print(f"{parser.prog}: {line}", file=sys.stderr)
         return 1
     status = int(summary.pop("exit_status", 0))
-    if arguments.json:
-        print(json.dumps(summary, indent=2))
-    else:
-        for line in _lines(summary):
+    try:
+        for line in [json.dumps(summary, indent=2)] if arguments.json else _lines(summary):
             print(line)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read it, such as `head`, has enough; nor may Python fail when it flushes at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return status
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from ..episode import EPISODE_COLUMNS, Source
 from ..episode_rows import episode_tables, with_column, write_tables
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
+from ..licences import checked_licence
 from .selection import Selection
 from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import RECORD_FILE, record_text, stored_record
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-_LICENCE = re.compile(r"[a-z0-9][a-z0-9.+-]*")
 
 
 def _name(column: str, text: str) -> None:
@@ -33,8 +33,9 @@ def _names(column: str, text: str) -> None:
 
 
 def _licence(column: str, text: str) -> None:
-    if not _LICENCE.fullmatch(text):
-        raise InvalidValueError(f"--set {column}", "a Hub licence identifier such as cc-by-4.0", text)
+    if not text:
+        raise InvalidValueError(f"--set {column}", "a licence identifier of the Hub such as cc-by-4.0", text)
+    checked_licence(text, f"--set {column}")
 
 
 def _source(column: str, text: str) -> None:

@@ -7,9 +7,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ...documents import ConversionRecord
 from ...episode import EPISODE_COLUMNS
 from ...episode_rows import episode_tables, stripped_hint
 from ...exceptions import FileFormatError, MissingExtraError
+from ...json_file import read_json
+from ...lerobot_folder.loading import require_loadable
+from ...minimal_card import CARD_FILE, is_minimal_card
 from ...versions.content import Content, read_content
 from ...versions.manifest import data_set_files
 
@@ -52,9 +56,8 @@ class StoredSet:
         Raises:
             FileFormatError: no data set of this project, or one that contradicts itself.
         """
-        if not root.is_dir():
-            raise FileFormatError(root, "the folder of a LeRobot data set", "none")
-        info = _object(root / "meta" / "info.json", "LeRobot's info")
+        folder = require_loadable(root)
+        info = folder.info
         tables = episode_tables(root, _PLACES)
         try:
             episodes = pa.concat_tables(list(tables.values()), promote_options="permissive").sort_by("episode_index")
@@ -64,6 +67,7 @@ class StoredSet:
         if "episode_uuid" in missing or len(missing) > len(EPISODE_COLUMNS) // 2:
             found = f"none named {', '.join(missing[:3])}, ...{stripped_hint(info, root)}"
             raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", found)
+        folder.rows([name for name in EPISODE_COLUMNS if name not in missing])
         content = read_content(root)
         return cls(root, info, episodes, content, stored_record(root))
 
@@ -91,10 +95,11 @@ class StoredSet:
 
     def left_behind(self) -> list[str]:
         """Files about this very data set, which a part of it does not take along: card, releases, findings, ..."""
+        minimal = {CARD_FILE} if is_minimal_card(self.root / CARD_FILE) else set()
         names = [
             name
             for name in data_set_files(self.root)
-            if name not in _WRITTEN and not name.startswith(_WRITTEN_FOLDERS) and name not in self.licences()
+            if name not in _WRITTEN | minimal and not name.startswith(_WRITTEN_FOLDERS) and name not in self.licences()
         ]
         return names + [f"{folder}/" for folder in ("raw",) if (self.root / folder).is_dir()]
 
@@ -124,21 +129,9 @@ def stored_record(root: Path) -> dict[str, Any]:
         FileFormatError: no JSON object.
     """
     path = root / RECORD_FILE
-    return _object(path, "the record of a conversion") if path.is_file() else {}
+    return dict(read_json(path, ConversionRecord, "the record of a conversion")) if path.is_file() else {}
 
 
 def record_text(record: Mapping[str, Any]) -> str:
     """The text of `meta/copolicy.json`."""
     return json.dumps(record, indent=2) + "\n"
-
-
-def _object(path: Path, what: str) -> dict[str, Any]:
-    try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FileFormatError(path.parent.parent, "a LeRobot v3 data set with meta/info.json", "none") from None
-    except (OSError, ValueError) as error:
-        raise FileFormatError(path, f"{what} as JSON", str(error)) from None
-    if not isinstance(fields, dict):
-        raise FileFormatError(path, f"{what} as a JSON object", type(fields).__name__)
-    return fields

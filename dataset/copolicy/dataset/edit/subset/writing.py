@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...exceptions import FileFormatError, MissingExtraError, RunError
+from ...minimal_card import CARD_FILE, minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
 from .numbered_files import Place, file_of, next_place, numbered
@@ -71,6 +72,9 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     totals = {"total_episodes": len(numbers), "total_frames": int(lengths.sum()), "splits": dict(splits)}
     info = {**source.info, **paths, **totals}
     (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    (folder / CARD_FILE).write_text(
+        minimal_card({source.rows[number]["license"] or "" for number in numbers}), encoding="utf-8"
+    )
     return _verified(source, numbers, folder)
 
 
