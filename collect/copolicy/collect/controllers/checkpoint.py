@@ -67,6 +67,7 @@ class Checkpoint:
             with contextlib.redirect_stdout(io.StringIO()):  # LeRobot prints while it loads
                 self.policy = policy_class.from_pretrained(folder, config=config)
             self.policy.eval()
+            _require_finite(folder, self.policy, self._torch)
             self._preprocess, self._postprocess = factory.make_pre_post_processors(
                 config, pretrained_path=str(folder), preprocessor_overrides={"device_processor": {"device": device}}
             )
@@ -110,3 +111,9 @@ class Checkpoint:
         with torch.inference_mode():
             plan = self.policy.plan(self._preprocess(batch), generator=self._generator, actions=actions)
         return self._postprocess(plan[:, self.frames - 1 :]).cpu().numpy().astype(float)
+
+
+def _require_finite(folder: Path, policy: Any, torch: Any) -> None:
+    for name, values in policy.state_dict().items():
+        if values.is_floating_point() and not bool(torch.isfinite(values).all()):
+            raise FileFormatError(folder, "finite weights", f"nan or infinity in {name}")
