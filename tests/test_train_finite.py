@@ -154,10 +154,11 @@ def test_an_excluded_episode_may_hold_nan_and_its_statistics_do_no_harm(tmp_path
 
 
 def _diverging(root: Path, output: Path, policy: str, rate: str) -> list[str]:
+    """Steps of the size of the rate: the first of ACT, the second of ours, whose rate rises from zero."""
     if policy != "ours":
         return other_policy(root, output, [*ACT, f"--policy.optimizer_lr={rate}"], save_freq=1)
     more = [f"--policy.optimizer_lr={rate}", "--policy.scheduler_warmup_steps=1", "--policy.optimizer_weight_decay=0"]
-    return [*flags(root, output, save_freq=1), *more]
+    return [*flags(root, output, save_freq=2), *more]
 
 
 @pytest.mark.parametrize("policy", ["ours", "without average", "act"])
@@ -169,13 +170,14 @@ def test_a_loss_that_is_not_finite_ends_the_run_at_its_step(random_table, tmp_pa
     assert main(arguments) == 1
     error = capsys.readouterr().err
     line = error.splitlines()[-1]
-    assert line.startswith("copolicy-train: training stopped at step 2: expected a finite ")
+    step = 2 if policy == "act" else 3
+    assert line.startswith(f"copolicy-train: training stopped at step {step}: expected a finite ")
     assert line.endswith(f"; the last checkpoint is {output / 'checkpoints' / 'last'}")
     assert "End of training" not in error
     checkpoints = output / "checkpoints"
-    assert sorted(path.name for path in checkpoints.iterdir()) == ["000001", "last"]
-    assert (checkpoints / "last").resolve().name == "000001"
-    assert non_finite_weight(weights(output, 1)) is None
+    assert sorted(path.name for path in checkpoints.iterdir()) == [f"{step - 1:06d}", "last"]
+    assert (checkpoints / "last").resolve().name == f"{step - 1:06d}"
+    assert non_finite_weight(weights(output, step - 1)) is None
 
 
 @pytest.mark.parametrize("policy", ["ours", "act"])
@@ -183,30 +185,27 @@ def test_weights_that_are_not_finite_are_not_saved(random_table, tmp_path, capsy
     output = tmp_path / "out"
     assert main(_diverging(random_table, output, policy, "1e39")) == 1
     line = capsys.readouterr().err.splitlines()[-1]
-    assert "training stopped at step 1: expected finite weights, found" in line
+    step = 1 if policy == "act" else 2
+    assert f"training stopped at step {step}: expected finite weights, found" in line
     assert line.endswith("; no checkpoint was written")
     assert not output.exists()
 
 
 def test_a_resumed_run_says_the_step_of_the_whole_run(random_table, tmp_path, capsys):
     output = tmp_path / "out"
-    assert main(flags(random_table, output, steps=2, save_freq=1)) == 0
-    # A state of the optimizer that no good run leaves: the next step throws the weights far off.
-    arguments = [f"--config_path={output}", "--resume=true", "--steps=6", "--policy.ema=false", "--save_freq=1"]
-    from copolicy.train import finite_training
-
-    capsys.readouterr()
-    state = output / "checkpoints" / "000002" / "training_state" / "optimizer_param_groups.json"
-    groups = json.loads(state.read_text(encoding="utf-8"))
-    for group in groups:
-        group["initial_lr"] = group["lr"] = 1e37
-    state.write_text(json.dumps(groups), encoding="utf-8")
-    scheduler = output / "checkpoints" / "000002" / "training_state" / "scheduler_state.json"
-    settings = json.loads(scheduler.read_text(encoding="utf-8"))
-    settings["base_lrs"] = [1e37 for _ in settings["base_lrs"]]
-    scheduler.write_text(json.dumps(settings), encoding="utf-8")
-    assert finite_training is not None
-    assert main(arguments) == 1
+    assert main(flags(random_table, output, steps=2)) == 0
+    # A state that no good run leaves behind: steps of this size throw the weights far off.
+    state = output / "checkpoints" / "000002" / "training_state"
+    for path, name in (("optimizer_param_groups.json", "lr"), ("scheduler_state.json", "base_lrs")):
+        text = (state / path).read_text(encoding="utf-8")
+        content = json.loads(text)
+        if name == "lr":
+            content = [{**group, "lr": 1e37, "initial_lr": 1e37} for group in content]
+        else:
+            content["base_lrs"] = [1e37 for _ in content["base_lrs"]]
+        (state / path).write_text(json.dumps(content), encoding="utf-8")
+    more = ["--resume=true", "--steps=6", "--save_freq=1", "--policy.ema=false"]
+    assert main([f"--config_path={output}", *more]) == 1
     line = capsys.readouterr().err.splitlines()[-1]
     assert "training stopped at step 4: expected a finite" in line
     assert (output / "checkpoints" / "last").resolve().name == "000003"
@@ -215,10 +214,10 @@ def test_a_resumed_run_says_the_step_of_the_whole_run(random_table, tmp_path, ca
 def test_lerobot_train_stops_at_such_a_loss_and_keeps_the_checkpoint_before(random_table, tmp_path, monkeypatch):
     output = tmp_path / "out"
     with pytest.raises(
-        NonFiniteLossError, match=r"^training stopped at step 2: expected a finite loss, found (nan|inf)"
+        NonFiniteLossError, match=r"^training stopped at step 3: expected a finite loss, found (nan|inf)"
     ):
         lerobot_train(monkeypatch, _diverging(random_table, output, "ours", "1e37"))
-    assert (output / "checkpoints" / "last").resolve().name == "000001"
+    assert (output / "checkpoints" / "last").resolve().name == "000002"
     with pytest.raises(NonFiniteError, match="expected finite weights to save, found"):
         lerobot_train(monkeypatch, _diverging(random_table, tmp_path / "other", "ours", "1e39"))
     assert not (tmp_path / "other" / "checkpoints" / "last").exists()

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,7 @@ class Checkpoint:
         elif recipe.get("dataset"):
             data = TrainingData.from_recipe(recipe["dataset"])
         else:
-            data = TrainingData.from_settings(settings)
+            data = replace(TrainingData.from_settings(settings), fps=config.get("fps"))
         with (folder / WEIGHTS).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         return cls(folder, config, training or recipe.get("training") or {}, data, digest, recipe)

@@ -89,23 +89,29 @@ def _unusable_statistic(stats: Mapping[str, Mapping[str, Any]] | None) -> str | 
     return None
 
 
-def usable_statistics(
-    root: Path, stats: dict[str, Any], episodes: Collection[int] | None, total: int
+def mended_statistics(
+    root: Path, stats: Mapping[str, Any] | None, episodes: Collection[int], total: int
 ) -> dict[str, Any]:
-    """The statistics to train with: those of the data set, or of the chosen episodes where an excluded one spoils them.
+    """Statistics to put in the place of those of a data set that an excluded episode spoils; none where they are sound.
+
+    Args:
+        root: of the data set.
+        stats: of the data set, by column.
+        episodes: that are trained on.
+        total: episodes of the data set.
 
     Raises:
-        NonFiniteError: they hold an empty value or no finite number.
+        NonFiniteError: statistics hold an empty value or no finite number, and no episode that is left out explains it.
     """
     unusable = _unusable_statistic(stats)
     if unusable is None:
-        return stats
-    if episodes is not None and len(set(episodes)) < total:
+        return {}
+    if len(set(episodes)) < total:
         from lerobot.datasets.compute_stats import aggregate_stats
 
         parts = _episode_statistics(root, set(episodes))
         if parts and all(parts) and not any(_unusable_statistic(part) for part in parts):
-            return {**stats, **aggregate_stats(parts)}
+            return aggregate_stats(parts)
     raise NonFiniteError(
         f"{root / 'meta' / 'stats.json'}: expected finite numbers, found {unusable}; make it anew with "
         "lerobot-edit-dataset --operation.type recompute_stats"

@@ -10,11 +10,12 @@ from lerobot.configs.train import TrainPipelineConfig
 from lerobot.datasets import LeRobotDatasetMetadata
 from lerobot.datasets import factory as lerobot_datasets
 from lerobot.scripts import lerobot_train
+from tqdm import tqdm
 
 from .checked_stream import CheckedStream
 from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes
 from .epoch_order import WholeEpochSampler
-from .finite_data import require_finite_frames, usable_statistics
+from .finite_data import require_finite_frames, mended_statistics
 from .finite_training import guarded
 from .memory_dataset import MemoryDataset
 
@@ -27,21 +28,29 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
     Raises:
         CopolicyError: the data set cannot be trained on, or the training leads nowhere.
     """
+    guards = guarded(config, {name: getattr(lerobot_train, name) for name in _GUARDED})
+    with _datasets_in_memory(), _replaced(lerobot_train, guards):
+        try:
+            lerobot_train.train(config)
+        finally:
+            # LeRobot's own is drawn once more when Python forgets it, which would be after the line of an error.
+            for bar in list(getattr(tqdm, "_instances", ())):
+                bar.close()
+
+
+@contextmanager
+def _datasets_in_memory() -> Iterator[None]:
+    # LeRobot's trainer takes no data set or sampler of one's own; it looks these names up in its module at each run.
     original = lerobot_train.make_train_eval_datasets
-    # LeRobot's trainer takes no data set, sampler or check of one's own; it looks these names up in its module at
-    # each run.
+    ours = {
+        "make_train_eval_datasets": lambda config: _make_datasets(config, original),
+        "EpisodeAwareSampler": WholeEpochSampler,
+    }
     with (
         _replaced(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}),
-        _replaced(
-            lerobot_train,
-            {
-                "make_train_eval_datasets": lambda config: _make_datasets(config, original),
-                "EpisodeAwareSampler": WholeEpochSampler,
-                **guarded(config, {name: getattr(lerobot_train, name) for name in _GUARDED}),
-            },
-        ),
+        _replaced(lerobot_train, ours),
     ):
-        lerobot_train.train(config)
+        yield
 
 
 @contextmanager
@@ -76,7 +85,7 @@ def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
     else:
         episodes = chosen_episodes(meta, source.episodes)
     whole = episodes == list(range(meta.total_episodes))
-    statistics = usable_statistics(meta.root, meta.stats or {}, episodes, meta.total_episodes)
+    statistics = mended_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
     local = source.root is not None
     if local:
         require_finite_frames(meta.root, episodes, meta.features)
@@ -89,7 +98,7 @@ def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
         if dataset is not None:
             if dataset.episodes is None:
                 dataset.episodes = episodes
-            if statistics is not meta.stats and dataset.meta.stats:
+            if statistics:
                 dataset.meta.stats.update(statistics)
             if not local:  # by now they are here
                 require_finite_frames(dataset.meta.root, episodes, meta.features)

@@ -16,7 +16,7 @@ from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.train.checked_stream import CheckedStream
 from copolicy.train.episode_choice import excluded_episodes, require_episode_columns
-from copolicy.train.finite_data import require_finite_frames, usable_statistics
+from copolicy.train.finite_data import require_finite_frames, mended_statistics
 
 from ..env.configuration_table_carrying import TableCarryingEnvConfig
 from .callers import data_sets_of_callers, environment_of_callers
@@ -54,7 +54,7 @@ def prepare_training(config: CopolicyConfig, meta: Any) -> frozenset[int]:
     if used:
         raise RunError(_refusal(meta, used, excluded, any(_yields_all(data_set) for data_set in data_sets)))
     require_finite_frames(meta.root, chosen, meta.features)
-    usable_statistics(meta.root, meta.stats or {}, chosen, meta.total_episodes)
+    mended_statistics(meta.root, meta.stats, chosen, meta.total_episodes)
     record_conditions(config, meta, chosen)
     return frozenset()
 

@@ -17,6 +17,7 @@ import numpy as np
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError
 
 from .checkpoint_folder import checkpoint_folder
+from .training_conditions import training_conditions
 
 
 class Checkpoint:
@@ -30,6 +31,8 @@ class Checkpoint:
         frames: how many observations a plan is made from.
         planned_frames: how many actions a plan holds from the newest observation on.
         actions_per_plan: frames of a plan that are executed before the next one (LeRobot's `n_action_steps`).
+        conditions: rate and physics that it learned at.
+        fps: the rate, frames a second.
     """
 
     def __init__(self, path: Path | str, seed: int = 0, device: str = "cpu", settings: Mapping[str, Any] | None = None):
@@ -46,6 +49,8 @@ class Checkpoint:
             MissingExtraError: torch or LeRobot is not installed.
         """
         folder = checkpoint_folder(path)
+        self.conditions = training_conditions(folder)
+        self.fps = self.conditions.fps
         try:
             self._torch = import_module("torch")
             config_class = import_module("lerobot.configs.policies").PreTrainedConfig
