@@ -16,6 +16,10 @@ class CheckedStream(StreamingLeRobotDataset):
         NonFiniteError: while it is read, at a sample with a value that is NaN or infinite.
     """
 
+    def __init__(self, *arguments: Any, max_num_shards: int = 1, **settings: Any):
+        # LeRobot passes the number of loading processes, which is 0 here, and then reads nothing.
+        super().__init__(*arguments, max_num_shards=max(1, max_num_shards), **settings)
+
     def __iter__(self) -> Iterator[dict[str, Any]]:
         wanted = None if self.episodes is None else frozenset(self.episodes)
         for sample in super().__iter__():

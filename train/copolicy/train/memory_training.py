@@ -15,7 +15,7 @@ from tqdm import tqdm
 from .checked_stream import CheckedStream
 from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes
 from .epoch_order import WholeEpochSampler
-from .finite_data import require_finite_frames, mended_statistics
+from .finite_data import mended_statistics, require_finite_frames
 from .finite_training import guarded
 from .memory_dataset import MemoryDataset
 
