@@ -10,6 +10,7 @@ from copolicy.dataset.repo_id import checked_repo_id
 
 from .artefacts import newest_release
 from .datasheet import datasheet
+from .excluded import excluded
 from .facts import DatasetFacts
 from .findings import findings
 from .markdown import share, table
@@ -68,6 +69,7 @@ def render(
         _overview(facts, title),
         *(f"![{caption}]({path})\n\n*{caption}*" for path, caption in figures),
         _loading(facts, repo_id),
+        *excluded(facts, repo_id),
         _episodes(facts),
         multimodality(facts),
         findings(facts),
