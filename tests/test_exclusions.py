@@ -180,7 +180,7 @@ def test_flags_and_every_episode_column_survive_loading_and_merging(root, conver
         found = list(merged[name])
         if EPISODE_COLUMNS[name] == "float":
             # LeRobot merges through pandas, which writes NaN as null.
-            found = [np.nan if value is None else value for value in found]
+            found, expected = ([np.nan if value is None else value for value in values] for values in (found, expected))
             assert np.array_equal(found, expected, equal_nan=True), name
         else:
             assert found == expected, name

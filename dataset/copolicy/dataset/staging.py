@@ -84,7 +84,7 @@ def replacements(paths: Sequence[Path]) -> Iterator[list[Path]]:
                 path.parent.mkdir(parents=True, exist_ok=True)
             partials.append(path.parent / f".{path.name}.{_unique()}")
         places = dict(zip(partials, paths, strict=True))
-        with about(paths[0] if len(paths) == 1 else None, places=places):
+        with about(Path(os.path.commonpath(paths)) if paths else None, places=places):
             yield list(partials)
         for partial, path in places.items():
             with about(path, partial):
@@ -124,6 +124,9 @@ def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, 
     try:
         yield
     except OSError as error:
+        if error.errno is None:
+            # Of h5py or pyarrow: a path beside a text without a number would take the place of the text.
+            error.errno, error.strerror = refusal(error) or errno.EIO, " ".join(str(error).split())
         for hidden, known in places.items():
             if isinstance(error.filename, (str, os.PathLike)) and Path(error.filename).is_relative_to(hidden):
                 error.filename = str(known / Path(error.filename).relative_to(hidden))
