@@ -178,6 +178,7 @@ def test_columns_come_back_from_an_earlier_version(left, made):
 def test_columns_come_back_from_recordings(left, made):
     summary = restore(left, made.parent / "recordings")
     assert (summary["restored"], summary["not_measured"]) == (4, "replay_drift_px, which conversion measures")
+    assert summary["next"].startswith(f"copolicy-dataset amend {left} --set license=ID, which no original states")
     after = columns(left)
     assert all(row["replay_drift_px"] != row["replay_drift_px"] for row in after)
     for row, original in zip(after, [columns(made)[number] for number in (0, 2, 3, 5)], strict=True):
