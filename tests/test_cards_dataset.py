@@ -227,7 +227,7 @@ def test_a_card_is_not_overwritten_unless_asked(dataset, capsys):
 def test_a_folder_that_is_no_data_set_is_named(tmp_path, capsys):
     assert main(["dataset", str(tmp_path)]) == 2
     assert capsys.readouterr().err == (
-        f"copolicy-cards: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none\n"
+        f"copolicy-cards: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found an empty folder\n"
     )
 
 

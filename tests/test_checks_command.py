@@ -172,7 +172,10 @@ def test_the_call_is_wrong(tmp_path, capsys):
 
     nowhere, empty = tmp_path / "nowhere", tmp_path / "empty"
     empty.mkdir()
-    assert error(str(nowhere)) == f"{nowhere}: expected a folder, or USER/NAME of a data set on the Hub, found neither"
+    assert (
+        error(str(nowhere))
+        == f"{nowhere}: expected a folder, or USER/NAME of a data set on the Hub, found no such file or folder"
+    )
     found = "expected recordings (*.mcap) or a LeRobot data set (meta/info.json), found an empty folder"
     assert error(str(empty)) == f"{empty}: {found}"
     assert error() == "PATH: expected a folder, or USER/NAME of a data set on the Hub, found None"

@@ -152,7 +152,7 @@ def test_a_task_is_known_by_its_sentence(dataset, converted):
 DAMAGES = {
     "no data set with meta/info.json": (
         lambda root: (root / "meta" / "info.json").unlink(),
-        r"table: expected a LeRobot v3 data set with meta/info.json, found none",
+        r"table: expected a LeRobot v3 data set with meta/info.json, found a folder of other files",
     ),
     "older": (
         lambda root: change_json(root, "meta/info.json", lambda info: info.update(codebase_version="v2.1")),
