@@ -347,6 +347,17 @@ def test_damaged_copies_give_an_error_of_ours_or_the_truth(tmp_path):
     assert counts["recover"]["true prefix"] > 30
 
 
+def test_a_message_of_a_channel_that_was_lost_with_its_chunk_ends_the_episode(tmp_path, whole):
+    """The first chunk declares the channels."""
+    content = whole[0].read_bytes()
+    begin, end = next(span for span in damage.record_spans(content) if content[span[0]] == 0x06)
+    part = tmp_path / "episode.mcap.part"
+    part.write_bytes(content[:begin] + content[end:])
+    (recovery,) = recover(tmp_path)
+    assert recovery.status == "damaged"
+    assert "found a message of a channel 1 that was never declared" in recovery.detail
+
+
 def test_the_study_sees_wrong_numbers_and_other_exceptions(tmp_path):
     sound, _ = damage.originals(tmp_path)
     truth = sound.truth

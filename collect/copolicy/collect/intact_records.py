@@ -182,6 +182,7 @@ class _StepCount:
     def __init__(self, part: IntactPart):
         self._part = part
         self._schemas: dict[int, str] = {}
+        self._declared: set[int] = set()
         self._topics: dict[int, str] = {}  # of channels that are ours; of others nothing follows
         self._others: set[str] = set()
         self._next = {topic.name: 0 for topic in (TABLE_STATE, *ACTIONS)}
@@ -204,10 +205,13 @@ class _StepCount:
         if isinstance(record, Schema):
             self._schemas[record.id] = record.name
         elif isinstance(record, Channel):
+            self._declared.add(record.id)
             if is_ours(record, self._schemas.get(record.schema_id, "")):
                 self._topics[record.id] = record.topic
             else:
                 self._others.add(record.topic)
+        elif isinstance(record, Message) and record.channel_id not in self._declared:
+            raise ValueError(f"a message of a channel {record.channel_id} that was never declared")
         elif isinstance(record, Message) and record.channel_id in self._topics:
             if record.sequence < self._sequence:
                 raise ValueError(f"step {record.sequence} after step {self._sequence}")
