@@ -15,6 +15,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.minimal_card import is_minimal_card
 from copolicy.dataset.versions.withdrawals import WITHDRAWALS_FILE, withdrawals_text
 
 
@@ -47,7 +48,10 @@ def test_a_card_states_what_the_metadata_holds(dataset):
     assert metadata["license"] == "cc-by-4.0"
     assert metadata["task_categories"] == ["robotics"]
     assert metadata["size_categories"] == ["n<1K"]
-    assert metadata["configs"] == [{"config_name": "default", "data_files": "data/*/*.parquet"}]
+    assert metadata["configs"] == [
+        {"config_name": "default", "data_files": "data/*/*.parquet"},
+        {"config_name": "episodes", "data_files": "meta/episodes/*/*.parquet"},
+    ]
     assert {"LeRobot", "upstream"} <= set(metadata["tags"])
     info = json.loads((dataset / "meta" / "info.json").read_text(encoding="utf-8"))
     text = card.text
@@ -250,7 +254,7 @@ def test_a_truncated_parquet_file_is_named(dataset):
 def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
     assert main(["dataset", str(dataset), "--repo-id", "table"]) == 2
     assert "--repo-id: expected USER/NAME" in capsys.readouterr().err
-    assert not (dataset / "README.md").exists()
+    assert is_minimal_card(dataset / "README.md")
 
 
 def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):

@@ -75,7 +75,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
     dataset = load(tmp_path / "set")
     rows = dataset.meta.episodes
     assert rows["episode_uuid"] == ["uuid-0", "uuid-1", "uuid-2"]
-    assert rows["license"] == ["CC-BY-4.0", "CC0-1.0", "CC-BY-4.0"]
+    assert rows["license"] == ["cc-by-4.0", "CC0-1.0", "cc-by-4.0"]
     assert max(rows["replay_drift_px"]) < 1e-6
     episode = read_episode(recordings / "a" / "episode_1.mcap")
     for name, column in frame_columns(episode, 10).items():

@@ -224,7 +224,7 @@ def test_each_format_becomes_a_data_set(examples, tmp_path, capsys, name, form, 
     assert dataset.num_frames == frames
     rows = dataset.meta.episodes
     assert set(rows["source"]) == {"upstream"}
-    assert set(rows["license"]) == {"CC-BY-4.0"}
+    assert set(rows["license"]) == {"cc-by-4.0"}
     assert len(set(rows["episode_uuid"])) == episodes
     successes = [bool(dataset[end - 1]["next.success"]) for end in rows["dataset_to_index"]]
     assert successes == rows["success"]

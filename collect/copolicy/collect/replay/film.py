@@ -52,7 +52,11 @@ def write_video(
     frames = _shown_progress(track, size, fps, speed)
     encode = _encoder()
     with new_file(path) as unfinished:
-        encode(unfinished, _CONTAINERS[path.suffix.lower()], frames, size, fps)
+        try:
+            encode(unfinished, _CONTAINERS[path.suffix.lower()], frames, size, fps)
+        except RunError as error:
+            # The hidden file is gone when somebody reads this.
+            raise RunError(str(error).replace(unfinished.name, path.name)) from None
     return _summary(path, track, size, fps, speed)
 
 
