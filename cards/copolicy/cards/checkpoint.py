@@ -2,11 +2,12 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.training_run import find_policy_folder
 
 from .artefacts import read_json
 from .facts import DatasetFacts
@@ -38,7 +39,7 @@ class Checkpoint:
 
     @classmethod
     def read(cls, path: Path, dataset_root: Path | None = None) -> "Checkpoint":
-        """Reads a checkpoint: its folder, one that holds `pretrained_model`, or a whole run (its last checkpoint).
+        """Reads a checkpoint: its folder, one that holds `pretrained_model`, or a whole run (its newest checkpoint).
 
         Args:
             dataset_root: folder of the data set it was trained on (default: where the training found it, if it is
@@ -60,7 +61,7 @@ class Checkpoint:
         elif recipe.get("dataset"):
             data = TrainingData.from_recipe(recipe["dataset"])
         else:
-            data = TrainingData.from_settings(settings)
+            data = replace(TrainingData.from_settings(settings), fps=config.get("fps"))
         with (folder / WEIGHTS).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         return cls(folder, config, training or recipe.get("training") or {}, data, digest, recipe)
@@ -115,7 +116,7 @@ def _training_root(settings: dict[str, Any]) -> Path | None:
 
 
 def _folder(path: Path) -> Path:
-    for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
-        if (folder / "config.json").is_file() and (folder / WEIGHTS).is_file():
-            return folder
+    folder = find_policy_folder(path)
+    if folder is not None:
+        return folder
     raise FileFormatError(path, f"a checkpoint folder with config.json and {WEIGHTS}", "none")

@@ -4,20 +4,20 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.training_run import POLICY_FILES, find_policy_folder
 
 PRETRAINED = "pretrained"
 """In the place of a path: the model that comes with the package."""
 
 _PLUGIN = "lerobot_policy_copolicy"
-_FILES = ("config.json", "model.safetensors")
 
 
 def checkpoint_folder(path: Path | str) -> Path:
     """The folder with `config.json` and `model.safetensors`.
 
     Args:
-        path: that folder, one that holds `pretrained_model`, that of a training run (its last checkpoint), or
-            `pretrained`.
+        path: that folder, one that holds `pretrained_model`, that of a training run (its newest checkpoint, see
+            `find_policy_folder`), or `pretrained`.
 
     Raises:
         FileFormatError: there is none.
@@ -25,10 +25,11 @@ def checkpoint_folder(path: Path | str) -> Path:
     if str(path) == PRETRAINED:
         return pretrained_folder()
     path = Path(path)
-    for folder in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
-        if all((folder / name).is_file() for name in _FILES):
-            return folder
-    raise FileFormatError(path, f"a checkpoint folder with {' and '.join(_FILES)}", _found(path) or "an empty folder")
+    folder = find_policy_folder(path)
+    if folder is not None:
+        return folder
+    expected = f"a checkpoint folder with {' and '.join(POLICY_FILES)}"
+    raise FileFormatError(path, expected, _found(path) or "an empty folder")
 
 
 def pretrained_folder() -> Path:
@@ -44,7 +45,7 @@ def pretrained_folder() -> Path:
     if not places:
         raise FileFormatError(PRETRAINED, f"the package {_PLUGIN} with its model", "no such package")
     folder = Path(places[0]) / PRETRAINED
-    missing = [name for name in _FILES if not (folder / name).is_file()]
+    missing = [name for name in POLICY_FILES if not (folder / name).is_file()]
     if missing:
         found = f"none named {' and '.join(missing)}; reinstall {_PLUGIN}, or name a checkpoint of your own"
         raise FileFormatError(folder, "the model that comes with the package", found)
