@@ -235,3 +235,13 @@ def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
     assert main(["dataset", str(dataset), "--repo-id", "table"]) == 2
     assert "--repo-id: expected user/name" in capsys.readouterr().err
     assert not (dataset / "README.md").exists()
+
+
+def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
+    assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
+    assert dataset_command(["exclude", str(dataset), "--episodes", "1", "3", "--reason", "stick unplugged"]) == 0
+    text = render(DatasetFacts.read(dataset), "lab/table")
+    assert "2 of 6 episodes are kept and marked as not to be used" in text
+    assert "| 3 | stick unplugged |" in text
+    assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text
+    assert "its own trainer and loader take every episode unless they" in text

@@ -23,6 +23,7 @@ from hub_user import Done, HubUser
 from local_hub import READ_TOKEN, TOKEN, LocalHub, Repository
 from versioned_data_set import EPISODES, FRAMES, keep_episodes, set_value, simulated_data_set
 
+from copolicy.dataset.exclusions import exclude
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.release import release
 
@@ -351,3 +352,17 @@ def test_a_name_that_is_none_is_refused(hub, user, dataset):
     assert done.err == (
         "copolicy-dataset: repo id: expected user/name in letters, digits, '-', '_' and '.', found 'table'\n"
     )
+
+
+def test_excluded_episodes_are_sent_only_when_asked_for(hub, dataset, publish):
+    exclude(dataset, ["1"], "a stick was unplugged")
+    release(dataset, "minor", "One episode excluded.")
+    done = publish()
+    assert done.status == 1
+    assert "found 1 (1); nothing was uploaded" in done.err
+    assert f"copolicy-dataset select {dataset} --out NEW --drop-excluded" in done.err
+    assert "--with-excluded sends them all the same" in done.err
+    assert len(done.err.splitlines()) == 1
+    assert not hub.repositories
+    assert publish("--with-excluded").status == 0
+    assert is_published(hub, dataset)

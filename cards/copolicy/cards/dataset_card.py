@@ -7,6 +7,7 @@ from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 
 from .artefacts import RELEASE_FILE, read_json
 from .datasheet import datasheet
+from .excluded import excluded
 from .facts import DatasetFacts
 from .findings import findings
 from .markdown import share, table
@@ -66,6 +67,7 @@ def render(
         _overview(facts, title),
         *(f"![{caption}]({path})\n\n*{caption}*" for path, caption in figures),
         _loading(facts, repo_id),
+        *excluded(facts, repo_id),
         _episodes(facts),
         multimodality(facts),
         findings(facts),

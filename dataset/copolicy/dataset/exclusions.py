@@ -131,7 +131,14 @@ def _exclude(arguments: argparse.Namespace) -> dict:
         if arguments.episodes or arguments.reason:
             raise InvalidValueError("--list", "no --episodes and no --reason beside it", "one")
         listed = [entry._asdict() for entry in excluded_episodes(arguments.root)]
-        return {"left_out": listed if arguments.json else _readable(listed)}
+        left_out = {entry["episode"] for entry in listed}
+        rest = sorted(row.episode for table in _tables(arguments.root).values() for row in _rows(table))
+        kept = ",".join(str(episode) for episode in rest if episode not in left_out)
+        return {
+            "left_out": listed if arguments.json else _readable(listed),
+            # LeRobot's own commands and loaders take every episode unless they are told.
+            "for_lerobot": f"--dataset.episodes=[{kept}]",
+        }
     if not arguments.episodes:
         raise InvalidValueError("--episodes", "numbers, ranges such as 3-5, or episode_uuids", None)
     if arguments.undo:

@@ -21,6 +21,9 @@ def add_publish_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--repo-id", required=True, metavar="U/N", help="user/name on the Hub")
     parser.add_argument("--private", action="store_true", help="create it private; refuse one that is public")
     parser.add_argument("--raw", type=Path, metavar="DIR", help="folder of recordings; those of the episodes go up too")
+    parser.add_argument(
+        "--with-excluded", action="store_true", help="send excluded episodes too; without it, a set with any is refused"
+    )
 
 
 def add_pull_command(commands: argparse._SubParsersAction) -> None:
@@ -40,7 +43,8 @@ def add_pull_command(commands: argparse._SubParsersAction) -> None:
 def _publish(arguments: argparse.Namespace) -> dict:
     from .publish import publish
 
-    return asdict(publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw))
+    published = publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw, arguments.with_excluded)
+    return asdict(published)
 
 
 def _pull(arguments: argparse.Namespace) -> dict:

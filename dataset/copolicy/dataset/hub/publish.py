@@ -13,6 +13,7 @@ from pathlib import Path
 from ..checks.checking import check_dataset
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
+from ..exclusions import excluded_episodes
 from ..versions.content import read_content
 from ..versions.data_version import newest
 from ..versions.manifest import MANIFEST_FILE, Manifest
@@ -42,22 +43,27 @@ class Published:
     recordings_left_out: list[str]
 
 
-def publish(root: Path, repo_id: str, private: bool = False, raw: Path | None = None) -> Published:
+def publish(
+    root: Path, repo_id: str, private: bool = False, raw: Path | None = None, with_excluded: bool = False
+) -> Published:
     """Checks the data set, uploads its newest release and tags it.
 
     Args:
         private: of a repository that does not exist yet; one that is there must be private already.
         raw: folder of the recordings that the episodes were made from, to go up as `raw/`.
+        with_excluded: send episodes that are marked as excluded too; not every trainer leaves them out.
 
     Raises:
         FileFormatError: no release, no card, or a folder that is no data set.
-        RunError: a check finds an error; the folder is not what was released; this version, or a newer one, is on
-            the Hub.
+        RunError: a check finds an error; the folder is not what was released; it holds excluded episodes that were not
+            asked for; this version, or a newer one, is on the Hub.
         HubError: the Hub did not do what was asked.
     """
     require_repo_id(repo_id)
     record, manifest = verify_release(root)
     _require_checked(root)
+    if not with_excluded:
+        _require_none_excluded(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
     codebase_tag = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))["codebase_version"]
     api = hub_api()
@@ -89,6 +95,17 @@ def _require_checked(root: Path) -> None:
         raise RunError(
             f"{root}: expected a data set that passes copolicy-dataset check, found {result.count('error')} errors, "
             f"first {result.findings[0]}"
+        )
+
+
+def _require_none_excluded(root: Path) -> None:
+    excluded = [entry.episode for entry in excluded_episodes(root)]
+    if excluded:
+        listed = ", ".join(map(str, excluded[:12])) + (", ..." if len(excluded) > 12 else "")
+        raise RunError(
+            f"{root}: expected a release without excluded episodes, found {len(excluded)} ({listed}); nothing was "
+            f"uploaded; `copolicy-dataset select {root} --out NEW --drop-excluded` leaves them out (release NEW then), "
+            "--with-excluded sends them all the same"
         )
 
 
