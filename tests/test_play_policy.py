@@ -27,6 +27,7 @@ class Counter:
 
     name = "policy:counter"
     frames = 2
+    fps = 10
     actions_per_plan = 3
 
     def __init__(self):

@@ -105,7 +105,10 @@ def test_a_batch_for_a_device_is_gathered_there(random_table):
 @pytest.mark.parametrize(("device", "deferred"), [("cpu", False), ("cuda", True)])
 def test_training_on_a_device_gathers_there(random_table, device, deferred):
     policy = SimpleNamespace(device=device, observation_keys=[STATE])
-    config: Any = SimpleNamespace(resume=True, policy=policy, trainable_config=policy)
+    source = SimpleNamespace(
+        repo_id="local/table", root=random_table, revision=None, repo_type="dataset", episodes=None
+    )
+    config: Any = SimpleNamespace(resume=False, policy=policy, trainable_config=policy, dataset=source)
     training, evaluation = _make_datasets(config, lambda _: (windows(random_table), None))
     assert evaluation is None
     (batch,) = training.__getitems__([0, 3])

@@ -19,7 +19,7 @@ except ModuleNotFoundError:
 _SETTINGS = (
     "type", "preset", "past_human_action", "network", "observation_features", "n_obs_steps", "horizon",
     "n_action_steps", "n_layers", "width", "n_heads", "num_train_timesteps", "prediction_type", "sampler",
-    "num_inference_steps", "initial_noise_scale", "mirror", "permute_obstacles", "ema",
+    "num_inference_steps", "initial_noise_scale", "mirror", "permute_obstacles", "ema", "fps",
 )  # fmt: skip
 _WITH_PACKAGE = "pretrained"  # folder of the model that the package brings
 _TRAINING = ("steps", "batch_size", "samples", "seed")
@@ -192,4 +192,6 @@ def _limits(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> st
         )
     incomplete = [e["settings"]["maps"] for e in evaluations if not e["settings"].get("complete_set", True)]
     lines += [f"- Only a part of the maps of {maps} was tried." for maps in incomplete]
+    told = [line for e in evaluations for line in e["settings"].get("told_otherwise", ())]
+    lines += [f"- Evaluated otherwise than it learned: {line}." for line in dict.fromkeys(told)]
     return "## Limits\n\n" + "\n".join(lines)

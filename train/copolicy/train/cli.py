@@ -17,12 +17,14 @@ from copolicy.dataset.exceptions import (
     OutputExistsError,
     RunError,
 )
+from copolicy.dataset.training_run import POLICY_FILES, find_policy_folder
 
 from .policy_commands import policy_parser
 
 _PROG = "copolicy-train"
 # What draccus puts before the reason, where a section of the configuration may also be absent.
 _UNDECODED = "Could not decode the value into any of the given types:"
+_SETTINGS = "train_config.json"
 _HELP = """\
 usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
        copolicy-train export CHECKPOINT --out FOLDER    averaged weights alone, to give away (export --help)
@@ -37,7 +39,11 @@ Set unless you give them:
   --dataset.repo_id=local/NAME   NAME is that of the folder of --dataset.root
   --num_workers=0                batches come from memory
 
-Episodes that the data set marks as discarded are left out; the checkpoint records which ones were used.
+Episodes that the data set marks as discarded or excluded are left out; each checkpoint records which ones were used,
+and a resumed run goes on with these, less what was excluded since. A value that is NaN, infinite or empty is refused
+before the first step; a loss that is not finite ends the run with status 1 and leaves the last good checkpoint.
+
+--config_path and --policy.path take the folder of a run too, which means its newest checkpoint.
 
 example:
   copolicy-train --dataset.root=data/table --policy.preset=small --policy.device=cpu \\
@@ -110,7 +116,7 @@ def _print_help(flags: Sequence[str]) -> int:
 
 
 def _train(arguments: argparse.Namespace) -> dict:
-    flags = with_defaults(arguments.flags)
+    flags = [_newest(flag) for flag in _joined(with_defaults(arguments.flags))]
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))
     # LeRobot and its libraries print here and there; stdout is for the summary.
@@ -131,8 +137,12 @@ def _train(arguments: argparse.Namespace) -> dict:
                 raise  # the system's own, of a file; the Hub client's have pages of advice instead
             raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
     output = Path(config.output_dir or "")
-    checkpoint = output / "checkpoints" / "last" / "pretrained_model"
-    return {"output_dir": str(output), "steps": config.steps, "checkpoint": str(checkpoint)}
+    checkpoint = find_policy_folder(output)
+    return {
+        "output_dir": str(output),
+        "steps": config.steps,
+        "checkpoint": None if checkpoint is None else str(checkpoint),
+    }
 
 
 @contextlib.contextmanager
@@ -193,6 +203,34 @@ def _validate(config) -> None:
         raise
     except Exception as error:
         raise CopolicyError(_line(error)) from error
+
+
+def _joined(flags: Sequence[str]) -> list[str]:
+    """The flags with `--config_path FILE` and `--policy.path FOLDER` as one word each."""
+    joined: list[str] = []
+    for flag in flags:
+        if joined and joined[-1] in ("--config_path", "--policy.path"):
+            joined[-1] += f"={flag}"
+        else:
+            joined.append(flag)
+    return joined
+
+
+def _newest(flag: str) -> str:
+    """A flag that names a run by its folder, or a checkpoint through a link that was not copied, names the newest."""
+    name, _, value = flag.partition("=")
+    if name not in ("--config_path", "--policy.path") or not value:
+        return flag
+    path, file = Path(value), ""
+    if name == "--config_path" and path.suffix:
+        if path.name != _SETTINGS or (path.is_file() and path.parent.parent.name != "last"):
+            return flag
+        path, file = path.parent, path.name
+    folder = find_policy_folder(path, (_SETTINGS, *POLICY_FILES) if name == "--config_path" else POLICY_FILES)
+    if folder is None or folder == path:
+        return flag
+    logging.info("%s: the newest checkpoint is %s", value, folder)
+    return f"{name}={folder / file}"
 
 
 def _check_local_path(name: str, value: str | None) -> None:

@@ -12,7 +12,7 @@ from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans_command import add_plans_command
 from .result_file import require_new, write_json
-from .study_flags import add_study_flags, physics_of, planner_of, require_positive, study_settings
+from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,15 +50,15 @@ def _coplan(arguments: argparse.Namespace) -> dict:
 
     planner = planner_of(arguments.policy, arguments)
     maps = map_set(arguments.maps, arguments.orientations)[: arguments.limit]
-    physics = physics_of(arguments)
+    protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
     with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
         outcomes = coplan(
             planner,
             maps,
-            physics,
+            protocol.physics,
             repeats=arguments.repeats,
             actions_per_plan=arguments.actions_per_plan,
-            fps=arguments.fps,
+            fps=protocol.fps,
             seed=arguments.seed,
             on_plan=lambda finished: bar.update(finished - bar.n),
         )
@@ -73,7 +73,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
             "map_count": len(maps),
             "complete_set": arguments.limit is None,
             "repeats": arguments.repeats,
-            **study_settings(arguments),
+            **study_settings(arguments, protocol),
         },
         "summary": summary,
         "episodes": [outcome.to_json() for outcome in outcomes],

@@ -54,7 +54,7 @@ def training_episodes(episodes: list[int] | None, total: int, discarded: list[bo
         RunError: none is left.
     """
     asked = list(range(total)) if episodes is None else episodes
-    missing = [episode for episode in asked if episode >= total]
+    missing = [episode for episode in asked if not 0 <= episode < total]
     if missing:
         raise InvalidValueError("dataset.episodes", f"0 to {total - 1}", missing[0])
     kept = [episode for episode in asked if not (discarded and discarded[episode])]

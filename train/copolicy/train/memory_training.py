@@ -1,62 +1,108 @@
-"""LeRobot's own trainer, fed from memory."""
+"""LeRobot's own trainer, fed from memory with episodes and numbers that can be trained on."""
 
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
 
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.datasets import LeRobotDatasetMetadata
+from lerobot.datasets import factory as lerobot_datasets
 from lerobot.scripts import lerobot_train
+from tqdm import tqdm
 
+from .checked_stream import CheckedStream
+from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes
 from .epoch_order import WholeEpochSampler
-from .local_dataset import training_episodes
+from .finite_data import mended_statistics, require_finite_frames
+from .finite_training import guarded
 from .memory_dataset import MemoryDataset
+
+_GUARDED = ("update_policy", "save_checkpoint", "update_last_checkpoint", "make_policy")
 
 
 def train_from_memory(config: TrainPipelineConfig) -> None:
     """Runs `lerobot_train.train` with data sets in memory; checkpoints, logs and evaluation are LeRobot's.
 
     Raises:
-        CopolicyError: the data set cannot be trained on.
+        CopolicyError: the data set cannot be trained on, or the training leads nowhere.
     """
-    with _datasets_in_memory():
-        lerobot_train.train(config)
+    guards = guarded(config, {name: getattr(lerobot_train, name) for name in _GUARDED})
+    with _datasets_in_memory(), _replaced(lerobot_train, guards):
+        try:
+            lerobot_train.train(config)
+        finally:
+            # LeRobot's own is drawn once more when Python forgets it, which would be after the line of an error.
+            for bar in list(getattr(tqdm, "_instances", ())):
+                bar.close()
 
 
 @contextmanager
 def _datasets_in_memory() -> Iterator[None]:
     # LeRobot's trainer takes no data set or sampler of one's own; it looks these names up in its module at each run.
     original = lerobot_train.make_train_eval_datasets
-    original_sampler = lerobot_train.EpisodeAwareSampler
-    lerobot_train.make_train_eval_datasets = lambda config: _make_datasets(config, original)
-    lerobot_train.EpisodeAwareSampler = WholeEpochSampler
+    ours = {
+        "make_train_eval_datasets": lambda config: _make_datasets(config, original),
+        "EpisodeAwareSampler": WholeEpochSampler,
+    }
+    with (
+        _replaced(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}),
+        _replaced(lerobot_train, ours),
+    ):
+        yield
+
+
+@contextmanager
+def _replaced(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
+    before = {name: getattr(module, name) for name in values}
+    for name, value in values.items():
+        setattr(module, name, value)
     try:
         yield
     finally:
-        lerobot_train.make_train_eval_datasets = original
-        lerobot_train.EpisodeAwareSampler = original_sampler
+        for name, value in before.items():
+            setattr(module, name, value)
 
 
 def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:
-    if not config.resume:  # a resumed run goes on with the episodes that it began with
-        _leave_out_discarded(config)
     # The co-policy says what it reads; any other policy takes what it finds.
     read = getattr(config.policy, "observation_keys", None)
     on_host = config.trainable_config.device == "cpu"
     return tuple(
-        None if dataset is None else _in_memory(dataset, read, deferred=not on_host) for dataset in original(config)
+        None if dataset is None else _in_memory(dataset, read, deferred=not on_host)
+        for dataset in _load(config, original)
     )
 
 
-def _leave_out_discarded(config: TrainPipelineConfig) -> None:
-    """Narrows the configured episodes, so that the checkpoint records which ones the policy was trained on."""
+def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
+    """LeRobot's data sets of the episodes to train on, which the configuration and so each checkpoint then names."""
     source = config.dataset
-    if source.streaming:
-        return
-    meta = LeRobotDatasetMetadata(source.repo_id, root=source.root, revision=source.revision)
-    episodes = meta.episodes
-    marked = episodes["discarded"] if episodes is not None and "discarded" in episodes.column_names else []
-    source.episodes = training_episodes(source.episodes, meta.total_episodes, [bool(mark) for mark in marked])
+    repo_type = "bucket" if source.repo_type == "bucket" else "dataset"
+    meta = LeRobotDatasetMetadata(source.repo_id, source.root, source.revision, repo_type=repo_type)
+    if config.resume and config.checkpoint_path is not None:
+        episodes = resumed_episodes(meta, source.episodes, recorded_episodes(config.checkpoint_path))
+    else:
+        episodes = chosen_episodes(meta, source.episodes)
+    whole = episodes == list(range(meta.total_episodes))
+    statistics = mended_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
+    local = source.root is not None
+    if local:
+        require_finite_frames(meta.root, episodes, meta.features)
+    source.episodes = None if whole else episodes  # LeRobot reads all of them sooner than each of them
+    try:
+        datasets = original(config)
+    finally:
+        source.episodes = episodes
+    for dataset in datasets:
+        if dataset is not None:
+            if dataset.episodes is None:
+                dataset.episodes = episodes
+            if statistics:
+                dataset.meta.stats.update(statistics)
+            if not local:  # by now they are here
+                require_finite_frames(dataset.meta.root, episodes, meta.features)
+    return datasets
 
 
 def _in_memory(dataset, read: Collection[str] | None, deferred: bool):

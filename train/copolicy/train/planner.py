@@ -21,6 +21,7 @@ class Planner:
     Attributes:
         checkpoint: the policy.
         frames: how many observations a plan is made from.
+        fps: frames a second of the data that it learned from.
         planning_seconds: wall time of each call of `plan`, s.
         batch_sizes: number of tables in each call.
         actions: how many actions of a plan are wanted from the current frame on, the fewer the faster; None for all.
@@ -36,6 +37,7 @@ class Planner:
         """
         self.checkpoint = Checkpoint(Path(path), device=device, settings=settings)
         self.frames = self.checkpoint.frames
+        self.fps = self.checkpoint.fps
         self.planning_seconds: list[float] = []
         self.batch_sizes: list[int] = []
         self.actions: int | None = None
@@ -66,6 +68,7 @@ class Planner:
             "checkpoint": os.path.relpath(self.checkpoint.folder),
             "type": policy.config.type,
             "weights_sha256": self.checkpoint.weights_sha256,
+            "learned": self.checkpoint.conditions.to_json(),
             "parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
             **{name: getattr(policy.config, name) for name in _SETTINGS if hasattr(policy.config, name)},
         }

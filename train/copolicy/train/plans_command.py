@@ -11,7 +11,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import MAP_SETS, RECORD_HZ, identify
 
 from .result_file import require_new
-from .study_flags import add_study_flags, physics_of, planner_of, require_positive
+from .study_flags import add_study_flags, planner_of, protocol_of, require_positive
 
 if TYPE_CHECKING:
     from .plans import Decision
@@ -51,14 +51,16 @@ def _plans(arguments: argparse.Namespace) -> dict:
     from .plans import sample_plans
     from .plans_figure import save_plans
 
+    planner = planner_of(arguments.policy, arguments)
+    protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
     decision = sample_plans(
-        planner_of(arguments.policy, arguments),
+        planner,
         maps[arguments.map],
-        physics_of(arguments),
+        protocol.physics,
         samples=arguments.samples,
         seconds=arguments.seconds,
         actions_per_plan=arguments.actions_per_plan,
-        fps=arguments.fps,
+        fps=protocol.fps,
         seed=arguments.seed,
     )
     map_id = identify(decision.map_config)[0]
@@ -74,6 +76,9 @@ def _plans(arguments: argparse.Namespace) -> dict:
         "map": map_id,
         "seconds": seconds,
         "samples": len(decision.samples),
+        "fps": protocol.fps,
+        "angular_acceleration_limit": protocol.physics.angular_acceleration_limit,
+        **({"told_otherwise": list(protocol.told_otherwise)} if protocol.told_otherwise else {}),
         **_counts(decision),
         "picture": str(arguments.out),
     }

@@ -56,7 +56,7 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
             "optimizer": training.get("optimizer"),
             "scheduler": training.get("scheduler"),
         }
-        recipe["dataset"] = _data_set(training.get("dataset") or {})
+        recipe["dataset"] = {**_learned_at(training.get("policy") or {}), **_data_set(training.get("dataset") or {})}
     if commands:
         recipe["commands"] = list(commands)
     return recipe
@@ -115,6 +115,11 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
         **{column: counts for column in _COUNTED if (counts := _counts(root, column, set(used)))},
         **{key: release[key] for key in ("version", "content_hash") if key in release},
     }
+
+
+def _learned_at(policy: dict[str, Any]) -> dict[str, Any]:
+    """Rate and physics that the policy's settings record, which hold also where the data are not at hand."""
+    return {name: policy[name] for name in ("fps", "physics", "physics_mixture") if policy.get(name)}
 
 
 def _counts(root: Path, column: str, used: Collection[int]) -> dict[str, int]:

@@ -88,6 +88,10 @@ class CopolicyConfig(PreTrainedConfig):
     scheduler_warmup_steps: int | None = None  # updates over which the learning rate rises
     scheduler_final_lr_fraction: float | None = None  # learning rate of the last update, as a fraction of the peak
 
+    fps: float | None = None  # frames a second of the training data, filled in from them; an action is held as long
+    physics: dict[str, float] | None = None  # of the training episodes, where they share them; filled in from them
+    physics_mixture: dict[str, int] = field(default_factory=dict)  # episodes by physics (JSON), where they differ
+
     normalization_mapping: dict[str, NormalizationMode] = field(default_factory=_identity)  # fixed, see above
 
     def __post_init__(self):

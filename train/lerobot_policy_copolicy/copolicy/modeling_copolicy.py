@@ -5,6 +5,7 @@ Ng, Liu and Kennedy, "Diffusion Co-Policy for Synergistic Human-Robot Collaborat
 
 import logging
 from collections import deque
+from pathlib import Path
 from typing import Unpack
 
 import torch
@@ -12,8 +13,10 @@ from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
 
-from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
 from copolicy.dataset.features import ACTION, FEATURES
+from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
+from copolicy.train.finite_weights import non_finite_weight
 
 from .augmentation import mirror, permute_obstacles
 from .backend import require_backend
@@ -24,9 +27,11 @@ from .diffusion import PlanDiffusion
 from .ema import ExponentialMovingAverage
 from .fast_planner import FastPlanner
 from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
+from .training_data import prepare_training, require_same_rate
 
 _ACTION_SIZE = FEATURES[ACTION]["shape"][0]
 _PADDING = f"{ACTION}_is_pad"
+_EPISODE = "episode_index"
 _SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
 _DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
 _FEATURES = {"absolute": AbsoluteFeatures, "relative": RelativeFeatures, "scan": ScanFeatures}
@@ -61,6 +66,12 @@ class CopolicyPolicy(PreTrainedPolicy):
     def __init__(self, config: CopolicyConfig, **kwargs):
         super().__init__(config)
         config.validate_features()
+        meta = kwargs.get("dataset_meta")
+        # Episodes that must not come up in a batch, where the constructor could not see which ones are trained on.
+        self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
+        require_same_rate(config)
+        self._loss: Tensor | None = None  # of a step that nobody has looked at yet
+        self._updates = 0
         unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
         if unused:
             logging.info("the co-policy does not read %s", ", ".join(unused))
@@ -94,9 +105,28 @@ class CopolicyPolicy(PreTrainedPolicy):
         return [{"params": decayed, "fused": fused}, {"params": plain, "weight_decay": 0.0, "fused": fused}]
 
     def update(self) -> None:
-        """Moves the average; LeRobot's trainer calls this after each optimizer step."""
+        """Moves the average; LeRobot's trainer calls this after each optimizer step.
+
+        Raises:
+            NonFiniteLossError: the loss of that step is NaN or infinite.
+        """
         if self.ema is not None:
             self.ema.update(self.denoiser)
+        self._updates += 1
+        # The trainer reads the loss next, so that waiting for it here costs nothing.
+        self._require_finite_loss()
+
+    def save_pretrained(self, save_directory: str | Path, **settings) -> str | None:
+        """LeRobot's, for weights that are worth keeping.
+
+        Raises:
+            NonFiniteError: one of them is NaN or infinite; nothing is written.
+        """
+        state = settings.get("state_dict")
+        unusable = non_finite_weight(self.state_dict() if state is None else state)
+        if unusable:
+            raise NonFiniteError(f"{save_directory}: expected finite weights to save, found {unusable}")
+        return super().save_pretrained(save_directory, **settings)
 
     def reset(self) -> None:
         """Forgets the history and the queued actions; call it whenever the environment is reset."""
@@ -119,7 +149,11 @@ class CopolicyPolicy(PreTrainedPolicy):
         Raises:
             InvalidValueError: a column is missing.
             ShapeError: a column has another shape.
+            RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
         """
+        if self.training:
+            self._require_finite_loss()
+            self._require_no_excluded(batch)
         sample = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
         sample[ACTION] = _column(batch, ACTION, self.config.horizon)
         if self.training:
@@ -127,14 +161,38 @@ class CopolicyPolicy(PreTrainedPolicy):
         noisy, steps, target = self.diffusion.noised(sample[ACTION])
         prediction = self.denoiser(noisy, steps, self.features(sample))
         error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
+        loss = self._reduced(error, batch, reduction)
+        if self.training:
+            self._loss = loss.detach()
+        return loss, {}
+
+    def _reduced(self, error: Tensor, batch: dict[str, Tensor], reduction: str) -> Tensor:
+        """The loss of errors `(B, T)`: a number, or `(B,)` one a sample for the reduction "none"."""
         if self.config.do_mask_loss_for_padding:
             if _PADDING not in batch:
                 raise InvalidValueError("batch, for do_mask_loss_for_padding", _PADDING, sorted(batch))
             kept = (~batch[_PADDING]).to(error.dtype)
             if reduction == "mean":
-                return (error * kept).sum() / kept.sum(), {}
-            return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1), {}
-        return (error.mean() if reduction == "mean" else error.mean(dim=1)), {}
+                return (error * kept).sum() / kept.sum()
+            return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1)
+        return error.mean() if reduction == "mean" else error.mean(dim=1)
+
+    def _require_finite_loss(self) -> None:
+        loss, self._loss = self._loss, None
+        if loss is None or bool(torch.isfinite(loss).all()):
+            return
+        step = int(self.ema.updates) if self.ema is not None else self._updates
+        raise NonFiniteLossError(float(loss[~torch.isfinite(loss)].flatten()[0]), step)
+
+    def _require_no_excluded(self, batch: dict[str, Tensor]) -> None:
+        if not len(self._excluded) or _EPISODE not in batch:
+            return
+        used = batch[_EPISODE][torch.isin(batch[_EPISODE], self._excluded.to(batch[_EPISODE].device))]
+        if len(used):
+            raise RunError(
+                f"expected no excluded episode in a batch, found {sorted(set(used.tolist()))}; "
+                "train with copolicy-train, which leaves them out, or give --dataset.episodes without them"
+            )
 
     @torch.no_grad()
     def plan(

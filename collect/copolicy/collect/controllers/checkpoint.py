@@ -17,6 +17,7 @@ import numpy as np
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError
 
 from .checkpoint_folder import checkpoint_folder
+from .training_conditions import training_conditions
 
 
 class Checkpoint:
@@ -30,6 +31,8 @@ class Checkpoint:
         frames: how many observations a plan is made from.
         planned_frames: how many actions a plan holds from the newest observation on.
         actions_per_plan: frames of a plan that are executed before the next one (LeRobot's `n_action_steps`).
+        conditions: rate and physics that it learned at.
+        fps: the rate, frames a second.
     """
 
     def __init__(self, path: Path | str, seed: int = 0, device: str = "cpu", settings: Mapping[str, Any] | None = None):
@@ -46,6 +49,8 @@ class Checkpoint:
             MissingExtraError: torch or LeRobot is not installed.
         """
         folder = checkpoint_folder(path)
+        self.conditions = training_conditions(folder)
+        self.fps = self.conditions.fps
         try:
             self._torch = import_module("torch")
             config_class = import_module("lerobot.configs.policies").PreTrainedConfig
@@ -67,6 +72,7 @@ class Checkpoint:
             with contextlib.redirect_stdout(io.StringIO()):  # LeRobot prints while it loads
                 self.policy = policy_class.from_pretrained(folder, config=config)
             self.policy.eval()
+            _require_finite(folder, self.policy, self._torch)
             self._preprocess, self._postprocess = factory.make_pre_post_processors(
                 config, pretrained_path=str(folder), preprocessor_overrides={"device_processor": {"device": device}}
             )
@@ -110,3 +116,9 @@ class Checkpoint:
         with torch.inference_mode():
             plan = self.policy.plan(self._preprocess(batch), generator=self._generator, actions=actions)
         return self._postprocess(plan[:, self.frames - 1 :]).cpu().numpy().astype(float)
+
+
+def _require_finite(folder: Path, policy: Any, torch: Any) -> None:
+    for name, values in policy.state_dict().items():
+        if values.is_floating_point() and not bool(torch.isfinite(values).all()):
+            raise FileFormatError(folder, "finite weights", f"nan or infinity in {name}")

@@ -15,9 +15,6 @@ from copolicy.dataset.task import MapConfig
 
 from .controller import ZERO, Reading
 
-POLICY_HZ = 10
-"""Rate of the data sets that policies are trained on."""
-
 
 class JointPlanner(Protocol):
     """What `Checkpoint` offers."""
@@ -25,6 +22,11 @@ class JointPlanner(Protocol):
     name: str
     frames: int
     actions_per_plan: int
+
+    @property
+    def fps(self) -> int:
+        """Frames a second that plans are for."""
+        ...
 
     def seed(self, seed: int) -> None:
         """Sets the source of noise."""
@@ -45,14 +47,15 @@ class _Plan(NamedTuple):
 class PolicyController:
     """Executes its seat's half of a policy's joint plans (receding horizon).
 
-        frame     0     1     2     3     4        10 Hz, three steps each
+        frame     0     1     2     3     4        of a policy of 10 Hz: three steps each
         observe   o0    o1    o2    o3    o4       state, and the human action of the frame before
         plan A    a0    a1    a2    ..             asked for before the start, when the table rests
         plan B               (o2)  b1    b2        asked for at frame 2; its b0 was due while it was being made
 
-    A frame's action is held for three steps. The next plan is asked for one frame before `actions_per_plan` frames
-    of this one are executed, and taken up at the first frame after it is ready, at the action that this frame is due,
-    never from its beginning. A slow plan so never holds the loop; where a plan runs out, its player lets go.
+    A frame's action is held for 30 / fps steps, at the rate of the data that the policy learned from. The next plan is
+    asked for one frame before `actions_per_plan` frames of this one are executed, and taken up at the first frame after
+    it is ready, at the action that this frame is due, never from its beginning. A slow plan so never holds the loop;
+    where a plan runs out, its player lets go.
 
     Attributes:
         latencies: seconds that each plan took.
@@ -65,7 +68,7 @@ class PolicyController:
         self.latencies: list[float] = []
         self._planner = planner
         self._clock = clock
-        self._hold = stride(POLICY_HZ)
+        self._hold = stride(planner.fps)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy")
         self._pending: Future[_Plan] | None = None
         self._forget()
@@ -82,6 +85,7 @@ class PolicyController:
         if self._pending is not None:
             self._pending.cancel()
         self._forget()
+        self._hold = stride(self._planner.fps)  # another policy may plan now
         self._worker.submit(self._planner.seed, seed)  # after a plan that still runs
         self._seat = seat
         self._map = environment_state(map_config)
@@ -97,7 +101,7 @@ class PolicyController:
         if within == 0:
             if frame > 0:
                 self._states.append(np.array(state))
-                self._human.append(frame_actions(np.array(self._held), POLICY_HZ)[0, 2:].copy())
+                self._human.append(frame_actions(np.array(self._held), self._planner.fps)[0, 2:].copy())
                 self._held = []
             self._take(frame)
         age = self._clock() - self._age_from if self._age_from else 0

@@ -60,7 +60,10 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     from .pictures import SIZE, picture_count, pictures
 
     planner = Checkpoint(arguments.policy)
-    tracks = [demonstrate(planner, maps[number], arguments.partner, arguments.seed) for number in arguments.map]
+    physics = planner.conditions.physics
+    tracks = [
+        demonstrate(planner, maps[number], arguments.partner, arguments.seed, physics) for number in arguments.map
+    ]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)
     frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
@@ -73,6 +76,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         "bytes": path.stat().st_size,
         "pictures": count,
         "policy": planner.name,
+        "learned": planner.conditions.to_json(),
         "partner": f"simulated, human of {arguments.partner}",
         "episodes": [
             f"{arguments.maps} {number}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"

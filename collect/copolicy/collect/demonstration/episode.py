@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
-from copolicy.dataset.task import MapConfig, identify
+from copolicy.dataset.task import MapConfig, Physics, identify
 
 from ..controllers import PolicyController, ScriptedController
 from ..controllers.policy import JointPlanner
@@ -14,7 +14,9 @@ from ..replay.track import Track, track_of
 from ..world import RUNNING, TableWorld
 
 
-def demonstrate(planner: JointPlanner, map_config: MapConfig, partner: str = "S01", seed: int = 0) -> Track:
+def demonstrate(
+    planner: JointPlanner, map_config: MapConfig, partner: str = "S01", seed: int = 0, physics: Physics | None = None
+) -> Track:
     """Lets a policy on the robot's seat and a simulated partner carry the table to the end of the episode.
 
     The world waits for each plan, so that the speed of the machine changes nothing.
@@ -24,9 +26,11 @@ def demonstrate(planner: JointPlanner, map_config: MapConfig, partner: str = "S0
         map_config: the map.
         partner: name of a simulated pair, whose human is the partner.
         seed: of the plans' noise and of the partner.
+        physics: of the world; the usual one if None.
     """
     robot, human = PolicyController(planner), ScriptedController(partner)
-    world = TableWorld(map_config)
+    physics = physics or Physics()
+    world = TableWorld(map_config, physics)
     states, actions = [], []
     try:
         for seat, controller in enumerate((robot, human)):
@@ -56,5 +60,5 @@ def demonstrate(planner: JointPlanner, map_config: MapConfig, partner: str = "S0
         success=outcome.success,
         termination_reason=cast(TerminationReason, outcome.reason),
     )
-    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config)
+    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config, physics=physics)
     return track_of(Path(map_id), episode)

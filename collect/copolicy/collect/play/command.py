@@ -1,13 +1,18 @@
 """The flags of `copolicy-collect play`."""
 
 import argparse
+import logging
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.task import MAP_SETS, Physics
 
+from ..controllers.checkpoint_folder import checkpoint_folder
+from ..controllers.training_conditions import training_conditions
 from .settings import PilotSpec, PlaySettings
 
 _ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
@@ -54,7 +59,9 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--consent-1", default="", metavar="ID", help="record id of player b's consent, no name")
     command.add_argument("--license", default="", help="of the recordings, an SPDX identifier")
     command.add_argument(
-        "--angular-limit", choices=_ANGULAR_LIMITS, default="pi/2", help="angular acceleration, rad/s^2 (default pi/2)"
+        "--angular-limit",
+        choices=_ANGULAR_LIMITS,
+        help="angular acceleration, rad/s^2 (default: what a policy at the table learned with, else pi/2)",
     )
     command.add_argument("--countdown", type=float, default=3.0, help="seconds before each episode (default 3)")
     command.add_argument("--new-session", action="store_true", help="do not continue the pair's unfinished session")
@@ -89,7 +96,7 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
         license=arguments.license,
-        angular_limit=_ANGULAR_LIMITS[arguments.angular_limit],
+        angular_limit=_angular_limit(pilots or (), arguments.angular_limit),
         headless=arguments.headless,
         fullscreen=arguments.fullscreen,
         window=_size(arguments.window),
@@ -98,6 +105,31 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
         new_session=arguments.new_session,
         countdown_s=arguments.countdown,
     )
+
+
+def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None) -> float:
+    """The limit that the policies at the table learned with; a flag wins, and is said to contradict them."""
+    given = None if flag is None else _ANGULAR_LIMITS[flag]
+    learned: dict[str, float] = {}
+    for pilot in pilots:
+        if pilot.kind == "policy":
+            conditions = training_conditions(checkpoint_folder(pilot.detail))
+            learned[pilot.detail] = conditions.physics.angular_acceleration_limit
+            for note in conditions.notes:
+                logging.info("%s: %s", pilot.detail, note)
+            rest = replace(conditions.physics, angular_acceleration_limit=Physics().angular_acceleration_limit)
+            if rest != Physics():
+                logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)
+    if given is None:
+        if len(set(learned.values())) > 1:
+            raise InvalidValueError(
+                "--angular-limit", "a choice, since the policies learned with different ones", learned
+            )
+        return next(iter(learned.values()), Physics().angular_acceleration_limit)
+    for name, limit in learned.items():
+        if not math.isclose(limit, given):
+            logging.warning("--angular-limit %s: %s learned with %.4g rad/s^2", flag, name, limit)
+    return given
 
 
 def _play(arguments: argparse.Namespace) -> dict:

@@ -3,12 +3,14 @@
 import argparse
 from pathlib import Path
 
+from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder
+from copolicy.collect.controllers.training_conditions import training_conditions
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import require_new, write_json
-from ..study_flags import add_protocol_flags, physics_of, policy_settings, require_positive
+from ..study_flags import add_protocol_flags, policy_settings, protocol_of, require_positive
 
 
 def add_human_command(commands: argparse._SubParsersAction) -> None:
@@ -103,13 +105,14 @@ def _plan(arguments: argparse.Namespace) -> dict:
 
     require_new(arguments.out, overwrite=arguments.overwrite)
     require_positive(arguments, "participants", "episodes_per_robot", "actions_per_plan")
-    physics = physics_of(arguments)
     robots = []
     for text in arguments.policies:
         name, path = split_name(text)
         if not name:
             raise InvalidValueError("NAME=CKPT", "a name for each robot", text)
         robots.append(Robot.of(name, path))
+    folders = [(robot.name, checkpoint_folder(robot.checkpoint)) for robot in robots]
+    physics = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders]).physics
     plan = make_plan(
         robots,
         arguments.maps,

@@ -64,6 +64,11 @@ class BlindPlanner:
             self._present = self._planners[robot]
             self.frames = self._present.frames
 
+    @property
+    def fps(self) -> int:
+        """Frames a second of the present one's plans."""
+        return self._present.fps
+
     def seed(self, seed: int) -> None:
         """Sets the source of noise."""
         with self._lock:

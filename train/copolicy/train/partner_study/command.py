@@ -11,7 +11,7 @@ from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import require_new, write_json
-from ..study_flags import add_study_flags, physics_of, planner_of, require_positive, study_settings
+from ..study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
 
 if TYPE_CHECKING:
     from .robots import Robot
@@ -74,22 +74,27 @@ def _partner(arguments: argparse.Namespace) -> dict:
     from .summary import DEFINITIONS, differences, summarise_with_partners
 
     maps = study_configurations(arguments.maps, arguments.configurations)
-    physics = physics_of(arguments)
     robots = [make_robot(text, arguments) for text in (arguments.policy, *arguments.baseline)]
     names = [robot.name for robot in robots]
     if len(set(names)) < len(names):
         raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
+    policies = [(robot.name, robot.planner.checkpoint.conditions) for robot in robots if robot.planner is not None]
+    protocol = protocol_of(arguments, policies)
+    # Each policy plans at its own rate; a scripted robot acts at every step of the world.
+    rates = [
+        protocol.fps if arguments.fps is not None or robot.planner is None else robot.planner.fps for robot in robots
+    ]
     found = []
     episodes = len(maps) * len(partners) * arguments.repeats
     with progress_bar(episodes * len(robots), "episodes") as bar:
-        for place, robot in enumerate(robots):
+        for place, (robot, fps) in enumerate(zip(robots, rates, strict=True)):
             outcomes = carry_with_partners(
                 robot,
                 maps,
                 partners,
-                physics,
+                protocol.physics,
                 repeats=arguments.repeats,
-                fps=arguments.fps,
+                fps=fps,
                 seed=arguments.seed,
                 partner_seed=arguments.partner_seed,
                 on_frame=lambda finished, done=place * episodes: bar.update(done + finished - bar.n),
@@ -121,7 +126,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
             "partners": {kind: asdict(PARTNERS[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
-            **study_settings(arguments),
+            **study_settings(arguments, protocol),
         },
         "definitions": DEFINITIONS,
         "baselines": described[1:],

@@ -1,0 +1,121 @@
+"""Which episodes a policy is trained on: those asked for, less those that the data set marks as excluded."""
+
+import json
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.exceptions import FileFormatError, RunError
+
+from .local_dataset import training_episodes
+
+_MARK = "discarded"
+_LOST = (
+    "its episode columns were lost, as by LeRobot's delete_episodes; copolicy-dataset restores them from the "
+    "recordings or an earlier version (copolicy-dataset amend --help)"
+)
+
+
+def excluded_episodes(meta: Any) -> frozenset[int]:
+    """The episodes that the column `discarded` of a data set marks; an empty value marks none.
+
+    Args:
+        meta: LeRobot's metadata of the data set.
+    """
+    episodes = meta.episodes
+    if episodes is None or _MARK not in episodes.column_names:
+        return frozenset()
+    pairs = zip(episodes["episode_index"], episodes[_MARK], strict=True)
+    return frozenset(int(episode) for episode, marked in pairs if marked)
+
+
+def require_episode_columns(meta: Any, named: bool) -> None:
+    """Refuses a data set of copolicy that does not say any more which episodes are excluded.
+
+    Args:
+        meta: LeRobot's metadata of the data set.
+        named: the user named the episodes to train on, and so has chosen.
+
+    Raises:
+        RunError: the column is gone.
+    """
+    episodes = meta.episodes
+    if named or episodes is None or _MARK in episodes.column_names or not _is_ours(meta):
+        return
+    raise RunError(
+        f"{meta.root}: expected the episode column {_MARK}, which says what to leave out, found none: {_LOST}; or name "
+        "the episodes to train on: --dataset.episodes=[0,1,...]"
+    )
+
+
+def _is_ours(meta: Any) -> bool:
+    """A conversion of ours left a mark that LeRobot's tools keep."""
+    action = meta.features.get("action") or {}
+    return (
+        str(meta.robot_type or "").startswith("copolicy")
+        or "record_hz" in action
+        or "hold" in action
+        or any((Path(meta.root) / "meta").glob("copolicy*.json"))
+    )
+
+
+def chosen_episodes(meta: Any, asked: Sequence[int] | None) -> list[int]:
+    """The episodes that a new run trains on, in the order asked for.
+
+    Args:
+        meta: LeRobot's metadata of the data set.
+        asked: as `--dataset.episodes` says; None for all.
+
+    Raises:
+        InvalidValueError: an episode that is not there.
+        RunError: none is left, or the data set has lost the column that tells.
+    """
+    if not meta.total_episodes:
+        raise RunError(f"{meta.root}: expected a data set with episodes, found an empty one")
+    require_episode_columns(meta, named=asked is not None)
+    excluded, total = excluded_episodes(meta), meta.total_episodes
+    chosen = training_episodes(None if asked is None else list(asked), total, [k in excluded for k in range(total)])
+    return list(range(total)) if chosen is None else chosen
+
+
+def resumed_episodes(meta: Any, asked: Sequence[int] | None, began: Sequence[int] | None) -> list[int]:
+    """The episodes that a resumed run goes on with: those that it began with, less what was excluded since.
+
+    Args:
+        meta: LeRobot's metadata of the data set.
+        asked: of the run's settings, which `--dataset.episodes` may have changed.
+        began: what the checkpoint says; None where it does not say, as before every run recorded them.
+
+    Raises:
+        InvalidValueError: an episode that is not there any more.
+        RunError: none is left, or the data set has lost the column that tells.
+    """
+    changed = asked is not None and list(asked) != list(began or ())
+    require_episode_columns(meta, named=changed)
+    excluded, total = excluded_episodes(meta), meta.total_episodes
+    source = list(range(total)) if asked is None else list(asked)
+    chosen = training_episodes(source, total, [k in excluded for k in range(total)]) or source
+    since = sorted(set(source) - set(chosen))
+    if changed:
+        origin = "that --dataset.episodes names"
+    elif asked is None:
+        origin = "of the data set (the checkpoint does not say which ones the run began with)"
+    else:
+        origin = "that the run began with"
+    left_out = f"; excluded since: {since}" if since else ""
+    logging.info("Resuming with %d of the %d episodes %s%s", len(chosen), len(source), origin, left_out)
+    return chosen
+
+
+def recorded_episodes(checkpoint: Path) -> list[int] | None:
+    """The episodes that the checkpoint of a run says it trained on; None where it does not say.
+
+    Raises:
+        FileFormatError: its `train_config.json` cannot be read.
+    """
+    path = checkpoint / "pretrained_model" / "train_config.json"
+    try:
+        return (json.loads(path.read_text(encoding="utf-8")).get("dataset") or {}).get("episodes")
+    except (OSError, ValueError, AttributeError) as error:
+        raise FileFormatError(path, "the settings of a training", f"{type(error).__name__}") from None

@@ -1,0 +1,138 @@
+"""What a co-policy asks of the data that it is about to be trained on, under any trainer that makes it as LeRobot does.
+
+`copolicy-train` has asked all this before, for any policy; here it is asked for `lerobot-train` and for loops of one's
+own.
+"""
+
+import json
+import logging
+import math
+from collections import Counter
+from collections.abc import Collection
+from typing import Any
+
+from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
+
+from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.train.checked_stream import CheckedStream
+from copolicy.train.episode_choice import excluded_episodes, require_episode_columns
+from copolicy.train.finite_data import mended_statistics, require_finite_frames
+
+from ..env.configuration_table_carrying import TableCarryingEnvConfig
+from .callers import data_sets_of_callers, environment_of_callers
+from .configuration_copolicy import CopolicyConfig
+
+_PHYSICS = "physics"
+_LIMIT = "angular_acceleration_limit"
+_FREE = "step_limit"  # how long an episode may last is no property of the dynamics
+
+
+def prepare_training(config: CopolicyConfig, meta: Any) -> frozenset[int]:
+    """Checks the episodes that are trained on, and records their rate and physics in the configuration.
+
+    Args:
+        meta: LeRobot's metadata of the data set.
+
+    Returns:
+        Excluded episodes that must not come up in a batch; empty where it is known that they do not.
+
+    Raises:
+        RunError: an excluded episode would be trained on, the column that tells is gone, or a number is not finite.
+    """
+    data_sets = data_sets_of_callers(meta)
+    excluded = excluded_episodes(meta)
+    if not data_sets:
+        require_episode_columns(meta, named=False)
+        record_conditions(config, meta, None)
+        return excluded
+    chosen: set[int] = set()
+    for data_set in data_sets:
+        episodes = None if _yields_all(data_set) else data_set.episodes
+        require_episode_columns(meta, named=episodes is not None)
+        chosen |= set(range(meta.total_episodes) if episodes is None else episodes)
+    used = sorted(excluded & chosen)
+    if used:
+        raise RunError(_refusal(meta, used, excluded, any(_yields_all(data_set) for data_set in data_sets)))
+    require_finite_frames(meta.root, chosen, meta.features)
+    mended_statistics(meta.root, meta.stats, chosen, meta.total_episodes)
+    record_conditions(config, meta, chosen)
+    return frozenset()
+
+
+def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[int] | None) -> None:
+    """Writes the rate of the data, and the physics of their episodes, into the configuration of a policy.
+
+    Args:
+        episodes: that are trained on; None for all.
+    """
+    fps = float(meta.fps)
+    if config.fps is not None and config.fps != fps:
+        logging.warning("The policy was made for %g frames a second; it goes on with data of %g", config.fps, fps)
+    config.fps = fps
+    counts = _physics(meta, episodes)
+    known = [text for text in counts if text]
+    physics = json.loads(known[0]) if len(known) == 1 else None
+    if physics is not None and config.physics is not None and config.physics != physics:
+        logging.warning("The policy learned under other physics before: %s; these data: %s", config.physics, physics)
+    config.physics = physics
+    config.physics_mixture = dict(counts) if len(counts) > 1 else {}
+    if len(known) > 1:
+        logging.warning(
+            "The episodes were recorded under different physics, which the checkpoint records as a mixture: %s",
+            "; ".join(f"{count} episodes {text or 'unknown'}" for text, count in counts.items()),
+        )
+
+
+def require_same_rate(config: CopolicyConfig) -> None:
+    """Refuses an environment of the task that plays the policy's actions at another rate than they were learned at.
+
+    Raises:
+        InvalidValueError: `--env.fps` differs from the rate that the checkpoint records.
+    """
+    environment = environment_of_callers()
+    if not isinstance(environment, TableCarryingEnvConfig):
+        return
+    if config.fps is not None and environment.fps != config.fps:
+        expected = f"{config.fps:g}, the frames a second of the data that the policy learned from"
+        raise InvalidValueError("--env.fps", expected, environment.fps)
+    limit = (config.physics or {}).get(_LIMIT)
+    if limit is not None and not math.isclose(limit, environment.angular_acceleration_limit):
+        logging.warning(
+            "The policy learned under an angular acceleration limit of %.4g rad/s^2; the environment has %.4g "
+            "(--env.angular_acceleration_limit)", limit, environment.angular_acceleration_limit,
+        )  # fmt: skip
+
+
+def _physics(meta: Any, episodes: Collection[int] | None) -> Counter[str]:
+    """How many episodes have which physics, as JSON without the time limit; an empty text where it is not known."""
+    table = meta.episodes
+    if table is None or _PHYSICS not in table.column_names:
+        return Counter()
+    counts: Counter[str] = Counter()
+    for episode, text in zip(table["episode_index"], table[_PHYSICS], strict=True):
+        if episodes is None or episode in episodes:
+            counts[_dynamics(text)] += 1
+    return counts
+
+
+def _dynamics(text: str | None) -> str:
+    try:
+        settings = json.loads(text or "{}")
+        return (
+            json.dumps({name: float(settings[name]) for name in sorted(settings) if name != _FREE}) if settings else ""
+        )
+    except (ValueError, TypeError, AttributeError):
+        raise RunError(f"meta/episodes: expected the settings of the physics as JSON, found {text!r}") from None
+
+
+def _yields_all(data_set: Any) -> bool:
+    """LeRobot's streamed data set yields every episode, whichever were asked for."""
+    return isinstance(data_set, StreamingLeRobotDataset) and not isinstance(data_set, CheckedStream)
+
+
+def _refusal(meta: Any, used: list[int], excluded: frozenset[int], streamed: bool) -> str:
+    text = f"{meta.root}: expected no excluded episode among those to train on, found {used}; train with copolicy-train"
+    if streamed:
+        return f"{text}, since LeRobot's streamed data set yields every episode"
+    rest = ",".join(str(episode) for episode in range(meta.total_episodes) if episode not in excluded)
+    return f"{text}, which leaves them out, or give --dataset.episodes=[{rest}]"
