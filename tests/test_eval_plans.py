@@ -1,6 +1,7 @@
 """Plans from one state: each goes on from there as co-planning would, and is told by the way that it took."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +206,8 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         "map": "unseen-07",
         "seconds": 0.5,
         "samples": 3,
+        "fps": 10,
+        "angular_acceleration_limit": math.pi / 2,
         "routes": {},
         "ended_by": {"timeout": 3},
         "picture": str(out),

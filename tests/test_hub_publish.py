@@ -357,7 +357,7 @@ def test_a_name_that_is_none_is_refused(hub, user, dataset):
 
 def test_excluded_episodes_are_sent_only_when_asked_for(hub, dataset, publish):
     exclude(dataset, ["1"], "a stick was unplugged")
-    release(dataset, "patch", "One episode excluded.")
+    release(dataset, "minor", "One episode excluded.")
     done = publish()
     assert done.status == 1
     assert "found 1 (1); nothing was uploaded" in done.err

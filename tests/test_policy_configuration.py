@@ -77,7 +77,8 @@ def test_windows_begin_with_the_history():
 
 @pytest.mark.parametrize("preset", ["paper", "default", "small"])
 def test_saved_configuration_holds_the_values_and_loads_back(tmp_path, preset):
-    saved = config(preset=preset, past_human_action=False, n_action_steps=4)
+    learned = {"fps": 30.0, "physics": {"angular_acceleration_limit": 0.5}}  # what a training fills in
+    saved = config(preset=preset, past_human_action=False, n_action_steps=4, **learned)
     saved.save_pretrained(tmp_path)
     assert None not in {
         name: value for name, value in json.loads((tmp_path / "config.json").read_text(encoding="utf-8")).items()
