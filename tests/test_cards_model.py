@@ -203,7 +203,7 @@ def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("content", "found"),
     [
-        ({"study": "coplan"}, "expected a result of copolicy-eval, found none: 'label' is missing"),
+        ({"study": "coplan"}, "expected a result of copolicy-eval, found object missing required field `label`"),
         ([1], "expected a JSON object, found list"),
         (None, "expected a result of copolicy-eval, found no such file"),
     ],

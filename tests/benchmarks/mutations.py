@@ -112,7 +112,9 @@ def main() -> None:
         chosen = [one for one in damages(sound) if arguments.match in str(one)][arguments.start :: arguments.every]
         print(f"{len(chosen)} damages", flush=True)
         for damage in chosen:
-            for name, run, flags in list(commands(scratch / "damaged", scratch / "out", scratch / "other", arguments.before)):
+            for name, run, flags in list(
+                commands(scratch / "damaged", scratch / "out", scratch / "other", arguments.before)
+            ):
                 if arguments.only and name not in arguments.only:
                     continue
                 shutil.rmtree(scratch / "out", ignore_errors=True)
