@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.documents import RELEASE_FILE
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
@@ -17,7 +18,6 @@ RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
 
 _TRAINING = ("batch_size", "seed")
-_RELEASE = "meta/copolicy_release.json"
 _COUNTED = ("source", "map_set", "license", "pair_id")
 _EPISODE = ("map_id", "start_theta", "partner", "robot", "repeat", "success", "reason", "time_s")
 
@@ -105,7 +105,7 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
     folder = LeRobotFolder.open(root)
     info = folder.info
     used = range(info["total_episodes"]) if chosen is None else chosen
-    release = _json(root / _RELEASE) or {}
+    release = _json(root / RELEASE_FILE) or {}
     return {
         **facts,
         "episodes": info["total_episodes"],

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+from ..documents import RECORD_FILE
 from ..episode import EPISODE_COLUMNS, Source
 from ..episode_rows import episode_tables, with_column, write_tables
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
 from ..licences import checked_licence
 from .selection import Selection
 from .subset.replace_folder import finish_interrupted
-from .subset.stored_set import RECORD_FILE, record_text, stored_record
+from .subset.stored_set import record_text, stored_record
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
-from ..episode_rows import stripped_hint
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
-from .info import INFO_FILE, read_info, require_episodes
+from .info import INFO_FILE, read_info, require_episodes, stripped_hint
 from .tables import column_types, damaged, episode_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")

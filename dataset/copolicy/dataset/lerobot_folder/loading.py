@@ -11,8 +11,8 @@ from ..exceptions import CopolicyError, FileFormatError
 from ..files import visible_files
 from ..json_file import read_json
 from .folder import POSITIONS, LeRobotFolder
+from .info import STATS_FILE, TASKS_FILE
 from .references import (
-    TASKS_FILE,
     data_path,
     read_tasks,
     tasks_are_indexed,
@@ -21,7 +21,6 @@ from .references import (
 )
 from .tables import ColumnError, column_types, episode_values, pa, read_parquet, row_count, scalars, vectors
 
-STATS_FILE = Path("meta/stats.json")
 STATISTICS = ("min", "max", "mean", "std")
 """The statistics of a feature that normalisation may use."""
 
