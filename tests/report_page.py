@@ -63,7 +63,7 @@ def make_data_set(folder: Path, episodes: int) -> Path:
     root = folder / "table"
     with contextlib.redirect_stdout(io.StringIO()):
         assert (
-            convert(["mcap", str(folder / "raw"), "--root", str(root), "--repo-id", "local/table", "--license", "MIT"])
+            convert(["mcap", str(folder / "raw"), "--root", str(root), "--repo-id", "local/table", "--license", "mit"])
             == 0
         )
     return root

@@ -1,12 +1,12 @@
 """Which episodes a policy is trained on: those asked for, less those that the data set marks as excluded."""
 
-import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
-from copolicy.dataset.exceptions import FileFormatError, RunError
+from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.json_file import read_json
 
 from .local_dataset import training_episodes
 
@@ -15,6 +15,16 @@ _LOST = (
     "its episode columns were lost, as by LeRobot's delete_episodes; copolicy-dataset restores them from the "
     "recordings or an earlier version (copolicy-dataset amend --help)"
 )
+
+
+class _DataSet(TypedDict, total=False):
+    episodes: list[int] | None
+
+
+class _Settings(TypedDict, total=False):
+    """`train_config.json`, as far as it is read here."""
+
+    dataset: _DataSet | None
 
 
 def excluded_episodes(meta: Any) -> frozenset[int]:
@@ -115,7 +125,5 @@ def recorded_episodes(checkpoint: Path) -> list[int] | None:
         FileFormatError: its `train_config.json` cannot be read.
     """
     path = checkpoint / "pretrained_model" / "train_config.json"
-    try:
-        return (json.loads(path.read_text(encoding="utf-8")).get("dataset") or {}).get("episodes")
-    except (OSError, ValueError, AttributeError) as error:
-        raise FileFormatError(path, "the settings of a training", f"{type(error).__name__}") from None
+    settings = read_json(path, _Settings, "the settings of a training")
+    return (settings.get("dataset") or {}).get("episodes")

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.json_file import read_json
 
-from ..result_file import read_json
 from .paired import Key, Values, episode_key, episode_values
 
 _WHAT = "a result of copolicy-eval coplan or partner"
@@ -41,7 +41,7 @@ class Result:
         Raises:
             FileFormatError: no such file, no result of a study with episodes, or one that repeats an episode.
         """
-        content = read_json(path, _WHAT)
+        content = read_json(path, dict[str, Any], _WHAT)
         try:
             study, label, rows = str(content["study"]), str(content["label"]), tuple(content["episodes"])
             settings = {key: one for key, one in content["settings"].items() if key not in _FREE_SETTINGS}
