@@ -35,11 +35,16 @@ FINDINGS = {
 STATISTICS = {
     "version": 1,
     "statistics": {
-        "route_entropy": {
-            "value": 0.93, "unit": "bits", "interval": [0.8, 1.0], "episodes": 30, "definition": "entropy of routes",
-            "null": {"how": "shuffled", "mean": 0.1, "low": 0.0, "high": 0.2, "p": 0.01}, "details": {"L": 3},
+        "routes": {
+            "route_entropy": {
+                "value": 0.93, "unit": "bits", "interval": [0.8, 1.0], "episodes": 30,
+                "definition": "entropy of routes",
+                "null": {"how": "shuffled", "mean": 0.1, "low": 0.0, "high": 0.2, "p": 0.01}, "details": {"L": 3},
+            },
         },
-        "energy_distance": {"value": None, "unit": "1", "interval": None, "episodes": 0, "note": "one split only"},
+        "distances": {
+            "energy_distance": {"value": None, "unit": "1", "interval": None, "episodes": 0, "note": "one split only"},
+        },
     },
 }  # fmt: skip
 

@@ -203,8 +203,8 @@ def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("content", "found"),
     [
-        ({"study": "coplan"}, "expected a result of copolicy-eval, found none: 'label' is missing"),
-        ([1], "expected a JSON object, found a JSON list"),
+        ({"study": "coplan"}, "expected a result of copolicy-eval, found object missing required field `label`"),
+        ([1], "expected a result of copolicy-eval, found a JSON list"),
         (None, "expected a result of copolicy-eval, found no such file"),
     ],
 )

@@ -24,7 +24,7 @@ from damaged_sets import Damage, copy_of, damages, harmless
 Run = Callable[[list[str]], int]
 
 
-def commands(root: Path, scratch: Path, sound: Path) -> Iterator[tuple[str, Run, list[str]]]:
+def commands(root: Path, scratch: Path, sound: Path, before: bool) -> Iterator[tuple[str, Run, list[str]]]:
     """Name, entry point and arguments of every command that reads a data set."""
     from copolicy.cards.cli import main as cards
     from copolicy.convert.cli import main as convert
@@ -42,6 +42,13 @@ def commands(root: Path, scratch: Path, sound: Path) -> Iterator[tuple[str, Run,
     yield "minari", convert, ["export", str(root), "--out", str(scratch / "m-v0"), "--format", "minari"]
     yield "merge", convert, ["merge", str(root), str(sound), "--root", str(scratch / "merged"), "--repo-id", "l/m"]
     yield "train", train, [str(root)]
+    if not before:
+        part = str(scratch / "part")
+        yield "select", dataset, ["select", str(root), "--out", part, "--episodes", "1"]
+        yield "split", dataset, ["split", str(root), "--out", part, "--parts", "a=0.5", "b=rest", "--by", "episodes"]
+        yield "amend", dataset, ["amend", str(root), "--set", "session_id=S9"]
+        yield "restore", dataset, ["amend", str(root), "--restore-from", str(sound)]
+        yield "withdraw", dataset, ["withdraw", "C1", str(root)]
 
 
 def train(arguments: list[str]) -> int:
@@ -93,7 +100,8 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1)
     parser.add_argument("--start", type=int, default=0)
     parser.add_argument("--only", nargs="+")
-    parser.add_argument("--match", default="")
+    parser.add_argument("--match", default="", help="only damages whose line holds this text")
+    parser.add_argument("--before", action="store_true", help="without the commands that 0.1.0 did not have")
     parser.add_argument("--verbose", action="store_true", help="print each wrong outcome")
     arguments = parser.parse_args()
     counts: dict[str, Counter[str]] = {}
@@ -104,7 +112,9 @@ def main() -> None:
         chosen = [one for one in damages(sound) if arguments.match in str(one)][arguments.start :: arguments.every]
         print(f"{len(chosen)} damages", flush=True)
         for damage in chosen:
-            for name, run, flags in list(commands(scratch / "damaged", scratch / "out", scratch / "other")):
+            for name, run, flags in list(
+                commands(scratch / "damaged", scratch / "out", scratch / "other", arguments.before)
+            ):
                 if arguments.only and name not in arguments.only:
                     continue
                 shutil.rmtree(scratch / "out", ignore_errors=True)

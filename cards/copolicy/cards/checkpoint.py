@@ -7,6 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.json_file import require_type
+from copolicy.dataset.policy_documents import (
+    EvaluationDocument,
+    KeptEvaluationsDocument,
+    PolicyConfigDocument,
+    RecipeDocument,
+    TrainingDocument,
+)
 from copolicy.dataset.training_run import find_policy_folder
 
 from .artefacts import read_json
@@ -16,6 +24,7 @@ from .training_data import TrainingData
 WEIGHTS = "model.safetensors"
 RECIPE = "recipe.json"
 EVALUATIONS = "eval.json"
+_RESULT = "a result of copolicy-eval"
 
 
 @dataclass(frozen=True)
@@ -49,11 +58,12 @@ class Checkpoint:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
         """
         folder = _folder(path)
-        config = read_json(folder / "config.json") or {}
+        config = read_json(folder / "config.json", dict, "a policy's configuration") or {}
         if "type" not in config:
             raise FileFormatError(folder / "config.json", "a policy's configuration with its type", "none")
-        training = read_json(folder / "train_config.json") or {}
-        recipe = read_json(folder / RECIPE) or {}
+        require_type(config, PolicyConfigDocument, "a policy's configuration", folder / "config.json")
+        training = read_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
+        recipe = read_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
         root = dataset_root or _training_root(settings)
         if root is not None:
@@ -83,26 +93,22 @@ class Checkpoint:
         """
         if not paths:
             kept = self.folder / EVALUATIONS
-            results = (read_json(kept) or {}).get("evaluations") or []
+            stored = read_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
+            results = stored.get("evaluations") or []
             return [self._checked(kept, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InvalidValueError("--eval", "each file once", [str(path) for path in paths])
         return [self._evaluation(path) for path in paths]
 
     def _evaluation(self, path: Path) -> dict[str, Any]:
-        result = read_json(path)
+        result = read_json(path, dict, _RESULT)
         if result is None:
-            raise FileFormatError(path, "a result of copolicy-eval", "no such file")
+            raise FileFormatError(path, _RESULT, "no such file")
         return self._checked(path, result)
 
     def _checked(self, path: Path, result: dict[str, Any]) -> dict[str, Any]:
-        try:
-            label, weights = result["label"], result["policy"]["weights_sha256"]
-            success = result["summary"]["success"]
-            _ = label, result["study"], result["settings"]["maps"], success["mean"], success["standard_error"]
-            _ = success["episodes"], success["wilson_95"], result["summary"]["planning_ms_per_call"]
-        except (KeyError, TypeError) as error:
-            raise FileFormatError(path, "a result of copolicy-eval", f"none: {error} is missing") from None
+        require_type(result, EvaluationDocument, _RESULT, path)
+        weights = result["policy"].get("weights_sha256")
         # An exported policy makes the same plans as the checkpoint that it came from, and so has the same results.
         if weights not in (self.weights_sha256, (self.recipe.get("weights") or {}).get("exported_from")):
             expected = f"an evaluation of {self.folder.name} (weights {self.weights_sha256[:12]})"

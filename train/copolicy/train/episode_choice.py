@@ -3,10 +3,11 @@
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.json_file import read_json
+from copolicy.dataset.policy_documents import TrainingDocument
 
 from .local_dataset import training_episodes
 
@@ -15,16 +16,6 @@ _LOST = (
     "its episode columns were lost, as by LeRobot's delete_episodes; copolicy-dataset restores them from the "
     "recordings or an earlier version (copolicy-dataset amend --help)"
 )
-
-
-class _DataSet(TypedDict, total=False):
-    episodes: list[int] | None
-
-
-class _Settings(TypedDict, total=False):
-    """`train_config.json`, as far as it is read here."""
-
-    dataset: _DataSet | None
 
 
 def excluded_episodes(meta: Any) -> frozenset[int]:
@@ -125,5 +116,5 @@ def recorded_episodes(checkpoint: Path) -> list[int] | None:
         FileFormatError: its `train_config.json` cannot be read.
     """
     path = checkpoint / "pretrained_model" / "train_config.json"
-    settings = read_json(path, _Settings, "the settings of a training")
+    settings = read_json(path, TrainingDocument, "the settings of a training")
     return (settings.get("dataset") or {}).get("episodes")

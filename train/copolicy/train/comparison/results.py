@@ -7,6 +7,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.json_file import read_json
+from copolicy.dataset.policy_documents import ComparedDocument
 
 from .paired import Key, Values, episode_key, episode_values
 
@@ -41,7 +42,7 @@ class Result:
         Raises:
             FileFormatError: no such file, no result of a study with episodes, or one that repeats an episode.
         """
-        content = read_json(path, dict[str, Any], _WHAT)
+        content = read_json(path, ComparedDocument, _WHAT)
         try:
             study, label, rows = str(content["study"]), str(content["label"]), tuple(content["episodes"])
             settings = {key: one for key, one in content["settings"].items() if key not in _FREE_SETTINGS}
