@@ -68,7 +68,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
         "discarded_left_out": ["episode_2.mcap"],
         "unfinished_recordings": [],
         "physics": {"angular acceleration up to pi/2 rad/s^2": 3},
-        "mixed": ["license: 2 episodes CC-BY-4.0; 1 episode CC0-1.0"],
+        "mixed": ["license: 2 episodes cc-by-4.0; 1 episode CC0-1.0"],
         "not_verified": [],
     }
     assert captured.err == ""

@@ -17,10 +17,14 @@ class SuccessDocument(TypedDict):
     wilson_95: tuple[Number, Number] | None
 
 
+class _Mean(TypedDict):
+    mean: float | int
+
+
 class PartnerSummaryDocument(TypedDict):
     """The episodes with one kind of partner."""
 
-    success: SuccessDocument
+    success: _Mean
 
 
 class SummaryDocument(TypedDict):
@@ -58,7 +62,7 @@ class BaselineDocument(TypedDict):
     """Another robot in the same study."""
 
     name: str
-    policy: EvaluatedPolicyDocument
+    policy: NotRequired[EvaluatedPolicyDocument]
     summary: SummaryDocument
 
 
