@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .episode import EPISODE_COLUMNS
-from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from .exceptions import FileFormatError, InvalidValueError
 from .files import visible_files
 from .lerobot_folder.info import stripped_hint
 from .staging import replacements
@@ -25,27 +25,16 @@ def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Tab
         FileFormatError: no LeRobot data set, a damaged file, or one that lacks a needed column.
         MissingExtraError: pyarrow is not installed.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyarrow") from None
-    # The types of all columns, before any of them is rewritten.
     from .lerobot_folder.folder import LeRobotFolder
+    from .lerobot_folder.tables import read_parquet
 
+    # The types of all columns, before any of them is rewritten.
     folder = LeRobotFolder.open(root)
     folder.rows([name for name in needed if name in EPISODE_COLUMNS])
     files = visible_files(root / "meta" / "episodes", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     tables = {}
     for path in files:
-        try:
-            # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
-            with pq.ParquetFile(path) as file:
-                tables[path] = file.read()
-        except (pa.ArrowException, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+        tables[path] = read_parquet(path)
         missing = [name for name in needed if name not in tables[path].column_names]
         if missing:
             hint = stripped_hint(folder.info, root) if "episode_uuid" in missing else ""

@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow so that a broken file is a finding, not an end."""
+"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow so that a damaged file is a finding and the check goes on."""
 
 from pathlib import Path
 from typing import Any

@@ -126,11 +126,11 @@ def amend(root: Path, settings: Mapping[str, str], selection: Selection | None =
         after = table
         for name, value in settings.items():
             values = [row.get(name) or "" for row in part]
-            for place, row in enumerate(part):
-                if row["episode_index"] in chosen and values[place] != value:
-                    changed[name][values[place]] += 1
+            for index, row in enumerate(part):
+                if row["episode_index"] in chosen and values[index] != value:
+                    changed[name][values[index]] += 1
                     numbers.add(row["episode_index"])
-                    values[place] = value
+                    values[index] = value
             if values != [row.get(name) for row in part]:
                 after = with_column(after, name, values, "str")
         if after is not table:

@@ -127,16 +127,18 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     if minimal or not (root / CARD_FILE).is_file():
         found = "the minimal one of copolicy-convert, which describes nothing" if minimal else "none"
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
-    told, found = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
-    differences = told.differences(found)
-    changed = [line for line in told.differences(found, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)]
+    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
+    differences = released.differences(present)
+    changed = [
+        line for line in released.differences(present, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)
+    ]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"
         raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
     if differences:
-        replace_text(root / MANIFEST_FILE, found.to_text())
-    return record, found
+        replace_text(root / MANIFEST_FILE, present.to_text())
+    return record, present
 
 
 def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:

@@ -44,10 +44,10 @@ def require_loadable(root: Path) -> LeRobotFolder:
     """
     folder = LeRobotFolder.open(root)
     info = folder.info
-    for place, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
-        rows = sum(row_count(path) for path in visible_files(root / place, "*.parquet"))
+    for name, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
+        rows = sum(row_count(path) for path in visible_files(root / name, "*.parquet"))
         if rows != expected:
-            raise FileFormatError(root / place, f"{expected} rows, as meta/info.json says", f"{rows}")
+            raise FileFormatError(root / name, f"{expected} rows, as meta/info.json says", f"{rows}")
     for name in POSITIONS:
         episode_values(folder.episodes, name, "int", root / "meta" / "episodes")
     episodes_of_files: dict[str, frozenset[int]] = {}

@@ -109,10 +109,10 @@ class StoredSet:
 def without_episodes(record: Mapping[str, Any], uuids: Iterable[str]) -> dict[str, Any]:
     """The record of a conversion without the notes on some episodes."""
     gone = set(uuids)
-    kept = {**record}
+    shortened = {**record}
     if isinstance(record.get("notes"), dict):
-        kept["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in gone}
-    return kept
+        shortened["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in gone}
+    return shortened
 
 
 def write_record(folder: Path, record: Mapping[str, Any]) -> None:

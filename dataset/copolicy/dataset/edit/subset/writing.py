@@ -11,6 +11,7 @@ import numpy as np
 from ...exceptions import FileFormatError, MissingExtraError, RunError
 from ...lerobot_folder.info import INFO_FILE, TASKS_FILE
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE
+from ...lerobot_folder.tables import read_parquet
 from ...minimal_card import CARD_FILE, minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
@@ -146,8 +147,7 @@ def _frames(source: StoredSet, numbers: Sequence[int]) -> "Iterator[pa.Table]":
 def _read(path: Path, number: int) -> "tuple[pa.Table, np.ndarray]":
     if not path.is_file():
         raise FileFormatError(path, f"the frames of episode {number}", "no file")
-    with pq.ParquetFile(path) as file:
-        table = file.read()
+    table = read_parquet(path)
     return table, table.column("episode_index").to_numpy()
 
 
