@@ -1,4 +1,4 @@
-"""LeRobot's training loop, stopped at the first loss, gradient or weight that is not finite, before a checkpoint of it."""
+"""LeRobot's training loop, stopped at the first loss, gradient or weight that is not finite."""
 
 import logging
 import math

@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow so that a damaged file is a finding and the check goes on."""
+"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow; a damaged file becomes a finding."""
 
 from pathlib import Path
 from typing import Any
