@@ -35,11 +35,16 @@ FINDINGS = {
 STATISTICS = {
     "version": 1,
     "statistics": {
-        "route_entropy": {
-            "value": 0.93, "unit": "bits", "interval": [0.8, 1.0], "episodes": 30, "definition": "entropy of routes",
-            "null": {"how": "shuffled", "mean": 0.1, "low": 0.0, "high": 0.2, "p": 0.01}, "details": {"L": 3},
+        "routes": {
+            "route_entropy": {
+                "value": 0.93, "unit": "bits", "interval": [0.8, 1.0], "episodes": 30,
+                "definition": "entropy of routes",
+                "null": {"how": "shuffled", "mean": 0.1, "low": 0.0, "high": 0.2, "p": 0.01}, "details": {"L": 3},
+            },
         },
-        "energy_distance": {"value": None, "unit": "1", "interval": None, "episodes": 0, "note": "one split only"},
+        "distances": {
+            "energy_distance": {"value": None, "unit": "1", "interval": None, "episodes": 0, "note": "one split only"},
+        },
     },
 }  # fmt: skip
 
@@ -63,7 +68,7 @@ def make_data_set(folder: Path, episodes: int) -> Path:
     root = folder / "table"
     with contextlib.redirect_stdout(io.StringIO()):
         assert (
-            convert(["mcap", str(folder / "raw"), "--root", str(root), "--repo-id", "local/table", "--license", "MIT"])
+            convert(["mcap", str(folder / "raw"), "--root", str(root), "--repo-id", "local/table", "--license", "mit"])
             == 0
         )
     return root

@@ -204,7 +204,7 @@ def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
     ("content", "found"),
     [
         ({"study": "coplan"}, "expected a result of copolicy-eval, found object missing required field `label`"),
-        ([1], "expected a result of copolicy-eval, with object, found array"),
+        ([1], "expected a result of copolicy-eval, found a JSON list"),
         (None, "expected a result of copolicy-eval, found no such file"),
     ],
 )

@@ -11,11 +11,12 @@ import torch
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from copolicy.collect.world import TableWorld
-from copolicy.convert.lerobot_writer import ROBOT_TYPE, write_dataset
+from copolicy.convert.lerobot_writer import write_dataset
 from copolicy.convert.prepare import Conversion, prepare_episode
 from copolicy.dataset.episode import EPISODE_COLUMNS, Episode, EpisodeMeta
 from copolicy.dataset.exceptions import OutputExistsError, RunError
 from copolicy.dataset.features import FEATURES, TASK
+from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
 from copolicy.dataset.task import MAP_SETS
 
 

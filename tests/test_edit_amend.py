@@ -52,7 +52,7 @@ def test_the_record_says_what_and_nothing_personal(root):
     (note,) = record["amended"]
     assert note["episodes"] == 6
     assert note["columns"] == {
-        "license": {"episodes": 6, "from": ["CC-BY-4.0"], "to": "cc0-1.0"},
+        "license": {"episodes": 6, "from": ["cc-by-4.0"], "to": "cc0-1.0"},
         "consent_id": {"episodes": 6},
         "pair_id": {"episodes": 6},
     }
@@ -66,7 +66,7 @@ def test_the_record_says_what_and_nothing_personal(root):
 
 def test_it_is_a_patch_release_in_the_change_log(root):
     release(root, "minor", "The first.")
-    amend(root, {"license": "cc-by-4.0"})
+    amend(root, {"license": "cc0-1.0"})
     record = release(root, "patch", "The licence was forgotten.")
     assert record.version == "0.1.1"
     (change,) = record.changes
@@ -204,7 +204,7 @@ def test_only_rows_without_a_name_are_filled(root, made):
     assert restore(root, made)["restored"] == 2
     after = columns(root)
     assert [row["episode_uuid"] for row in after] == [row["episode_uuid"] for row in values]
-    assert [row["license"] for row in after] == ["mit", "CC-BY-4.0", "mit", "mit", "CC-BY-4.0", "mit"]
+    assert [row["license"] for row in after] == ["mit", "cc-by-4.0", "mit", "mit", "cc-by-4.0", "mit"]
 
 
 def test_every_episode_needs_one_original(left, made, tmp_path, capsys):

@@ -151,7 +151,7 @@ def test_the_same_training_twice_is_no_second_seed(tmp_path, capsys):
     [
         ("{", "no JSON (Expecting property name enclosed in double quotes: line 1 column 2 (char 1))"),
         ("[]", "a JSON list"),
-        ("{}", "none: KeyError 'study'"),
+        ("{}", "object missing required field `study`"),
         ('{"study": "coplan", "label": "", "policy": {}, "settings": {}, "episodes": [{"map_index": 0}]}',
          "episodes without map_id, start_theta, obstacles, repeat, success, time_s, interaction_mean"),
         ('{"study": "coplan", "label": "", "policy": {}, "settings": {}, "episodes": []}', None),

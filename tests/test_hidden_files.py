@@ -56,7 +56,7 @@ def ok(main, *arguments: object) -> dict:
 
 def test_recordings_are_converted_checked_and_found(made, tmp_path):
     raw = made / "littered" / "raw"
-    video = ("--video", "--video-size", "160x80", "--license", "CC-BY-4.0")
+    video = ("--video", "--video-size", "160x80", "--license", "cc-by-4.0")
     ok(convert, "mcap", raw, "--root", tmp_path / "set", "--repo-id", "lab/table", *video)
     assert contents(tmp_path / "set").keys() == contents(made / "set").keys()
     assert check_dataset(raw).findings == check_dataset(made / "raw").findings

@@ -64,7 +64,8 @@ def test_findings_that_are_not_there_are_named(report_set, tmp_path, capsys):
     assert capsys.readouterr().err == f"copolicy-cards: {expected}"
     missing.write_text("[]", encoding="utf-8")
     assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
-    assert capsys.readouterr().err == f"copolicy-cards: {missing}: expected findings of copolicy-dataset check, with object, found array\n"
+    expected = f"{missing}: expected findings of copolicy-dataset check, found a JSON list\n"
+    assert capsys.readouterr().err == f"copolicy-cards: {expected}"
 
 
 def test_frames_that_contradict_the_metadata_are_refused(report_set, tmp_path):

@@ -123,7 +123,7 @@ def commands(files: list[Path], folder: Path, workers: int, size: int) -> Iterat
     source.mkdir(parents=True)
     for number, path in enumerate(files):
         os.link(path, source / f"episode_{number:06d}.mcap")
-    flags = ("--repo-id", "local/growth", "--license", "CC0-1.0")
+    flags = ("--repo-id", "local/growth", "--license", "cc0-1.0")
     one, shards = str(folder / "one"), str(folder / "shards")
     yield "convert, in one go", measured(_CONVERT, "mcap", str(source), "--root", one, *flags)
     flags = (*flags, "--shards", shards, "--shard-episodes", str(size), "--workers", str(workers))

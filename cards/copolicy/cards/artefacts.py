@@ -6,12 +6,16 @@ from typing import Any
 
 from copolicy.dataset import json_file
 from copolicy.dataset.checks.stored_check import CHECK_FILE, Validity, content_hash, validity
-from copolicy.dataset.documents import CheckDocument, ReleaseDocument, StatisticsDocument
+from copolicy.dataset.documents import (
+    RELEASE_FILE,
+    STATISTICS_FILE,
+    CheckDocument,
+    ReleaseDocument,
+    StatisticsDocument,
+)
 
 __all__ = [
     "CHECK_FILE",
-    "CONVERSION_FILE",
-    "RELEASE_FILE",
     "STATISTICS_FILE",
     "KeptFindings",
     "estimates",
@@ -21,15 +25,6 @@ __all__ = [
     "statistics_doubt",
     "stored_statistics",
 ]
-
-STATISTICS_FILE = Path("meta/copolicy_stats.json")
-"""Multimodality statistics of `copolicy-dataset stats`."""
-
-RELEASE_FILE = Path("meta/copolicy_release.json")
-"""The newest release, made by `copolicy-dataset release`."""
-
-CONVERSION_FILE = Path("meta/copolicy.json")
-"""How the data set was converted, made by `copolicy-convert`."""
 
 
 @dataclass(frozen=True)

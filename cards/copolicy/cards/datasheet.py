@@ -5,11 +5,11 @@ What the metadata does not say is called not stated, so that a reader knows what
 
 from collections.abc import Iterator
 
-from copolicy.dataset.documents import ConversionRecord
+from copolicy.dataset.documents import RECORD_FILE, ConversionRecord
 from copolicy.dataset.features import ACTION
 from copolicy.dataset.versions.withdrawals import read_withdrawals
 
-from .artefacts import CONVERSION_FILE, newest_release, read_json
+from .artefacts import newest_release, read_json
 from .facts import DatasetFacts
 from .markdown import listing, share
 
@@ -90,16 +90,16 @@ def _preprocessing(facts: DatasetFacts) -> list[str]:
     ]
     if "hold" in action:
         lines.append(f"The action of a frame is the {action['hold']} of the recorded actions until the next frame")
-    record = read_json(facts.root / CONVERSION_FILE, ConversionRecord, "the record of a conversion")
+    record = read_json(facts.root / RECORD_FILE, ConversionRecord, "the record of a conversion")
     if record is None:
-        return [*lines, f"Conversion: not stated (no `{CONVERSION_FILE}`)"]
+        return [*lines, f"Conversion: not stated (no `{RECORD_FILE}`)"]
     lines.append(f"Converted by `{record.get('converter', 'not stated')}` {record.get('version', '')}".rstrip())
     left_out = record.get("left_out")
     if isinstance(left_out, dict):
         counts = ", ".join(f"{len(names)} {why}" for why, names in left_out.items() if isinstance(names, list))
         lines.append(f"Left out at conversion: {counts or 'none'}")
     notes = record.get("notes") or {}
-    lines.append(f"Episodes with a note on what was mended or doubtful: {len(notes)} (`{CONVERSION_FILE}`)")
+    lines.append(f"Episodes with a note on what was mended or doubtful: {len(notes)} (`{RECORD_FILE}`)")
     sources = sum(bool(episode["source_sha256"]) for episode in facts.episodes)
     lines.append(f"Episodes that name the hash of the file they were made from: {share(sources, len(facts.episodes))}")
     return lines

@@ -16,8 +16,8 @@ def excluded(facts: DatasetFacts, repo_id: str) -> list[str]:
     marked = [episode for episode in facts.episodes if episode.get("discarded")]
     if not marked:
         return []
-    kept = [str(episode["episode_index"]) for episode in facts.episodes if not episode.get("discarded")]
-    named = f"'[{','.join(kept)}]'" if len(kept) <= _LISTED else "LIST"
+    included = [str(episode["episode_index"]) for episode in facts.episodes if not episode.get("discarded")]
+    named = f"'[{','.join(included)}]'" if len(included) <= _LISTED else "LIST"
     rows = [(episode["episode_index"], _reason(str(episode.get("quality_flags") or ""))) for episode in marked]
     return [
         f"""## Excluded episodes

@@ -176,6 +176,9 @@ def _limits(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> st
         )
     incomplete = [e["settings"]["maps"] for e in evaluations if not e["settings"].get("complete_set", True)]
     lines += [f"- Only a part of the maps of {maps} was tried." for maps in incomplete]
-    told = [line for e in evaluations for line in e["settings"].get("told_otherwise", ())]
-    lines += [f"- Evaluated otherwise than it learned: {line}." for line in dict.fromkeys(told)]
+    contradictions = [line for e in evaluations for line in e["settings"].get("told_otherwise", ())]
+    lines += [
+        f"- Evaluated under other conditions than it was trained under: {line}."
+        for line in dict.fromkeys(contradictions)
+    ]
     return "## Limits\n\n" + "\n".join(lines)

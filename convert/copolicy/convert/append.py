@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.clock import Hold
+from copolicy.dataset.documents import RECORD_FILE
+from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
+from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
-from copolicy.dataset.lerobot_folder.info import INFO_FILE, read_info
+from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.log import read_metadata
 from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card, minimal_card
 from copolicy.dataset.staging import about, sync_folder, sync_tree
 
-from .lerobot_writer import RECORD_FILE
 from .linked_copy import add_later_columns, copy_as_links
 from .mixtures import Mixtures, converter_versions
 from .prepare import Conversion
@@ -34,8 +36,6 @@ try:
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-_INFO, _STATS, _TASKS = INFO_FILE, Path("meta/stats.json"), Path("meta/tasks.parquet")
-
 
 def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, Hold]:
     """Rate and hold of a data set, which what is added must share.
@@ -49,7 +49,7 @@ def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, H
     try:
         stored = int(info["fps"]), info["features"]["action"]["hold"]
     except (KeyError, TypeError, ValueError):
-        raise FileFormatError(root / _INFO, "a data set of copolicy-convert", "another") from None
+        raise FileFormatError(root / INFO_FILE, "a data set of copolicy-convert", "another") from None
     for name, asked, found in (("--fps", fps, stored[0]), ("--hold", hold, stored[1])):
         if asked is not None and asked != found:
             raise InvalidValueError(name, f"{found!r}, as {root} has it", asked)
@@ -140,22 +140,11 @@ def append_recordings(
     }
 
 
-def finish_interrupted(root: Path) -> None:
-    """Undoes or completes what an interrupted call left of a data set."""
-    root = root.resolve()
-    before = _before(root)
-    if before.is_dir():
-        if root.exists():
-            shutil.rmtree(before)
-        else:
-            before.rename(root)
-
-
 def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
     tables = [read_table(path) for path in numbered_files(whole / "meta" / "episodes").values()]
     named = [[name for name in EPISODE_COLUMNS if name in table.column_names] for table in tables]
     rows = [row for table, names in zip(tables, named, strict=True) for row in table.select(names).to_pylist()]
-    record = json.loads((whole / RECORD_FILE).read_text(encoding="utf-8"))
+    record = stored_record(whole)
     versions = converter_versions([record, *record["appended"]])
     try:
         mixtures = Mixtures.of(rows)
@@ -170,9 +159,9 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     if info["features"] != new["features"]:
         names = {*info["features"], *new["features"]}
         differ = sorted(name for name in names if info["features"].get(name) != new["features"].get(name))
-        raise FileFormatError(whole / _INFO, "the features of these recordings", f"others: {', '.join(differ)}")
-    if read_table(whole / _TASKS).to_pylist() != read_table(added / _TASKS).to_pylist():
-        raise FileFormatError(whole / _TASKS, "the one task of copolicy-convert", "others")
+        raise FileFormatError(whole / INFO_FILE, "the features of these recordings", f"others: {', '.join(differ)}")
+    if read_table(whole / TASKS_FILE).to_pylist() != read_table(added / TASKS_FILE).to_pylist():
+        raise FileFormatError(whole / TASKS_FILE, "the one task of copolicy-convert", "others")
     shift = Shift(info["total_episodes"], info["total_frames"])
     data: dict[Place, Place] = {}
     last, example = list(numbered_files(whole / "data").items())[-1]
@@ -190,17 +179,16 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     if info.get("splits") == {"train": f"0:{info['total_episodes']}"}:
         info["splits"] = {"train": f"0:{total}"}
     info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
-    record = json.loads((whole / RECORD_FILE).read_text(encoding="utf-8")) if (whole / RECORD_FILE).is_file() else {}
-    part = json.loads((added / RECORD_FILE).read_text(encoding="utf-8"))
+    record, part = stored_record(whole), stored_record(added)
     notes = {**record.get("notes", {}), **part.pop("notes")}
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
     _renew_minimal_card(whole)
-    for name in (_INFO, _STATS, RECORD_FILE):
+    for name in (INFO_FILE, STATS_FILE, RECORD_FILE):
         (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
     write_stats(aggregate_stats(statistics), whole)
-    (whole / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
-    (whole / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    (whole / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    write_record(whole, record)
     return info
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import json
 import logging
 import shutil
 from collections.abc import Iterator, Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import MissingExtraError
 from copolicy.dataset.files import on_visible_files
+from copolicy.dataset.lerobot_folder.info import read_info
 
 from .shifted_tables import Shift
 
@@ -50,7 +50,7 @@ def _moved_statistics(roots: Sequence[Path]) -> Iterator[dict[str, dict[str, Any
     episodes = frames = 0
     for root in roots:
         yield Shift(episodes, frames).statistics(load_stats(root) or {})
-        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
+        info = read_info(root)
         episodes, frames = episodes + info["total_episodes"], frames + info["total_frames"]
 
 

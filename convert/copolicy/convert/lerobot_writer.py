@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.clock import Hold
+from copolicy.dataset.documents import RECORD_FILE
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
 from copolicy.dataset.licences import licence_identifier
 from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder
@@ -40,8 +42,6 @@ try:
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-ROBOT_TYPE = "copolicy_table"
-RECORD_FILE = Path("meta/copolicy.json")
 _ARROW_TYPES = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
 
 

@@ -1,12 +1,22 @@
-"""The shapes of the JSON documents that commands leave in a data set's `meta/`, for those who read them."""
+"""Names and types of the JSON documents that commands leave in the `meta/` folder of a data set."""
 
+from pathlib import Path
 from typing import Any, NotRequired, TypedDict
+
+RECORD_FILE = Path("meta/copolicy.json")
+"""How a data set was made: converter, versions, notes by episode; and what was done to it since."""
+
+RELEASE_FILE = "meta/copolicy_release.json"
+"""The newest release, made by `copolicy-dataset release`."""
+
+STATISTICS_FILE = Path("meta/copolicy_stats.json")
+"""Multimodality statistics of `copolicy-dataset stats`."""
 
 Number = float | int | None
 
 
 class NullDistribution(TypedDict):
-    """What a statistic would be by chance."""
+    """Null distribution of a statistic."""
 
     mean: Number
     low: Number

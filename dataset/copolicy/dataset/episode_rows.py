@@ -1,21 +1,18 @@
 """The rows of meta/episodes as tables: read, chosen by number or name, and written back whole."""
 
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .episode import EPISODE_COLUMNS
-from .exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from .exceptions import FileFormatError, InvalidValueError
 from .files import visible_files
+from .lerobot_folder.info import stripped_hint
 from .staging import replacements
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-ROBOT_TYPE = "copolicy_table"
-"""The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
 
 
 def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Table]":
@@ -28,55 +25,21 @@ def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Tab
         FileFormatError: no LeRobot data set, a damaged file, or one that lacks a needed column.
         MissingExtraError: pyarrow is not installed.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ModuleNotFoundError:
-        raise MissingExtraError("pyarrow") from None
-    # The types of all columns, before any of them is rewritten.
     from .lerobot_folder.folder import LeRobotFolder
+    from .lerobot_folder.tables import read_parquet
 
-    LeRobotFolder.open(root).rows([name for name in needed if name in EPISODE_COLUMNS])
+    # The types of all columns, before any of them is rewritten.
+    folder = LeRobotFolder.open(root)
+    folder.rows([name for name in needed if name in EPISODE_COLUMNS])
     files = visible_files(root / "meta" / "episodes", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     tables = {}
     for path in files:
-        try:
-            # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
-            with pq.ParquetFile(path) as file:
-                tables[path] = file.read()
-        except (pa.ArrowException, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+        tables[path] = read_parquet(path)
         missing = [name for name in needed if name not in tables[path].column_names]
         if missing:
-            hint = stripped_hint(read_info(root), root) if "episode_uuid" in missing else ""
+            hint = stripped_hint(folder.info, root) if "episode_uuid" in missing else ""
             raise FileFormatError(path, "the episode columns of copolicy", f"none named {', '.join(missing)}{hint}")
     return tables
-
-
-def read_info(root: Path) -> dict[str, Any]:
-    """`meta/info.json`, empty where there is none that can be read as an object."""
-    try:
-        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return info if isinstance(info, dict) else {}
-
-
-def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
-    """What to do with a data set of ours whose episode columns are gone; empty for any other one.
-
-    LeRobot's delete and split write meta/episodes without them. What the feature `action` holds stays.
-    """
-    features = info.get("features")
-    action = features.get("action") if isinstance(features, dict) else None
-    if info.get("robot_type") != ROBOT_TYPE and not (isinstance(action, dict) and "hold" in action):
-        return ""
-    return (
-        f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "
-        "back from recordings or an earlier version, and copolicy-dataset select takes episodes out with all columns"
-    )
 
 
 def chosen_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping[str, int]) -> set[int]:

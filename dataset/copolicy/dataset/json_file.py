@@ -1,4 +1,4 @@
-"""JSON files from outside: read with their types checked, so that whoever uses them meets no surprise."""
+"""JSON files that others wrote, read with their types checked."""
 
 import json
 import re
@@ -8,7 +8,11 @@ from typing import Any
 import msgspec
 
 from .exceptions import FileFormatError
+from .file_kinds import kind_of
 
+_NAMES = {
+    "array": "list", "str": "text", "int": "number", "float": "number", "bool": "true or false", "null": "null",
+}  # fmt: skip
 _MISMATCH = re.compile(r"Expected (?P<expected>.+), got (?P<found>.+?)(?: - at `(?P<place>.+)`)?")
 
 
@@ -20,8 +24,10 @@ def read_json[T](path: Path, kind: type[T], what: str) -> T:
         what: the file is, for the error.
 
     Raises:
-        FileFormatError: no such file, no JSON, or a value of another type; the line names its place.
+        FileFormatError: no such file, no JSON, or a value of another type; the line names where it is.
     """
+    if path.exists() and not path.is_file():  # reading a pipe would wait for ever
+        raise FileFormatError(path, what, kind_of(path))
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -29,15 +35,20 @@ def read_json[T](path: Path, kind: type[T], what: str) -> T:
     except OSError as error:
         raise FileFormatError(path, what, error.strerror or str(error)) from None
     except UnicodeDecodeError as error:
-        raise FileFormatError(path, what, f"no text in UTF-8 (byte {error.start})") from None
+        kind = kind_of(path)
+        found = f"no text in UTF-8 (byte {error.start})" if kind in ("a JSON file", "a text file") else kind
+        raise FileFormatError(path, what, found) from None
     return parse_json(text, kind, what, path)
 
 
 def parse_json[T](text: str, kind: type[T], what: str, path: Path | str) -> T:
-    """The same for a text.
+    """The value in a JSON text, see `read_json`.
 
     Args:
-        path: where it is from, for the error.
+        path: of the file that the text is from, for the error.
+
+    Raises:
+        FileFormatError: no JSON, or a value of another type; the line names where it is.
     """
     try:
         value = json.loads(text)
@@ -50,7 +61,7 @@ def require_type[T](value: Any, kind: type[T], what: str, path: Path | str) -> T
     """A value as it is, if it has a type.
 
     Raises:
-        FileFormatError: it has another one; the line names the place.
+        FileFormatError: it has another one; the line names where it is.
     """
     try:
         msgspec.convert(value, kind)
@@ -65,5 +76,6 @@ def _mismatch(message: str, what: str, path: Path | str) -> FileFormatError:
         return FileFormatError(path, what, message[0].lower() + message[1:])
     expected = match["expected"].replace("`", "")
     found = match["found"].replace("`", "")
-    place = f" at {match['place']}" if match["place"] else ""
-    return FileFormatError(path, f"{what}, with {expected}{place}", found)
+    if not match["place"]:
+        return FileFormatError(path, what, f"a JSON {_NAMES.get(found, found)}")
+    return FileFormatError(path, f"{what}, with {expected} at {match['place']}", found)

@@ -1,4 +1,4 @@
-"""The shapes of the JSON documents beside a policy: results of `copolicy-eval`, recipe, configuration."""
+"""Types of the JSON documents beside a policy: results of `copolicy-eval`, recipe, configuration, training settings."""
 
 from typing import Any, NotRequired, TypedDict
 
@@ -17,10 +17,14 @@ class SuccessDocument(TypedDict):
     wilson_95: tuple[Number, Number] | None
 
 
+class _Mean(TypedDict):
+    mean: float | int
+
+
 class PartnerSummaryDocument(TypedDict):
     """The episodes with one kind of partner."""
 
-    success: SuccessDocument
+    success: _Mean
 
 
 class SummaryDocument(TypedDict):
@@ -58,7 +62,7 @@ class BaselineDocument(TypedDict):
     """Another robot in the same study."""
 
     name: str
-    policy: EvaluatedPolicyDocument
+    policy: NotRequired[EvaluatedPolicyDocument]
     summary: SummaryDocument
 
 
@@ -130,7 +134,7 @@ class _TrainingData(TypedDict, total=False):
 
 
 class TrainingDocument(TypedDict):
-    """What cards read of `train_config.json`."""
+    """What is read of `train_config.json`."""
 
     dataset: NotRequired[_TrainingData | None]
     batch_size: NotRequired[int | None]

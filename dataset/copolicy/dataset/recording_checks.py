@@ -1,4 +1,4 @@
-"""What vouches for a recording: check sums where it carries them, and what stands in for those that it lacks."""
+"""The checks of a recording: its check sums, and version, digest and counts where it has none."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

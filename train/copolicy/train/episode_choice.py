@@ -1,12 +1,13 @@
 """Which episodes a policy is trained on: those asked for, less those that the data set marks as excluded."""
 
-import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import FileFormatError, RunError
+from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.json_file import read_json
+from copolicy.dataset.policy_documents import TrainingDocument
 
 from .local_dataset import training_episodes
 
@@ -115,7 +116,5 @@ def recorded_episodes(checkpoint: Path) -> list[int] | None:
         FileFormatError: its `train_config.json` cannot be read.
     """
     path = checkpoint / "pretrained_model" / "train_config.json"
-    try:
-        return (json.loads(path.read_text(encoding="utf-8")).get("dataset") or {}).get("episodes")
-    except (OSError, ValueError, AttributeError) as error:
-        raise FileFormatError(path, "the settings of a training", f"{type(error).__name__}") from None
+    settings = read_json(path, TrainingDocument, "the settings of a training")
+    return (settings.get("dataset") or {}).get("episodes")

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files import visible_files
+from copolicy.dataset.lerobot_folder.tables import DAMAGED, damaged, read_parquet
 
 _EPISODE, _FRAME = "episode_index", "frame_index"
 _READ = ("observation.", "action", "next.reward", "timestamp")
@@ -128,11 +129,7 @@ def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str,
     """
     statistics = []
     for path in visible_files(root / "meta" / "episodes", "*.parquet"):
-        try:
-            rows = pq.ParquetFile(path).read().to_pylist()
-        except (pa.ArrowException, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
-        for row in rows:
+        for row in read_parquet(path).to_pylist():
             if row[_EPISODE] in episodes:
                 entry: dict[str, dict[str, np.ndarray]] = {}
                 for name in (name for name in row if name.startswith("stats/")):
@@ -177,8 +174,8 @@ def _row_groups(root: Path, columns: list[str]) -> Iterator[pa.Table]:
                 names = [name for name in columns if name in there]
                 for group in range(file.num_row_groups):
                     yield file.read_row_group(group, columns=list(dict.fromkeys([_EPISODE, *names])))
-        except (pa.ArrowException, OSError) as error:
-            raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
+        except DAMAGED as error:
+            raise damaged(path, error) from None
 
 
 def _collect(table: pa.Table, chosen: np.ndarray | None, start: int, found: _Unusable) -> None:

@@ -1,4 +1,4 @@
-"""LeRobot's training loop, stopped at the first step that leads nowhere, before a checkpoint of it is written."""
+"""LeRobot's training loop, stopped at the first loss, gradient or weight that is not finite."""
 
 import logging
 import math

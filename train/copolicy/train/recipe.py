@@ -3,13 +3,14 @@
 `recipe.json` and `eval.json` stand beside the weights; `copolicy-cards model` writes the card from them.
 """
 
-import json
 from collections import Counter
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.documents import RELEASE_FILE
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.json_file import read_json
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
 
@@ -17,7 +18,6 @@ RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
 
 _TRAINING = ("batch_size", "seed")
-_RELEASE = "meta/copolicy_release.json"
 _COUNTED = ("source", "map_set", "license", "pair_id")
 _EPISODE = ("map_id", "start_theta", "partner", "robot", "repeat", "success", "reason", "time_s")
 
@@ -38,15 +38,15 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     for command in commands:
         if str(Path.home()) in command or str(Path.cwd()) in command:
             raise InvalidValueError("--commands", "paths that another machine has too", command)
-    earlier = _json(folder / RECIPE_FILE)
+    earlier = _json(folder / RECIPE_FILE, "the recipe of an exported policy")
     if earlier:
         return {**earlier, **({"commands": list(commands)} if commands else {})}
     recipe: dict[str, Any] = {
         "weights": {"exported_from": weights_sha256, "averaged": averaged, "dtype": "float32"},
     }
-    training = _json(folder / "train_config.json")
+    training = _json(folder / "train_config.json", "the settings of a training")
     if training:
-        reached = _json(folder.parent / "training_state" / "training_step.json") or {}
+        reached = _json(folder.parent / "training_state" / "training_step.json", "the step of a training") or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},
@@ -67,28 +67,28 @@ def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
     Raises:
         FileFormatError: no result, or one of other weights.
     """
-    result = _json(path)
+    result = _json(path, "a result of copolicy-eval")
     try:
         if result is None:
             raise FileFormatError(path, "a result of copolicy-eval", "no such file")
         weights = result["policy"]["weights_sha256"]
         summary = _without(result["summary"], "by_map")
         episodes = [{key: row[key] for key in _EPISODE if key in row} for row in result.get("episodes", ())]
-        others = [
+        baselines = [
             {
-                "name": one["name"],
-                "policy": _without(one["policy"], "checkpoint"),
-                "summary": _without(one["summary"], "by_map"),
+                "name": baseline["name"],
+                "policy": _without(baseline["policy"], "checkpoint"),
+                "summary": _without(baseline["summary"], "by_map"),
             }
-            for one in result.get("baselines", ())
+            for baseline in result.get("baselines", ())
         ]
     except (KeyError, TypeError) as error:
         raise FileFormatError(path, "a result of copolicy-eval", f"none: {error} is missing") from None
     if weights not in digests:
         expected = f"an evaluation of this policy (weights {', '.join(sorted(digest[:12] for digest in digests))})"
         raise FileFormatError(path, expected, f"one of weights {str(weights)[:12]}")
-    kept = {**result, "policy": _without(result["policy"], "checkpoint"), "summary": summary, "episodes": episodes}
-    return {**kept, "baselines": others} if others else kept
+    shortened = {**result, "policy": _without(result["policy"], "checkpoint"), "summary": summary, "episodes": episodes}
+    return {**shortened, "baselines": baselines} if baselines else shortened
 
 
 def _without(table: dict[str, Any], key: str) -> dict[str, Any]:
@@ -105,7 +105,7 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
     folder = LeRobotFolder.open(root)
     info = folder.info
     used = range(info["total_episodes"]) if chosen is None else chosen
-    release = _json(root / _RELEASE) or {}
+    release = _json(root / RELEASE_FILE, "the record of a release") or {}
     return {
         **facts,
         "episodes": info["total_episodes"],
@@ -131,13 +131,6 @@ def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[s
     return dict(counts.most_common())
 
 
-def _json(path: Path) -> dict[str, Any] | None:
-    if not path.is_file():
-        return None
-    try:
-        value = json.loads(path.read_text(encoding="utf-8-sig"))
-    except ValueError as error:
-        raise FileFormatError(path, "JSON", str(error)) from None
-    if not isinstance(value, dict):
-        raise FileFormatError(path, "a JSON object", type(value).__name__)
-    return value
+def _json(path: Path, what: str) -> dict[str, Any] | None:
+    """The object in a JSON file, None where there is no such file."""
+    return read_json(path, dict[str, Any], what) if path.is_file() else None

@@ -98,25 +98,25 @@ def protocol_of(arguments: argparse.Namespace, policies: Iterable[tuple[str, Tra
             "--angular-limit", "a choice, since the policies learned under different physics", limits
         )
     physics = next(iter(worlds.values()), Physics(step_limit=arguments.step_limit))
-    told: list[str] = []
+    contradictions: list[str] = []
     if limit_flag is not None:
         physics = replace(physics, angular_acceleration_limit=limit_flag)
-        told += [
+        contradictions += [
             f"--angular-limit {arguments.angular_limit}: {name} learned with {limit:.4g} rad/s^2"
             for name, limit in ((name, world.angular_acceleration_limit) for name, world in worlds.items())
             if not math.isclose(limit, limit_flag)
         ]
     if fps_flag is not None:
-        told += [
+        contradictions += [
             f"--fps {fps_flag}: {name} learned from {conditions.fps:g} frames a second"
             for name, conditions in named
             if conditions.fps != fps_flag
         ]
-    for line in told:
+    for line in contradictions:
         logging.warning("warning: %s", line)
     fps = fps_flag if fps_flag is not None else next((conditions.fps for _, conditions in named), 10)
     stride(fps)
-    return Protocol(fps, physics, tuple(told))
+    return Protocol(fps, physics, tuple(contradictions))
 
 
 def study_settings(arguments: argparse.Namespace, protocol: Protocol) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""What a co-policy asks of the data that it is about to be trained on, under any trainer that makes it as LeRobot does.
+"""Checks of the training data by the co-policy itself, under any trainer that constructs it as LeRobot does.
 
-`copolicy-train` has asked all this before, for any policy; here it is asked for `lerobot-train` and for loops of one's
-own.
+`copolicy-train` makes the same checks before, for any policy; here they apply to `lerobot-train` and to training loops
+of the user.
 """
 
 import json

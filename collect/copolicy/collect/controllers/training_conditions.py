@@ -1,18 +1,38 @@
 """At which rate, and under which physics, a policy learned: read from its files, without torch."""
 
-import json
 import math
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.json_file import read_json
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.task import Physics
 
 ASSUMED_FPS = 10
 """Frames a second of a policy whose files do not say: our data sets have this rate unless asked for another."""
 
 _FREE = "step_limit"
+
+
+class _Rate(TypedDict, total=False):
+    fps: float | None
+    root: str | None
+
+
+class _Settings(TypedDict, total=False):
+    """`train_config.json` or `recipe.json`, as far as it is read here."""
+
+    dataset: _Rate | None
+
+
+class _Config(TypedDict, total=False):
+    """`config.json`, as far as it is read here."""
+
+    fps: float | None
+    physics: dict[str, Any] | None
+    physics_mixture: dict[str, int] | None
 
 
 @dataclass(frozen=True)
@@ -47,13 +67,13 @@ def training_conditions(folder: Path) -> TrainingConditions:
     Raises:
         FileFormatError: a file cannot be read, or holds no rate or no physics.
     """
-    config = _json(folder / "config.json")
+    config = read_json(folder / "config.json", _Config, "the configuration of a policy")
     notes: list[str] = []
     fps = config.get("fps") or _rate_beside(folder)
     if fps is None:
         fps = ASSUMED_FPS
         notes.append(f"the checkpoint does not say its rate; {fps} frames a second are assumed")
-    if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not (math.isfinite(fps) and fps > 0):
+    if not (math.isfinite(fps) and fps > 0):
         raise FileFormatError(folder / "config.json", "frames a second", repr(fps))
     physics, mixture = config.get("physics"), config.get("physics_mixture") or {}
     unknown = mixture.get("", 0)
@@ -71,9 +91,9 @@ def training_conditions(folder: Path) -> TrainingConditions:
     return TrainingConditions(rate, _physics(folder, physics or {}), tuple(notes))  # pyright: ignore[reportArgumentType]
 
 
-def _physics(folder: Path, settings: Any) -> Physics:
+def _physics(folder: Path, settings: dict[str, Any]) -> Physics:
     path, known = folder / "config.json", {field.name for field in fields(Physics)} - {_FREE}
-    if not isinstance(settings, dict) or not settings.keys() <= known:
+    if not settings.keys() <= known:
         raise FileFormatError(path, f"physics of {', '.join(sorted(known))}", str(settings))
     try:
         return Physics(**{name: float(value) for name, value in settings.items()})  # pyright: ignore[reportArgumentType]
@@ -81,21 +101,15 @@ def _physics(folder: Path, settings: Any) -> Physics:
         raise FileFormatError(path, "physics that can be", str(error)) from None
 
 
-def _rate_beside(folder: Path) -> Any:
-    recipe = folder / "recipe.json"
-    if recipe.is_file() and (fps := (_json(recipe).get("dataset") or {}).get("fps")):
-        return fps
-    training = folder / "train_config.json"
-    root = (_json(training).get("dataset") or {}).get("root") if training.is_file() else None
-    info = Path(root) / "meta" / "info.json" if root else None
-    return _json(info).get("fps") if info is not None and info.is_file() else None
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(path, "a JSON object", type(error).__name__) from None
-    if not isinstance(content, dict):
-        raise FileFormatError(path, "a JSON object", type(content).__name__)
-    return content
+def _rate_beside(folder: Path) -> float | None:
+    for name in ("recipe.json", "train_config.json"):
+        path = folder / name
+        data_set = (
+            (read_json(path, _Settings, "the settings of a training").get("dataset") or {}) if path.is_file() else {}
+        )
+        if fps := data_set.get("fps"):
+            return fps
+        info = Path(data_set.get("root") or "") / INFO_FILE
+        if data_set.get("root") and info.is_file():
+            return read_json(info, _Rate, "LeRobot's data set information").get("fps")
+    return None

@@ -64,8 +64,8 @@ def _export(arguments: argparse.Namespace) -> dict:
     elif arguments.format == "robomimic":
         from .robomimic import Validation, export_robomimic
 
-        asked = arguments.valid, arguments.valid_by or "pairs", arguments.seed or 0
-        validation = None if arguments.valid is None else Validation(*asked)
+        options = arguments.valid, arguments.valid_by or "pairs", arguments.seed or 0
+        validation = None if arguments.valid is None else Validation(*options)
         written = export_robomimic(source, arguments.out, validation)
     else:
         from .minari import export_minari

@@ -5,21 +5,21 @@ any. Numbers, files and times are taken from what it wrote; every other column f
 its type. The content of every episode is then compared with what it was.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.edit.subset.stored_set import write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 from copolicy.dataset.versions.content import Content, read_content
 
 from ..joined_sets import join_data_sets
-from ..lerobot_writer import RECORD_FILE
 from ..mixtures import Mixtures, converter_versions
 from ..shifted_tables import numbered_files, read_table
 from ..stored_rewards import foreign_rewards
@@ -81,7 +81,7 @@ def merge_datasets(
         content = read_content(partial)
         _verify(content, sources, set(LOCAL_NAMES) if prefixes else set())
         record = _record(sources, prefixes)
-        (partial / RECORD_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        write_record(partial, record)
         card = minimal_card({text or "" for text in expected.column("license").to_pylist()})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
     left_behind = {str(source.root): names for source in sources if (names := source.left_behind())}
@@ -157,7 +157,7 @@ def _restore_episodes(root: Path, expected: "pa.Table") -> None:
 
 def _restore_frames(root: Path) -> None:
     """The data files with the types of the feature table, a row group an episode; one file is in memory at a time."""
-    features = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
+    features = read_info(root)["features"]
     features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
     schema = get_hf_features_from_features(features).arrow_schema
     for path in numbered_files(root / "data").values():

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.documents import RECORD_FILE
+from copolicy.dataset.edit.subset.stored_set import stored_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.json_file import read_json
-from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card
 from copolicy.dataset.versions.content import Content, read_content
 from copolicy.dataset.versions.manifest import data_set_files
 
-from ..lerobot_writer import RECORD_FILE
 from ..shifted_tables import numbered_files, read_table
 
 try:
@@ -23,9 +23,8 @@ try:
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-_INFO = Path("meta/info.json")
 _CARRIED = ("data/", "meta/episodes/", "videos/")
-_REWRITTEN = {_INFO.as_posix(), "meta/stats.json", "meta/tasks.parquet", RECORD_FILE.as_posix()}
+_REWRITTEN = {INFO_FILE.as_posix(), STATS_FILE.as_posix(), TASKS_FILE.as_posix(), RECORD_FILE.as_posix()}
 
 
 @dataclass(frozen=True)
@@ -62,9 +61,7 @@ class MergeSource:
         missing = [name for name in EPISODE_COLUMNS if name not in {*episodes.column_names, *LATER_COLUMNS}]
         if missing:
             raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
-        path = root / RECORD_FILE
-        record = read_json(path, dict, "the record of a conversion") if path.is_file() else {}
-        return cls(root, read_info(root), episodes, content, record)
+        return cls(root, read_info(root), episodes, content, stored_record(root))
 
     def left_behind(self) -> list[str]:
         """Files that are about this data set alone and are not carried over: its statistics, releases, card, ..."""
@@ -81,7 +78,7 @@ def require_alike(sources: Sequence[MergeSource]) -> None:
     """
     first, *others = sources
     for other in others:
-        path = other.root / _INFO
+        path = other.root / INFO_FILE
         for name in ("codebase_version", "fps", "robot_type"):
             expected, found = first.info.get(name), other.info.get(name)
             if expected != found:

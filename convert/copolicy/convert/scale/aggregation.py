@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
 
 from ..joined_sets import join_data_sets
 from ..shifted_tables import numbered_files, read_table, write_like
-
-_INFO = Path("meta/info.json")
 
 
 def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) -> dict[str, Any]:
@@ -31,13 +30,13 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
         FileFormatError: a part is not complete. LeRobot would look for it on the Hub.
     """
     for root in roots:
-        for name in ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/episodes", "data"):
+        for name in (INFO_FILE, STATS_FILE, TASKS_FILE, "meta/episodes", "data"):
             if not (root / name).exists():
                 raise FileFormatError(root, f"a complete data set with {name}", "none; delete the shard's folder")
     join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
-    info = json.loads((target / _INFO).read_text(encoding="utf-8"))
-    info["features"] = json.loads((roots[0] / _INFO).read_text(encoding="utf-8"))["features"]
-    (target / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    info = read_info(target)
+    info["features"] = read_info(roots[0])["features"]
+    (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     example = next(iter(numbered_files(roots[0] / "meta" / "episodes").values()))
     for path in numbered_files(target / "meta" / "episodes").values():
         write_like(read_table(path), example, path)

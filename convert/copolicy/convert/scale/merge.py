@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
+from copolicy.dataset.documents import STATISTICS_FILE
+from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 
-from ..lerobot_writer import RECORD_FILE, WrittenDataset
+from ..lerobot_writer import WrittenDataset
 from ..mixtures import Mixtures
 from ..prepare import LeftOut, RepeatedEpisodeError
 from ..shifted_tables import numbered_files, read_table
@@ -91,7 +93,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
     """Writes what is known of the conversion; returns the notes by episode."""
     notes: dict[str, list[str]] = {}
     for part in roots:
-        notes |= json.loads((part / RECORD_FILE).read_text(encoding="utf-8"))["notes"]
+        notes |= stored_record(part)["notes"]
     document = {
         "converter": "copolicy-convert mcap",
         "version": version("lerobot_policy_copolicy"),
@@ -101,12 +103,12 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "hold": plan.conversion.hold,
         "notes": notes,
     }
-    (root / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    write_record(root, document)
     return notes
 
 
 def _write_statistics(root: Path) -> None:
-    from copolicy.dataset.statistics.command import STATISTICS_FILE, write_document
+    from copolicy.dataset.statistics.command import write_document
     from copolicy.dataset.statistics.compute import compute_statistics
     from copolicy.dataset.statistics.reading import read_trajectories
 

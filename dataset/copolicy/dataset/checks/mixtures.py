@@ -1,4 +1,4 @@
-"""Whether unlike episodes stand side by side: of other physics, other obstacles, other software, other sources."""
+"""Whether a data set mixes episodes of different physics, obstacle sizes, software versions or sources."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

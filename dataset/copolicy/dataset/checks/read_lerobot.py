@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow so that a broken file is a finding, not an end."""
+"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow; a damaged file becomes a finding."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
-from ..lerobot_folder.folder import other_task
+from ..lerobot_folder.folder import POSITIONS, other_task
 from ..lerobot_folder.info import INFO_FILE, read_info, require_episodes
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
 from .episode_table import EpisodeTable
@@ -17,8 +17,6 @@ from .finding import Finding
 
 CLOCK = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 """The columns of the frames that LeRobot itself adds."""
-
-_POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 
 
 def read_lerobot(root: Path) -> EpisodeTable:
@@ -75,11 +73,11 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
     """
     path = root / "meta" / "episodes"
     columns: dict[str, np.ndarray] = {}
-    for name in (*_POSITIONS, *EPISODE_COLUMNS):
+    for name in (*POSITIONS, *EPISODE_COLUMNS):
         if name not in meta.column_names:
-            if name in _POSITIONS[:2]:
+            if name in POSITIONS[:2]:
                 raise FileFormatError(path, "a table with episode_index and length", f"none named {name}")
-            if name in _POSITIONS:
+            if name in POSITIONS:
                 message = f"meta/episodes has no column {name}, without which LeRobot loads no episode"
                 damage.append(Finding("", "schema", None, None, "error", message))
             elif name in LATER_COLUMNS:
@@ -90,7 +88,7 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
         try:
             columns[name] = scalars(meta.column(name), kind, unknown)
         except ColumnError as error:
-            if name in _POSITIONS[:2]:
+            if name in POSITIONS[:2]:
                 raise FileFormatError(path, f"{error.expected} of {name}", error.found) from None
             message = f"episode column {name}: expected {error.expected}, found {error.found}"
             damage.append(Finding("", "schema", len(error.rows) or None, 0 if error.rows else None, "error", message))

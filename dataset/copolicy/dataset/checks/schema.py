@@ -6,8 +6,8 @@ from typing import get_args
 import numpy as np
 
 from ..episode import EPISODE_COLUMNS, Source, TerminationReason
-from ..episode_rows import stripped_hint
 from ..features import ACTION, FEATURES, HUMAN_ACTION
+from ..lerobot_folder.info import stripped_hint
 from ..task import RECORD_HZ
 from .episode_table import EpisodeTable
 from .finding import Finding

@@ -1,1 +1,1 @@
-"""Taking out and mending: a selection, parts without leakage, withdrawn consents, amended and restored columns."""
+"""Editing data sets: select, split without leakage, withdraw a consent, amend and restore columns."""

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+from ..documents import RECORD_FILE
 from ..episode import EPISODE_COLUMNS, Source
 from ..episode_rows import episode_tables, with_column, write_tables
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
 from ..licences import checked_licence
 from .selection import Selection
 from .subset.replace_folder import finish_interrupted
-from .subset.stored_set import RECORD_FILE, record_text, stored_record
+from .subset.stored_set import record_text, stored_record
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -125,11 +126,11 @@ def amend(root: Path, settings: Mapping[str, str], selection: Selection | None =
         after = table
         for name, value in settings.items():
             values = [row.get(name) or "" for row in part]
-            for place, row in enumerate(part):
-                if row["episode_index"] in chosen and values[place] != value:
-                    changed[name][values[place]] += 1
+            for index, row in enumerate(part):
+                if row["episode_index"] in chosen and values[index] != value:
+                    changed[name][values[index]] += 1
                     numbers.add(row["episode_index"])
-                    values[place] = value
+                    values[index] = value
             if values != [row.get(name) for row in part]:
                 after = with_column(after, name, values, "str")
         if after is not table:

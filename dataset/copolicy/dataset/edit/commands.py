@@ -55,7 +55,7 @@ def add_withdraw_command(commands: argparse._SubParsersAction) -> None:
     """Adds `withdraw`."""
     parser = add_command(
         commands, "withdraw", _withdraw, "delete every episode of a consent id from recordings and data sets",
-        "copolicy-dataset withdraw C-17 recordings datasets/table        (tells what would be deleted)\n"
+        "copolicy-dataset withdraw C-17 recordings datasets/table        (prints what would be deleted)\n"
         "  copolicy-dataset withdraw C-17 recordings datasets/table --yes",
     )  # fmt: skip
     parser.add_argument("consent", metavar="CONSENT_ID", help="one consent id")

@@ -74,9 +74,9 @@ def _comparison(node: ast.Compare, columns: Mapping[str, str], text: str, flag: 
         if isinstance(comparison, (ast.In, ast.NotIn)):
             kinds, second = _values(right, columns, text, flag)
         else:
-            other, second = _value(right, columns, text, flag)
-            kinds = {other}
-        if not all(_comparable(kind, other) for other in kinds):
+            right_kind, second = _value(right, columns, text, flag)
+            kinds = {right_kind}
+        if not all(_comparable(kind, right_kind) for right_kind in kinds):
             found = f"{kind} compared with {', '.join(sorted(kinds))} in {ast.unparse(node)}"
             raise InvalidValueError(flag, "values of one type in a comparison", found)
         unknown = isinstance(comparison, (ast.NotEq, ast.NotIn))

@@ -87,15 +87,15 @@ def deal(
     """
     dealt: dict[str, list[int]] = {part.name: [] for part in parts}
     rest = _named(rows, together, parts, by, dealt)
-    shares = {part.name: part.proportion for part in parts if part.proportion is not None}
-    if not shares and rest:
+    proportions = {part.name: part.proportion for part in parts if part.proportion is not None}
+    if not proportions and rest:
         left = sum(len(group) for group in rest)
         raise RunError(f"--parts: expected a part for every episode, found {left} in none; add NAME=rest")
     if by == "episodes":
-        _spread(rows, rest, shares, dealt, seed)
+        _spread(rows, rest, proportions, dealt, seed)
     else:
-        _balance(rows, rest, shares, dealt, seed)
-    _fill_empty(dealt, rest, shares)
+        _balance(rows, rest, proportions, dealt, seed)
+    _fill_empty(dealt, rest, proportions)
     empty = [name for name, places in dealt.items() if not places]
     if empty:
         what = {"pairs": "groups of people", "maps": "maps", "episodes": "episodes"}[by]
@@ -124,8 +124,8 @@ def _named(
         unseen -= inside
         wanted = {owner[name]: name for name in sorted(inside) if name in owner}
         if len(wanted) > 1:
-            (one, first), (other, second) = list(wanted.items())[:2]
-            raise RunError(f"--parts: {first} ({one}) and {second} ({other}) share a person or a recording")
+            (part_a, name_a), (part_b, name_b) = list(wanted.items())[:2]
+            raise RunError(f"--parts: {name_a} ({part_a}) and {name_b} ({part_b}) share a person or a recording")
         if wanted:
             dealt[next(iter(wanted))] += group
         else:
@@ -144,7 +144,7 @@ def _names(row: Row, by: By) -> set[str]:
 def _balance(
     rows: Sequence[Row],
     rest: Sequence[Sequence[int]],
-    shares: Mapping[str, float],
+    proportions: Mapping[str, float],
     dealt: dict[str, list[int]],
     seed: int,
 ) -> None:
@@ -156,10 +156,10 @@ def _balance(
         kinds = Counter(_kind(rows[place]) for place in group)
 
         def lack(name: str, kinds: Counter = kinds) -> float:
-            inside = sum(count * (shares[name] - have[name][kind] / totals[kind]) for kind, count in kinds.items())
-            return inside / kinds.total() + shares[name] - have[name].total() / totals.total()
+            inside = sum(count * (proportions[name] - have[name][kind] / totals[kind]) for kind, count in kinds.items())
+            return inside / kinds.total() + proportions[name] - have[name].total() / totals.total()
 
-        best = max(shares, key=lack)
+        best = max(proportions, key=lack)
         have[best].update(kinds)
         dealt[best] += group
 
@@ -167,7 +167,7 @@ def _balance(
 def _spread(
     rows: Sequence[Row],
     rest: Sequence[Sequence[int]],
-    shares: Mapping[str, float],
+    proportions: Mapping[str, float],
     dealt: dict[str, list[int]],
     seed: int,
 ) -> None:
@@ -179,18 +179,18 @@ def _spread(
     have = Counter()
     for number in ordered:
         total = have.total() + len(rest[number])
-        best = max(shares, key=lambda name: shares[name] * total - have[name])
+        best = max(proportions, key=lambda name: proportions[name] * total - have[name])
         have[best] += len(rest[number])
         dealt[best] += rest[number]
 
 
-def _fill_empty(dealt: dict[str, list[int]], rest: Sequence[Sequence[int]], shares: Mapping[str, float]) -> None:
+def _fill_empty(dealt: dict[str, list[int]], rest: Sequence[Sequence[int]], proportions: Mapping[str, float]) -> None:
     """A part that asks for little gets the smallest group of a part that has several."""
-    for name in shares:
+    for name in proportions:
         if dealt[name]:
             continue
-        owned = {other: [group for group in rest if group[0] in set(dealt[other])] for other in shares}
-        donors = [(min(mine, key=len), other) for other, mine in owned.items() if len(mine) > 1]
+        owned = {part: [group for group in rest if group[0] in set(dealt[part])] for part in proportions}
+        donors = [(min(groups, key=len), part) for part, groups in owned.items() if len(groups) > 1]
         if donors:
             group, donor = min(donors, key=lambda entry: len(entry[0]))
             gone = set(group)

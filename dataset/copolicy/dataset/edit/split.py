@@ -108,7 +108,7 @@ def _facts(source: StoredSet, part: Part, numbers: list[int], total: int) -> dic
 
 
 def _shared(parts: dict[str, list[Row]]) -> dict[str, list[str]]:
-    """What is in several parts all the same, and a reader should know of: names by kind."""
+    """Names by kind (pairs, players, consents, maps) that are in more than one part."""
     kinds = {
         "pairs": lambda row: {row.get("pair_id")},
         "players": lambda row: {row.get("player_0_id"), row.get("player_1_id")},

@@ -5,14 +5,16 @@ be run again: files that arrived are not sent twice, a commit that arrived is fo
 missing is done.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..checks.checking import check_dataset
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
 from ..exclusions import excluded_episodes
+from ..json_file import parse_json
+from ..lerobot_folder.info import read_info
 from ..minimal_card import CARD_FILE, is_minimal_card
 from ..repo_id import checked_repo_id
 from ..staging import replace_text
@@ -66,7 +68,7 @@ def publish(
     if not with_excluded:
         _require_none_excluded(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
-    codebase_tag = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))["codebase_version"]
+    codebase_tag = read_info(root)["codebase_version"]
     api = hub_api()
     repository = read_repository(api, repo_id)
     if repository is None:
@@ -125,24 +127,28 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     if minimal or not (root / CARD_FILE).is_file():
         found = "the minimal one of copolicy-convert, which describes nothing" if minimal else "none"
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
-    told, found = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
-    differences = told.differences(found)
-    changed = [line for line in told.differences(found, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)]
+    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
+    differences = released.differences(present)
+    changed = [
+        line for line in released.differences(present, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)
+    ]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"
         raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
     if differences:
-        replace_text(root / MANIFEST_FILE, found.to_text())
-    return record, found
+        replace_text(root / MANIFEST_FILE, present.to_text())
+    return record, present
 
 
 def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:
     tag = record.data_version.tag
     if tag in repository.tags:
         text = read_file(api, repository.repo_id, repository.tags[tag], RELEASE_FILE)
-        there = json.loads(text).get("content_hash") if text else None
-        what = "this content" if there == record.content_hash else f"other content ({there})"
+        name = f"{RELEASE_FILE} of {tag} in {repository.repo_id}"
+        published = parse_json(text, dict[str, Any], "the record of a release", name) if text else {}
+        content_hash = published.get("content_hash")
+        what = "this content" if content_hash == record.content_hash else f"other content ({content_hash})"
         raise RunError(f"{repository.repo_id}: {tag} is on the Hub already, with {what}; nothing was uploaded")
     latest = newest(list(repository.tags))
     if latest is not None and latest > record.data_version:

@@ -1,1 +1,1 @@
-"""Reading LeRobot v3 data set folders. This file imports nothing, so that a command line without one stays quick."""
+"""Reads LeRobot v3 data set folders. This file imports nothing, which keeps the start of other commands fast."""

@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set folder: what every reader of one goes through first."""
+"""A LeRobot v3 data set folder: the first step of every reader."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
-from ..episode_rows import stripped_hint
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files import visible_files
-from .info import INFO_FILE, read_info, require_episodes
+from .info import INFO_FILE, read_info, require_episodes, stripped_hint
 from .tables import column_types, damaged, episode_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
@@ -21,7 +20,7 @@ POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index"
 
 @dataclass(frozen=True)
 class LeRobotFolder:
-    """The metadata of a data set, verified as far as any reader needs it.
+    """The metadata of a data set, checked for types and for consistent episode numbers and lengths.
 
     Attributes:
         info: `meta/info.json`, the types of its entries checked.
@@ -47,14 +46,14 @@ class LeRobotFolder:
         for name in POSITIONS:
             if name in table.column_names:
                 values = episode_values(table, name, "int", path)
-                place = table.column_names.index(name)
-                table = table.set_column(place, name, pa.array(values))
+                position = table.column_names.index(name)
+                table = table.set_column(position, name, pa.array(values))
             elif name in POSITIONS[:2]:
                 raise FileFormatError(path, f"a column {name}", "none")
         table = table.sort_by("episode_index")
         numbers, lengths = (table.column(name).to_numpy() for name in POSITIONS[:2])
         if not np.array_equal(numbers, np.arange(len(numbers))):
-            raise FileFormatError(path, f"episodes 0 to {len(numbers) - 1}, each once", _others(numbers))
+            raise FileFormatError(path, f"episodes 0 to {len(numbers) - 1}, each once", _wrong_numbers(numbers))
         if (lengths < 1).any():
             raise FileFormatError(path, "episodes of at least one frame", f"episode {int(np.argmin(lengths))} of none")
         if lengths.sum(dtype=float) > 2**40:
@@ -151,15 +150,15 @@ def other_task(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) 
     for name in features:
         feature = info["features"].get(name)
         if feature is None:
-            others = ", ".join(name for name in info["features"] if name not in ("timestamp", "frame_index"))
-            return f"one of another task: no feature {name} ({others[:120]})"
+            present = ", ".join(name for name in info["features"] if name not in ("timestamp", "frame_index"))
+            return f"one of another task: no feature {name} ({present[:120]})"
         shape = tuple(FEATURES[name]["shape"])
         if tuple(feature["shape"]) != shape:
             return f"one of another task: {name} of shape {tuple(feature['shape'])} instead of {shape}"
     return ""
 
 
-def _others(numbers: np.ndarray) -> str:
+def _wrong_numbers(numbers: np.ndarray) -> str:
     repeated = numbers[1:][np.diff(numbers) == 0]
     if len(repeated):
         return f"episode {repeated[0]} twice"

@@ -1,6 +1,7 @@
 """`meta/info.json` of a LeRobot v3 data set, and what a folder is that has none."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
@@ -10,6 +11,11 @@ from ..files import visible_files
 from ..json_file import read_json
 
 INFO_FILE = Path("meta/info.json")
+STATS_FILE = Path("meta/stats.json")
+TASKS_FILE = Path("meta/tasks.parquet")
+ROBOT_TYPE = "copolicy_table"
+"""The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
+
 _WHAT = "LeRobot's data set information"
 
 
@@ -76,6 +82,21 @@ def require_episodes(root: Path, info: dict[str, Any]) -> None:
     """
     if info["total_episodes"] == 0 and not visible_files(root / "meta" / "episodes", "*.parquet"):
         raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
+
+
+def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
+    """What to do with a data set of ours whose episode columns are gone; empty for any other one.
+
+    LeRobot's delete and split write meta/episodes without them. What the feature `action` holds stays.
+    """
+    features = info.get("features")
+    action = features.get("action") if isinstance(features, dict) else None
+    if info.get("robot_type") != ROBOT_TYPE and not (isinstance(action, dict) and "hold" in action):
+        return ""
+    return (
+        f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "
+        "back from recordings or an earlier version, and copolicy-dataset select takes episodes out with all columns"
+    )
 
 
 def _other_version(version: str) -> str:

@@ -11,8 +11,8 @@ from ..exceptions import CopolicyError, FileFormatError
 from ..files import visible_files
 from ..json_file import read_json
 from .folder import POSITIONS, LeRobotFolder
+from .info import STATS_FILE, TASKS_FILE
 from .references import (
-    TASKS_FILE,
     data_path,
     read_tasks,
     tasks_are_indexed,
@@ -21,7 +21,6 @@ from .references import (
 )
 from .tables import ColumnError, column_types, episode_values, pa, read_parquet, row_count, scalars, vectors
 
-STATS_FILE = Path("meta/stats.json")
 STATISTICS = ("min", "max", "mean", "std")
 """The statistics of a feature that normalisation may use."""
 
@@ -45,10 +44,10 @@ def require_loadable(root: Path) -> LeRobotFolder:
     """
     folder = LeRobotFolder.open(root)
     info = folder.info
-    for place, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
-        rows = sum(row_count(path) for path in visible_files(root / place, "*.parquet"))
+    for name, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
+        rows = sum(row_count(path) for path in visible_files(root / name, "*.parquet"))
         if rows != expected:
-            raise FileFormatError(root / place, f"{expected} rows, as meta/info.json says", f"{rows}")
+            raise FileFormatError(root / name, f"{expected} rows, as meta/info.json says", f"{rows}")
     for name in POSITIONS:
         episode_values(folder.episodes, name, "int", root / "meta" / "episodes")
     episodes_of_files: dict[str, frozenset[int]] = {}

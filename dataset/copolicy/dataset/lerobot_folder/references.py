@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import FileFormatError
+from .info import TASKS_FILE
 from .tables import column_types, episode_values, pq, read_parquet
 
-TASKS_FILE = Path("meta/tasks.parquet")
 DATA_TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_TEMPLATE = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 _TASK_NAMES = ("task", "__index_level_0__")

@@ -1,4 +1,4 @@
-"""The Parquet tables of a LeRobot data set: columns as arrays, or one sentence on what keeps them from being one."""
+"""The Parquet tables of a LeRobot data set: columns as arrays, with their types checked."""
 
 import math
 from collections.abc import Sequence

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from ..commandline import add_command
+from ..documents import STATISTICS_FILE
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
 from ..staging import replace_text
-
-STATISTICS_FILE = Path("meta/copolicy_stats.json")
-"""Where the statistics lie in a data set."""
 
 
 def add_stats_command(commands: argparse._SubParsersAction) -> None:

@@ -5,15 +5,13 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
+from ..documents import RELEASE_FILE
 from ..exceptions import FileFormatError, UnknownNameError
 from ..files import visible_files
 from ..json_file import read_json
 from .content import Content, ContentFields
 from .data_version import DataVersion
 from .withdrawals import is_anonymous
-
-RELEASE_FILE = "meta/copolicy_release.json"
-"""The newest release."""
 
 EARLIER_FOLDER = "meta/copolicy_releases"
 """The records of the releases before it, `x.y.z.json`."""

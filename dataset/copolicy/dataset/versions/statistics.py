@@ -4,10 +4,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from ..documents import STATISTICS_FILE
 from ..json_file import read_json
-
-STATISTICS_FILE = Path("meta/copolicy_stats.json")
-"""What `copolicy-dataset stats` stores."""
 
 
 def read_statistics(root: Path) -> dict[str, Any] | None:

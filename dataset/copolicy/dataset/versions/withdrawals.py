@@ -9,14 +9,23 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
-from ..exceptions import FileFormatError
+from ..json_file import read_json
 from .content import Content, EpisodeContent
 
 WITHDRAWALS_FILE = Path("meta/copolicy_withdrawals.json")
 _SCHEMA = "copolicy-withdrawals-1"
 _ANONYMOUS = re.compile(r"withdrawn-\d+")
+
+
+class _Withdrawal(TypedDict):
+    date: str
+    episodes: int
+
+
+class _File(TypedDict):
+    withdrawals: list[_Withdrawal]
 
 
 def read_withdrawals(root: Path) -> list[dict[str, Any]]:
@@ -28,12 +37,8 @@ def read_withdrawals(root: Path) -> list[dict[str, Any]]:
     path = root / WITHDRAWALS_FILE
     if not path.is_file():
         return []
-    try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-        entries = [{"date": str(entry["date"]), "episodes": int(entry["episodes"])} for entry in fields["withdrawals"]]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FileFormatError(path, f"a record of withdrawals ({_SCHEMA})", f"{type(error).__name__} {error}") from None
-    return entries
+    entries = read_json(path, _File, f"a record of withdrawals ({_SCHEMA})")["withdrawals"]
+    return [{"date": entry["date"], "episodes": entry["episodes"]} for entry in entries]
 
 
 def withdrawals_text(entries: Iterable[dict[str, Any]]) -> str:

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.json_file import require_type
+from copolicy.dataset.json_file import read_json
 from copolicy.dataset.policy_documents import ComparedDocument
 
-from ..result_file import read_json
 from .paired import Key, Values, episode_key, episode_values
 
 _WHAT = "a result of copolicy-eval coplan or partner"
@@ -43,7 +42,7 @@ class Result:
         Raises:
             FileFormatError: no such file, no result of a study with episodes, or one that repeats an episode.
         """
-        content = require_type(read_json(path, _WHAT), ComparedDocument, _WHAT, path)
+        content = read_json(path, ComparedDocument, _WHAT)
         try:
             study, label, rows = str(content["study"]), str(content["label"]), tuple(content["episodes"])
             settings = {key: one for key, one in content["settings"].items() if key not in _FREE_SETTINGS}

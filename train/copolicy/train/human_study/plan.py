@@ -12,9 +12,9 @@ import numpy as np
 
 from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
+from copolicy.dataset.json_file import read_json
 from copolicy.dataset.task import MapConfig, Physics, identify
 
-from ..result_file import read_json
 from .latin_square import williams_square
 
 _VERSION = 1
@@ -116,7 +116,7 @@ class StudyPlan:
         Raises:
             FileFormatError: no such file, no plan, or one that was changed since it was made.
         """
-        content = read_json(path, _WHAT)
+        content = read_json(path, dict[str, Any], _WHAT)
         try:
             if content["study_plan"] != _VERSION:
                 raise FileFormatError(path, f"{_WHAT}, version {_VERSION}", f"version {content['study_plan']}")

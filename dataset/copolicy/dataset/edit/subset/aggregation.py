@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...exceptions import FileFormatError
+from ...lerobot_folder.info import STATS_FILE
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-STATS_FILE = Path("meta/stats.json")
 _PREFIX = "stats/"
 
 Statistics = dict[str, dict[str, np.ndarray]]

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ...exceptions import FileFormatError
+from ...lerobot_folder.info import INFO_FILE
 
 Place = tuple[int, int]
 """Numbers of a chunk and of a file in it."""
@@ -26,7 +27,7 @@ def file_of(root: Path, info: dict[str, Any], key: str, **numbers: Any) -> Path:
         return root / info[key].format(**numbers)
     except (KeyError, AttributeError, IndexError, TypeError, ValueError):
         found = f"{key} {info.get(key)!r} and {numbers}"
-        raise FileFormatError(root / "meta" / "info.json", "the path of a file for its numbers", found) from None
+        raise FileFormatError(root / INFO_FILE, "the path of a file for its numbers", found) from None
 
 
 def next_place(place: Place | None, info: dict[str, Any]) -> Place:

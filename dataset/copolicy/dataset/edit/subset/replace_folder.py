@@ -22,14 +22,14 @@ def replaced_folder(root: Path) -> Iterator[Path]:
     Between the two renamings the old content lies under a hidden name, from where `finish_interrupted` brings it
     back. The old content is deleted at the end.
     """
-    place = root.resolve()
-    partial = place.parent / f".{place.name}.{secrets.token_hex(4)}.partial"
+    target = root.resolve()
+    partial = target.parent / f".{target.name}.{secrets.token_hex(4)}.partial"
     try:
         yield partial
         sync_tree(partial)
-        place.rename(_before(place))
-        partial.rename(place)
-        sync_folder(place.parent)
+        target.rename(_before(target))
+        partial.rename(target)
+        sync_folder(target.parent)
     except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
         finish_interrupted(root)
@@ -37,7 +37,7 @@ def replaced_folder(root: Path) -> Iterator[Path]:
             # Nobody finds the hidden folder when they read this.
             error.filename = str(error.filename or root).replace(str(partial), str(root))
         raise
-    shutil.rmtree(_before(place))
+    shutil.rmtree(_before(target))
 
 
 def finish_interrupted(root: Path) -> None:

@@ -7,11 +7,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ...documents import ConversionRecord
+from ...documents import RECORD_FILE, ConversionRecord
 from ...episode import EPISODE_COLUMNS
-from ...episode_rows import episode_tables, stripped_hint
+from ...episode_rows import episode_tables
 from ...exceptions import FileFormatError, MissingExtraError
 from ...json_file import read_json
+from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, stripped_hint
 from ...lerobot_folder.loading import require_loadable
 from ...minimal_card import CARD_FILE, is_minimal_card
 from ...versions.content import Content, read_content
@@ -22,12 +23,9 @@ try:
 except ModuleNotFoundError:
     raise MissingExtraError("pyarrow") from None
 
-RECORD_FILE = Path("meta/copolicy.json")
-"""How the data set was made: converter, versions, notes by episode; and what was done to it since."""
-
 _ELSEWHERE = ("data/", "meta/", "videos/", "stats/")  # columns of meta/episodes that say where an episode lies
 _PLACES = ("episode_index", "length", "dataset_from_index", "dataset_to_index", "data/chunk_index", "data/file_index")
-_WRITTEN = {"meta/info.json", "meta/stats.json", "meta/tasks.parquet", RECORD_FILE.as_posix()}
+_WRITTEN = {path.as_posix() for path in (INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE)}
 _WRITTEN_FOLDERS = ("data/", "meta/episodes/", "videos/")
 _LICENCES = ("LICENSE", "LICENCE", "COPYING", "NOTICE")
 
@@ -111,10 +109,10 @@ class StoredSet:
 def without_episodes(record: Mapping[str, Any], uuids: Iterable[str]) -> dict[str, Any]:
     """The record of a conversion without the notes on some episodes."""
     gone = set(uuids)
-    kept = {**record}
+    shortened = {**record}
     if isinstance(record.get("notes"), dict):
-        kept["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in gone}
-    return kept
+        shortened["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in gone}
+    return shortened
 
 
 def write_record(folder: Path, record: Mapping[str, Any]) -> None:

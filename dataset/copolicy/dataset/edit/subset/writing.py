@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...exceptions import FileFormatError, MissingExtraError, RunError
+from ...lerobot_folder.info import INFO_FILE, TASKS_FILE
+from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE
+from ...lerobot_folder.tables import read_parquet
 from ...minimal_card import CARD_FILE, minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
@@ -24,10 +27,7 @@ except ModuleNotFoundError:
 
 _DATA_MB = 100  # LeRobot's size of a data file, where meta/info.json does not say
 _FIXED = ("count", "std")  # statistics that do not move with the values
-_PATHS = {
-    "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-    "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
-}
+_PATHS = {"data_path": DATA_TEMPLATE, "video_path": VIDEO_TEMPLATE}
 
 
 def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits: Mapping[str, str]) -> str:
@@ -65,13 +65,13 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     path.parent.mkdir(parents=True)
     pq.write_table(_plain(rows), path, compression="snappy", use_dictionary=True)
     write_statistics(aggregated_statistics(rows), folder)
-    shutil.copyfile(source.root / "meta" / "tasks.parquet", folder / "meta" / "tasks.parquet")
+    shutil.copyfile(source.root / TASKS_FILE, folder / TASKS_FILE)
     for name in source.licences():
         shutil.copyfile(source.root / name, folder / name)
     paths = {name: path for name, path in _PATHS.items() if source.info.get(name)}
     totals = {"total_episodes": len(numbers), "total_frames": int(lengths.sum()), "splits": dict(splits)}
     info = {**source.info, **paths, **totals}
-    (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    (folder / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     (folder / CARD_FILE).write_text(
         minimal_card({source.rows[number]["license"] or "" for number in numbers}), encoding="utf-8"
     )
@@ -147,8 +147,7 @@ def _frames(source: StoredSet, numbers: Sequence[int]) -> "Iterator[pa.Table]":
 def _read(path: Path, number: int) -> "tuple[pa.Table, np.ndarray]":
     if not path.is_file():
         raise FileFormatError(path, f"the frames of episode {number}", "no file")
-    with pq.ParquetFile(path) as file:
-        table = file.read()
+    table = read_parquet(path)
     return table, table.column("episode_index").to_numpy()
 
 

@@ -8,18 +8,20 @@ from pathlib import Path
 from typing import Any
 
 from ...checks.stored_check import CHECK_FILE
+from ...documents import RECORD_FILE, RELEASE_FILE, STATISTICS_FILE
 from ...exceptions import CopolicyError
 from ...hub.raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
+from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE
+from ...minimal_card import CARD_FILE
 from ...staging import sync_folder
 from ...versions.changelog import CHANGELOG_FILE
 from ...versions.content import EpisodeContent
 from ...versions.manifest import MANIFEST_FILE, Manifest
-from ...versions.release_record import EARLIER_FOLDER, RELEASE_FILE, ReleaseRecord
-from ...versions.statistics import STATISTICS_FILE
+from ...versions.release_record import EARLIER_FOLDER, ReleaseRecord
 from ...versions.withdrawals import WITHDRAWALS_FILE, anonymised, read_withdrawals, withdrawals_text
 from ..amend import today
 from ..subset.replace_folder import is_unfinished, replaced_folder
-from ..subset.stored_set import RECORD_FILE, StoredSet, without_episodes, write_record
+from ..subset.stored_set import StoredSet, without_episodes, write_record
 from ..subset.writing import kept_splits, write_subset
 from .traces import Traces
 
@@ -27,7 +29,7 @@ PEOPLE = ("pair_id", "player_0_id", "player_1_id", "session_id")
 """The episode columns whose pseudonyms go where nobody else has them."""
 
 MADE_ANEW = {
-    "README.md": "copolicy-cards dataset",
+    CARD_FILE: "copolicy-cards dataset",
     "figures": "copolicy-cards dataset",
     "meta/croissant.json": "copolicy-cards dataset --croissant",
     "report.html": "copolicy-cards report",
@@ -37,8 +39,9 @@ MADE_ANEW = {
 }
 """Files that count, draw or name every episode, and the command that makes each anew."""
 
-_REWRITTEN = {"data", "videos", "images", ".cache", "meta/episodes", "meta/info.json", "meta/stats.json",
-              "meta/tasks.parquet", RECORD_FILE.as_posix(), WITHDRAWALS_FILE.as_posix()}  # fmt: skip
+_REWRITTEN = {"data", "videos", "images", ".cache", "meta/episodes"} | {
+    path.as_posix() for path in (INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE, WITHDRAWALS_FILE)
+}
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ _LARGEST = 64 << 20
 
 @dataclass(frozen=True)
 class Traces:
-    """What must not be found any more.
+    """Names that may not remain after a withdrawal.
 
     Attributes:
         names: the consent id, `episode_uuid`s, digests of recordings, and pseudonyms that nobody else has.

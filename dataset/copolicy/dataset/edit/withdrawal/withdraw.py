@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...episode_rows import episode_tables, read_info, stripped_hint
+from ...episode_rows import episode_tables
 from ...exceptions import FileFormatError, InvalidValueError, RunError
+from ...json_file import read_json
+from ...lerobot_folder.info import INFO_FILE, stripped_hint
 from ..selection import consents_of
 from ..subset.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
 from ..subset.stored_set import StoredSet
@@ -188,12 +190,21 @@ def _read_below(paths: Sequence[Path]) -> _Below:
             known.add(item.resolve())
             if not item.is_dir():
                 below.recordings[item] = read_recording(item)
-            elif (info := read_info(item)) and not stripped_hint(info, item):
+            elif _is_foreign(item):
                 below.foreign.append(item)
             else:
                 tables = episode_tables(item, ("episode_index", "episode_uuid", "consent_id"))
                 below.sets[item] = [row for table in tables.values() for row in _columns(table).to_pylist()]
     return below
+
+
+def _is_foreign(root: Path) -> bool:
+    """Whether a data set is another project's. One whose information cannot be read may be ours."""
+    try:
+        info = read_json(root / INFO_FILE, dict[str, Any], "LeRobot's data set information")
+    except FileFormatError:
+        return False
+    return bool(info) and not stripped_hint(info, root)
 
 
 def _columns(table: Any) -> Any:
@@ -228,7 +239,7 @@ def _walk(path: Path, unfinished: list[Path]) -> Iterator[Path]:
         entered.add((status.st_dev, status.st_ino))
         unfinished += [Path(folder, name) for name in folders if is_unfinished(name)]
         folders[:] = [name for name in folders if not is_unfinished(name)]
-        if (Path(folder) / "meta" / "info.json").is_file():
+        if (Path(folder) / INFO_FILE).is_file():
             yield Path(folder)
             folders[:] = [name for name in folders if name == "raw"]
         else:
