@@ -176,7 +176,8 @@ def harmless(damage: Damage) -> bool:
         unnamed = damage.field.endswith(".names") and not damage.field.startswith(("features.action", "features.obs"))
         return unnamed or damage.field.endswith(_FREE_ENTRIES) or (damage.field, damage.kind) in _FREE_INFO
     if damage.file == "meta/stats.json":
-        return any(f".{quantile}" in damage.field for quantile in ("q01", "q10", "q50", "q90", "q99"))
+        # Other numbers than those of the frames are a warning, unless they are far off.
+        return any(f".{name}" in damage.field for name in _QUANTILES) or damage.kind in ("-1", "1.5", "true")
     if damage.file.startswith("meta/episodes"):
         if damage.field.startswith(("stats/", "meta/episodes/")):
             return True
@@ -185,6 +186,7 @@ def harmless(damage: Damage) -> bool:
     return damage.file.startswith("meta/copolicy")
 
 
+_QUANTILES = ("q01", "q10", "q50", "q90", "q99")
 _MEASURED = ("achieved_hz", "replay_drift_px")
 _FREE_COLUMNS = (*_MEASURED, "seed", "late_ticks")
 _FREE_ENTRIES = (".hold", ".record_hz", "robot_type", "video_path", "video_files_size_in_mb", "data_files_size_in_mb")

@@ -15,7 +15,7 @@ from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 
 EVERY = 211
-"""Of some eleven thousand damages, each so-and-so-manieth; a prime, so that all kinds come up."""
+"""One damage of so many is tried, of some eleven thousand; a prime, so that all kinds come up."""
 
 
 @pytest.fixture(scope="module")

@@ -95,7 +95,7 @@ def test_a_column_of_nulls_gets_its_type_back(root):
         (["licence=mit"], UnknownNameError, "unknown episode column 'licence'; available: consent_id"),
         (["license"], InvalidValueError, "NAME=VALUE"),
         (["license=mit", "license=x"], InvalidValueError, "each name once"),
-        (["license=CC BY 4.0"], InvalidValueError, "--set license: expected a"),
+        (["license=CC BY 4.0"], InvalidValueError, "--set license: expected cc-by-4.0, as the Hub spells it"),
         (["pair_id=Anna Smith"], InvalidValueError, "--set pair_id: expected up to 64 letters.*no name of a person"),
         (["consent_id=C-1,,C-2"], InvalidValueError, "--set consent_id"),
         (["source=robot"], InvalidValueError, "one of human, simulated, upstream"),

@@ -18,6 +18,7 @@ from copolicy.dataset.edit.selection import Selection
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.exclusions import exclude
 from copolicy.dataset.features import ACTION
+from copolicy.dataset.minimal_card import is_minimal_card
 from copolicy.dataset.versions.content import read_content
 
 VIDEO = ("--no-drift", "--video", "--video-size", "160x80")
@@ -204,7 +205,7 @@ def test_record_extra_keys_splits_and_licences_come_along(root, tmp_path):
     assert note["asked"] == {"episodes": ["0-1", "4", "6"]}
     assert note["from"] == {"name": "set", "content_hash": read_content(root).hash, "episodes": 8}
     assert summary["not_carried"] == ["README.md", "raw/"]
-    assert not (tmp_path / "new" / "README.md").exists()
+    assert is_minimal_card(tmp_path / "new" / "README.md")
 
 
 @pytest.mark.parametrize(
@@ -234,7 +235,7 @@ def test_an_output_that_exists_and_a_set_without_columns(root, tmp_path, capsys)
     assert main(["select", str(root), "--out", str(tmp_path / "new"), "--episodes", "0"]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert main(["select", str(tmp_path / "none"), "--out", str(tmp_path / "b"), "--episodes", "0"]) == 2
-    assert "expected the folder of a LeRobot data set, found none" in capsys.readouterr().err
+    assert "expected a LeRobot v3 data set with meta/info.json, found nothing there" in capsys.readouterr().err
 
 
 def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):

@@ -124,6 +124,8 @@ def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, 
     try:
         yield
     except OSError as error:
+        if error.errno is None and type(error) is not OSError:
+            raise  # of a network library, with a text of its own
         if error.errno is None:
             # Of h5py or pyarrow: a path beside a text without a number would take the place of the text.
             error.errno, error.strerror = refusal(error) or errno.EIO, " ".join(str(error).split())

@@ -18,7 +18,12 @@ class Limit:
 
 LIMITS: dict[str, Limit] = {
     "timestamp": Limit(1e-4, "s", "LeRobot's own tolerance between a timestamp and its frame"),
-    "frame_statistics": Limit(1e-3, "1", "sums over millions of frames in single precision; LeRobot joins parts"),
+    "frame_statistics.warning": Limit(
+        1e-3, "of the column's range", "sums over millions of frames in single precision; LeRobot joins parts"
+    ),
+    "frame_statistics.error": Limit(
+        0.05, "of the column's range", "a policy normalises by other numbers than its inputs have"
+    ),
     "duration": Limit(1.0, "frames", "the last frame may hold fewer steps than the others"),
     "jump": Limit(
         52.0, "px/s", "terminal speed of an axis under two full forces is 50 px/s; 4 % for other integrators"

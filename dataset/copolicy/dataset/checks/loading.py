@@ -1,13 +1,14 @@
 """Whether LeRobot can load any single episode: files that the metadata name, tasks, statistics of the frames."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..exceptions import CopolicyError
 from ..features import FEATURES
 from .episode_table import EpisodeTable
-from .finding import Finding
+from .finding import Finding, Severity
 from .limits import limit
 from .rule import Rule
 
@@ -29,7 +30,7 @@ def _tasks(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _statistics(table: EpisodeTable) -> Iterator[Finding]:
-    from ..lerobot_folder.loading import STATISTICS, numbers, read_statistics, statistics_problems
+    from ..lerobot_folder.loading import read_statistics, statistics_problems
 
     problems = list(statistics_problems(table.root, table.info))
     for problem in problems:
@@ -40,24 +41,30 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
         stored = read_statistics(table.root)
     except CopolicyError:
         return
-    bound = limit("frame_statistics")
     # LeRobot's merge leaves those of the running numbers (index, episode_index) as they were in the parts.
     for name, values in ((name, values) for name, values in table.frames.items() if name in FEATURES):
         rows = values.reshape(table.frame_count, -1).astype(float)
-        if name not in stored or not np.isfinite(rows).all():
-            continue  # said by `finite`
-        figures = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
-        scale = 1 + np.abs(rows).max()
-        for kind in STATISTICS:
-            off = float(np.abs(numbers(stored[name][kind], None) - figures[kind]).max() / scale)
-            if not off <= bound:
-                message = f"the {kind} of {name} in meta/stats.json is not that of the frames, relative to their size"
-                yield Finding("", "frame_statistics", off, bound, "error", message)
-                break
-        count = int(np.asarray(stored[name]["count"]).reshape(-1)[0])
-        if count != len(rows):
-            message = f"the count of {name} in meta/stats.json is not that of the frames"
-            yield Finding("", "frame_statistics", count, len(rows), "error", message)
+        if name in stored and np.isfinite(rows).all():  # else said by `finite`
+            yield from _against_frames(name, stored[name], rows)
+
+
+def _against_frames(name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
+    from ..lerobot_folder.loading import STATISTICS, numbers
+
+    warning, error = limit("frame_statistics.warning"), limit("frame_statistics.error")
+    figures = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
+    scale = 1 + np.abs(rows).max(axis=0)
+    off = {kind: float((np.abs(numbers(stored[kind], None) - figures[kind]) / scale).max()) for kind in STATISTICS}
+    kind = max(off, key=lambda kind: off[kind])
+    if not off[kind] <= warning:
+        severity: Severity = "error" if not off[kind] <= error else "warning"
+        bound = error if severity == "error" else warning
+        message = f"the {kind} of {name} in meta/stats.json is not that of the frames, relative to their range"
+        yield Finding("", "frame_statistics", off[kind], bound, severity, message)
+    count = int(np.asarray(stored["count"]).reshape(-1)[0])
+    if count != len(rows):
+        message = f"the count of {name} in meta/stats.json is not that of the frames"
+        yield Finding("", "frame_statistics", count, len(rows), "warning", message)
 
 
 RULES = (

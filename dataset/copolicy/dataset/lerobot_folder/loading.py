@@ -36,8 +36,11 @@ class Problem(NamedTuple):
     message: str
 
 
-def require_loadable(root: Path) -> LeRobotFolder:
+def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolder:
     """Checks that LeRobot can load every episode of a data set, whatever its task.
+
+    Args:
+        finite_statistics: refuse `meta/stats.json` with NaN, which an episode that is not used may have caused.
 
     Raises:
         FileFormatError: it cannot; the line names the first reason.
@@ -69,7 +72,7 @@ def require_loadable(root: Path) -> LeRobotFolder:
     for problems in (
         file_problems(root, info, rows, episodes_of_files),
         task_problems(root, info, rows, task_numbers),
-        statistics_problems(root, info),
+        statistics_problems(root, info, finite_statistics),
         episode_statistics_problems(root),
     ):
         for problem in problems:
@@ -138,8 +141,12 @@ def task_problems(
             yield Problem(row["episode_index"], f"meta/episodes names no task of the data set: {str(named)[:80]}")
 
 
-def statistics_problems(root: Path, info: Mapping[str, Any]) -> Iterator[Problem]:
-    """What is wrong with the form of `meta/stats.json`."""
+def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True) -> Iterator[Problem]:
+    """What is wrong with the form of `meta/stats.json`.
+
+    Args:
+        finite: NaN, infinite and empty numbers are wrong, too.
+    """
     name = STATS_FILE.as_posix()
     try:
         stored = read_statistics(root)
@@ -155,7 +162,7 @@ def statistics_problems(root: Path, info: Mapping[str, Any]) -> Iterator[Problem
         # Pictures have one figure a channel.
         width = None if feature["dtype"] in ("video", "image") else math.prod(feature["shape"])
         for kind in dict.fromkeys((*STATISTICS, "count", *stored[key])):
-            if numbers(stored[key].get(kind), 1 if kind == "count" else width) is None:
+            if numbers(stored[key].get(kind), 1 if kind == "count" else width, finite) is None:
                 yield Problem(None, f"{name} has no usable {kind} of {key}")
                 break
 
@@ -181,15 +188,15 @@ def read_statistics(root: Path) -> dict[str, dict[str, Any]]:
     return read_json(root / STATS_FILE, dict[str, dict[str, Any]], "statistics of the frames")
 
 
-def numbers(value: Any, width: int | None) -> np.ndarray | None:
-    """Finite numbers, `width` of them where that is given; None for anything else."""
+def numbers(value: Any, width: int | None, finite: bool = True) -> np.ndarray | None:
+    """Numbers, finite ones by default, `width` of them where that is given; None for anything else."""
     if isinstance(value, str | bool) or value is None:
         return None
     try:
         array = np.asarray(value, float).reshape(-1)
     except (TypeError, ValueError):
         return None
-    if not array.size or not np.isfinite(array).all() or (width is not None and array.size != width):
+    if not array.size or (finite and not np.isfinite(array).all()) or (width is not None and array.size != width):
         return None
     return array
 
