@@ -142,6 +142,13 @@ class TrainingDocument(TypedDict):
     optimizer: NotRequired[dict[str, Any] | None]
 
 
+class ReachedStep(TypedDict):
+    """LeRobot's `training_step.json` beside a checkpoint."""
+
+    step: NotRequired[int]
+    num_processes: NotRequired[int]
+
+
 class PolicyConfigDocument(TypedDict):
     """What cards read of `config.json`."""
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.json_file import read_json
+from copolicy.dataset.lerobot_folder.info import is_ours
 from copolicy.dataset.policy_documents import TrainingDocument
 
 from .local_dataset import training_episodes
@@ -51,14 +52,9 @@ def require_episode_columns(meta: Any, named: bool) -> None:
 
 
 def _is_ours(meta: Any) -> bool:
-    """A conversion of ours left a mark that LeRobot's tools keep."""
-    action = meta.features.get("action") or {}
-    return (
-        str(meta.robot_type or "").startswith("copolicy")
-        or "record_hz" in action
-        or "hold" in action
-        or any((Path(meta.root) / "meta").glob("copolicy*.json"))
-    )
+    """A conversion of ours left a mark that LeRobot's tools keep, or a document that they do not touch."""
+    marked = is_ours({"robot_type": meta.robot_type, "features": dict(meta.features)})
+    return marked or any((Path(meta.root) / "meta").glob("copolicy*.json"))
 
 
 def chosen_episodes(meta: Any, asked: Sequence[int] | None) -> list[int]:

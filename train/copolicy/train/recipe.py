@@ -13,6 +13,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.json_file import read_json
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
+from copolicy.dataset.policy_documents import ReachedStep, TrainingDocument
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -44,14 +45,14 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     recipe: dict[str, Any] = {
         "weights": {"exported_from": weights_sha256, "averaged": averaged, "dtype": "float32"},
     }
-    training = _json(folder / "train_config.json", "the settings of a training")
+    training = _json(folder / "train_config.json", "the settings of a training", TrainingDocument)
     if training:
-        reached = _json(folder.parent / "training_state" / "training_step.json", "the step of a training") or {}
+        reached = _json(folder.parent / "training_state" / "training_step.json", "a training's step", ReachedStep) or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},
             "steps": steps,
-            "samples": steps * training["batch_size"] * processes,
+            "samples": steps * training["batch_size"] * processes if steps and training.get("batch_size") else None,
             "optimizer": training.get("optimizer"),
             "scheduler": training.get("scheduler"),
         }
@@ -131,6 +132,6 @@ def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[s
     return dict(counts.most_common())
 
 
-def _json(path: Path, what: str) -> dict[str, Any] | None:
+def _json(path: Path, what: str, kind: Any = dict[str, Any]) -> dict[str, Any] | None:
     """The object in a JSON file, None where there is no such file."""
-    return read_json(path, dict[str, Any], what) if path.is_file() else None
+    return read_json(path, kind, what) if path.is_file() else None

@@ -16,6 +16,7 @@ TASKS_FILE = Path("meta/tasks.parquet")
 ROBOT_TYPE = "copolicy_table"
 """The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
 
+_OURS = "copolicy"  # begins the robot types of our data sets
 _WHAT = "LeRobot's data set information"
 
 
@@ -84,14 +85,20 @@ def require_episodes(root: Path, info: dict[str, Any]) -> None:
         raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
 
 
+def is_ours(info: Mapping[str, Any]) -> bool:
+    """Whether `copolicy-convert` wrote a data set, by the marks in `meta/info.json` that LeRobot's tools keep."""
+    features = info.get("features")
+    action = features.get("action") if isinstance(features, dict) else None
+    marked = isinstance(action, dict) and ("hold" in action or "record_hz" in action)
+    return marked or str(info.get("robot_type") or "").startswith(_OURS)
+
+
 def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
     """What to do with a data set of ours whose episode columns are gone; empty for any other one.
 
-    LeRobot's delete and split write meta/episodes without them. What the feature `action` holds stays.
+    LeRobot's delete and split write meta/episodes without them.
     """
-    features = info.get("features")
-    action = features.get("action") if isinstance(features, dict) else None
-    if info.get("robot_type") != ROBOT_TYPE and not (isinstance(action, dict) and "hold" in action):
+    if not is_ours(info):
         return ""
     return (
         f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "
