@@ -1,8 +1,10 @@
+import errno
+
 import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.staging import new_file, new_folder
+from copolicy.dataset.staging import about, new_file, new_folder, replacement
 
 
 def names(folder):
@@ -84,3 +86,31 @@ def test_so_is_a_single_file(tmp_path, monkeypatch):
     with new_file(tmp_path / "one") as partial:
         partial.write_text("x", encoding="utf-8")
     assert order == [*inodes(tmp_path / "one"), tmp_path / "one", *inodes(tmp_path)]
+
+
+class FixedNameError(OSError):
+    """As PyAV's errors: the name of the file cannot be changed."""
+
+    filename = property(lambda self: self.name)  # pyright: ignore[reportAssignmentType]
+
+    def __init__(self, name: str):
+        super().__init__(errno.ENOSPC, "No space left on device")
+        self.name = name
+
+
+def test_an_error_that_keeps_its_name_is_raised_anew_with_the_known_one(tmp_path):
+    with (
+        pytest.raises(OSError, match=r"No space left on device") as caught,
+        replacement(tmp_path / "film.mp4") as partial,
+    ):
+        raise FixedNameError(str(partial))
+    assert caught.value.filename == str(tmp_path / "film.mp4")
+
+
+def test_an_error_of_a_network_library_keeps_its_words(tmp_path):
+    class RemoteError(OSError):
+        pass
+
+    with pytest.raises(RemoteError) as caught, about(tmp_path / "run"):
+        raise RemoteError("404 Client Error")
+    assert (caught.value.errno, caught.value.filename) == (None, None)

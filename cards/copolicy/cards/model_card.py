@@ -127,7 +127,9 @@ def _configuration(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]
     # Said otherwise below, or of no consequence.
     skipped = ({"ema"} if averaged else set()) | ({"n_heads"} if checkpoint.config.get("network") == "mlp" else set())
     rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config.keys() - skipped]
-    training = [(f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if key in checkpoint.training]
+    training = [
+        (f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if checkpoint.training.get(key) is not None
+    ]
     optimizer = checkpoint.training.get("optimizer") or {}
     training += [(f"optimizer `{key}`", optimizer[key]) for key in ("type", "lr", "weight_decay") if key in optimizer]
     sizes = {evaluation["policy"].get("parameters") for evaluation in evaluations} - {None}

@@ -129,11 +129,18 @@ def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, 
         if error.errno is None:
             # Of h5py or pyarrow: a path beside a text without a number would take the place of the text.
             error.errno, error.strerror = refusal(error) or errno.EIO, " ".join(str(error).split())
+        name = error.filename
         for hidden, known in places.items():
-            if isinstance(error.filename, (str, os.PathLike)) and Path(error.filename).is_relative_to(hidden):
-                error.filename = str(known / Path(error.filename).relative_to(hidden))
-        if error.filename is None and path is not None:
-            error.filename = str(path)
+            if isinstance(name, (str, os.PathLike)) and Path(name).is_relative_to(hidden):
+                name = str(known / Path(name).relative_to(hidden))
+        if name is None and path is not None:
+            name = str(path)
+        if name == error.filename:
+            raise
+        try:
+            error.filename = name
+        except AttributeError:  # of PyAV, whose errors keep the name that they were made with
+            raise OSError(error.errno, error.strerror, name) from error
         raise
     except Exception as error:
         number = refusal(error)
