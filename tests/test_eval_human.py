@@ -198,7 +198,7 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
 
 def test_only_the_chosen_robot_plans():
     class One:
-        name, actions_per_plan, fps = "one", 8, 10.0
+        name, actions_per_plan, fps = "one", 8, 10
 
         def __init__(self, value, frames):
             self.value, self.frames = value, frames

@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, FRAMES, make_data_set, set_columns, set_frames
-from copolicy.convert.zarr_array import read_zarr_array
 from loaded_sets import load
 
 from copolicy.cards.cli import main as cards
@@ -24,6 +23,7 @@ from copolicy.collect.simulate import simulate
 from copolicy.collect.world import TableWorld
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
+from copolicy.convert.zarr_store import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.features import theta_of
@@ -205,7 +205,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(made, tmp_path):
     attributes = json.loads((tmp_path / "a.zarr/.zattrs").read_text(encoding="utf-8"))
     assert attributes["physics"] == counts
     assert [json.loads(row["physics"]) for row in attributes["episodes"]] == [asdict(EIGHTH)] * 2 + [asdict(HALF)] * 3
-    obs, ends = (read_zarr_array(tmp_path / "b.zarr" / name) for name in ("data/obs", "meta/episode_ends"))
+    obs, ends = (ZarrArrays(tmp_path / "b.zarr", name).read(name) for name in ("data/obs", "meta/episode_ends"))
     start = 0
     for episode, end in zip(source.episodes(), ends, strict=True):
         state, action = episode.states[0].astype(float), episode.actions[0].astype(float)

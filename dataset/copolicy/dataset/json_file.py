@@ -35,13 +35,13 @@ def read_json[T](path: Path, kind: type[T], what: str) -> T:
     except OSError as error:
         raise FileFormatError(path, what, error.strerror or str(error)) from None
     except UnicodeDecodeError as error:
-        kind = kind_of(path)
-        found = f"no text in UTF-8 (byte {error.start})" if kind in ("a JSON file", "a text file") else kind
+        file_kind = kind_of(path)
+        found = f"no text in UTF-8 (byte {error.start})" if file_kind in ("a JSON file", "a text file") else file_kind
         raise FileFormatError(path, what, found) from None
     return parse_json(text, kind, what, path)
 
 
-def parse_json[T](text: str, kind: type[T], what: str, path: Path | str) -> T:
+def parse_json[T](text: str | bytes, kind: type[T], what: str, path: Path | str) -> T:
     """The value in a JSON text, see `read_json`.
 
     Args:
