@@ -113,7 +113,7 @@ def test_damage_is_one_line(folder, tmp_path, capsys):
     (path,) = (folder / "data").glob("*/*.parquet")
     table = parquet.read_table(path)
     parquet.write_table(table.slice(0, 100), path)
-    with pytest.raises(FileFormatError, match="expected 4800 frames, each once, found 100"):
+    with pytest.raises(FileFormatError, match=r"expected 4800 frames with index 0, 1, \.\.\., each once, found 100"):
         read_trajectories(folder)
     parquet.write_table(table.drop_columns(["action"]), path)
     with pytest.raises(FileFormatError, match="expected the columns of copolicy, found none named action"):
