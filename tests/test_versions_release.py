@@ -224,7 +224,9 @@ def test_a_record_that_contradicts_itself_is_refused(released):
     with pytest.raises(FileFormatError, match=r"found a content hash that is not that of the episodes"):
         ReleaseRecord.read(path)
     path.write_text("{", encoding="utf-8")
-    with pytest.raises(FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found no JSON"):
+    with pytest.raises(
+        FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found no JSON"
+    ):
         read_release(released)
 
 
