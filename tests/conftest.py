@@ -3,6 +3,7 @@
 Fixtures import their builders when they are asked for: torch, LeRobot and Playwright take seconds.
 """
 
+import logging
 import os
 import shutil
 from pathlib import Path
@@ -45,6 +46,17 @@ def _private_home(tmp_path_factory):
     home = tmp_path_factory.mktemp("home")
     os.environ["HF_HOME"] = str(home / "huggingface")
     os.environ["HF_LEROBOT_HOME"] = str(home / "lerobot")
+
+
+@pytest.fixture(autouse=True)
+def _logging_as_found():
+    """LeRobot's training opens the root logger for the whole process, here or in a fixture of a wider scope."""
+    root = logging.getLogger()
+    root.setLevel(logging.WARNING)
+    handlers = list(root.handlers)
+    yield
+    for handler in set(root.handlers) - set(handlers):
+        root.removeHandler(handler)
 
 
 @pytest.fixture(scope="session")
