@@ -187,8 +187,8 @@ def harmless(damage: Damage) -> bool:
 
 
 _QUANTILES = ("q01", "q10", "q50", "q90", "q99")
-_MEASURED = ("achieved_hz", "replay_drift_px")
-_FREE_COLUMNS = (*_MEASURED, "seed", "late_ticks")
+_MEASURED = ("achieved_hz", "replay_drift_px", "obstacle_size")
+_FREE_COLUMNS = ("achieved_hz", "replay_drift_px", "seed", "late_ticks")
 _FREE_ENTRIES = (".hold", ".record_hz", "robot_type", "video_path", "video_files_size_in_mb", "data_files_size_in_mb")
 _FREE_INFO = {
     *((name, "missing") for name in ("chunks_size", "data_path", "splits", "splits.train")),

@@ -4,6 +4,8 @@
 
 prints, for each command, how many damages ended in a traceback, how many passed although something that the command
 uses was wrong, and how many were right: refused in one line, found, or harmless. `--every N` takes each N-th damage.
+`unlike check` counts those that passed where `check` finds an error: right only where the command does not use what
+was damaged, which `--verbose` lets a reader judge.
 """
 
 import argparse
@@ -22,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from damaged_sets import Damage, copy_of, damages, harmless
 
 Run = Callable[[list[str]], int]
+_PRINTED = ("traceback", "passed wrongly", "several lines", "unlike check")
 
 
 def commands(root: Path, scratch: Path, sound: Path, before: bool) -> Iterator[tuple[str, Run, list[str]]]:
@@ -112,6 +115,7 @@ def main() -> None:
         chosen = [one for one in damages(sound) if arguments.match in str(one)][arguments.start :: arguments.every]
         print(f"{len(chosen)} damages", flush=True)
         for damage in chosen:
+            refused_by_check = False
             for name, run, flags in list(
                 commands(scratch / "damaged", scratch / "out", scratch / "other", arguments.before)
             ):
@@ -126,13 +130,16 @@ def main() -> None:
                     result = "passed wrongly"
                 elif result == "refused" and len(printed.strip().splitlines()) > 1:
                     result = "several lines"
+                refused_by_check |= name == "check" and result == "refused"
+                if result == "passed" and refused_by_check:
+                    result = "unlike check"
                 counts.setdefault(name, Counter())[result] += 1
-                if arguments.verbose and result in ("traceback", "passed wrongly", "several lines"):
+                if arguments.verbose and result in _PRINTED:
                     last = (printed.strip().splitlines() or [""])[-1]
                     where = [line.strip() for line in printed.splitlines() if "copolicy" in line and "File" in line]
                     print(f"{result}: {name}: {damage}: {last[:200]} {where[-1:]}", flush=True)
     for name, results in counts.items():
-        wrong = {kind: results[kind] for kind in ("traceback", "passed wrongly", "several lines")}
+        wrong = {kind: results[kind] for kind in _PRINTED}
         print(f"{name:<14} {wrong}  right {results['passed'] + results['refused']}")
     total = Counter()
     for results in counts.values():

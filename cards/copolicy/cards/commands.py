@@ -8,9 +8,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.minimal_card import is_minimal_card
 from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
-from copolicy.dataset.staging import replace_text
-
-from .new_file import require_new
+from copolicy.dataset.staging import replace_text, require_new
 
 
 def add_dataset_command(commands: argparse._SubParsersAction) -> None:
@@ -67,7 +65,7 @@ def _dataset(arguments: argparse.Namespace) -> dict:
 
     facts = DatasetFacts.read(arguments.root)
     path = arguments.root / "README.md"
-    require_new(path, arguments.overwrite or is_minimal_card(path))
+    require_new(path, overwrite=arguments.overwrite or is_minimal_card(path))
     if arguments.croissant and not arguments.repo_id:
         raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
     repo_id = arguments.repo_id or local_repo_id(arguments.root)
@@ -93,7 +91,7 @@ def _model(arguments: argparse.Namespace) -> dict:
 
     checkpoint = Checkpoint.read(arguments.checkpoint, arguments.dataset)
     path = checkpoint.folder / "README.md"
-    require_new(path, arguments.overwrite)
+    require_new(path, overwrite=arguments.overwrite)
     evaluations = checkpoint.evaluations(arguments.eval)
     replace_text(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
     sources = checkpoint.data.sources or "not stated: the data set is not at hand"

@@ -11,12 +11,14 @@ from typing import Any
 
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.documents import RECORD_FILE
+from copolicy.dataset.edit.subset.numbered_files import Place, numbered_files
 from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.log import read_metadata
 from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card, minimal_card
 from copolicy.dataset.staging import about, sync_folder, sync_tree
@@ -26,7 +28,7 @@ from .mixtures import Mixtures, converter_versions
 from .prepare import Conversion
 from .recordings import convert_recordings, find_recordings
 from .scene_video import SCENE
-from .shifted_tables import Place, Shift, numbered_files, read_table, write_like
+from .shifted_tables import Shift, write_like
 from .stored_rewards import foreign_rewards
 
 try:
@@ -141,11 +143,11 @@ def append_recordings(
 
 
 def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
-    tables = [read_table(path) for path in numbered_files(whole / "meta" / "episodes").values()]
+    tables = [read_parquet(path) for path in numbered_files(whole / "meta" / "episodes").values()]
     named = [[name for name in EPISODE_COLUMNS if name in table.column_names] for table in tables]
     rows = [row for table, names in zip(tables, named, strict=True) for row in table.select(names).to_pylist()]
     record = stored_record(whole)
-    versions = converter_versions([record, *record["appended"]])
+    versions = converter_versions([record, *record.get("appended", [])])
     try:
         mixtures = Mixtures.of(rows)
     except InvalidValueError as error:
@@ -160,19 +162,19 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
         names = {*info["features"], *new["features"]}
         differ = sorted(name for name in names if info["features"].get(name) != new["features"].get(name))
         raise FileFormatError(whole / INFO_FILE, "the features of these recordings", f"others: {', '.join(differ)}")
-    if read_table(whole / TASKS_FILE).to_pylist() != read_table(added / TASKS_FILE).to_pylist():
+    if read_parquet(whole / TASKS_FILE).to_pylist() != read_parquet(added / TASKS_FILE).to_pylist():
         raise FileFormatError(whole / TASKS_FILE, "the one task of copolicy-convert", "others")
     shift = Shift(info["total_episodes"], info["total_frames"])
     data: dict[Place, Place] = {}
     last, example = list(numbered_files(whole / "data").items())[-1]
     for old, path in numbered_files(added / "data").items():
         data[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
-        write_like(shift.frame_table(read_table(path)), example, _numbered(whole / "data", last))
+        write_like(shift.frame_table(read_parquet(path)), example, _numbered(whole / "data", last))
     moved = {"data": data, **_move_videos(whole, added, info)}
     last, example = list(numbered_files(whole / "meta" / "episodes").items())[-1]
     for path in numbered_files(added / "meta" / "episodes").values():
         last = update_chunk_file_indices(*last, info["chunks_size"])
-        table = shift.episode_table(read_table(path), moved, last)
+        table = shift.episode_table(read_parquet(path), moved, last)
         write_like(table, example, _numbered(whole / "meta" / "episodes", last))
     statistics = [load_stats(whole), shift.statistics(load_stats(added) or {})]
     total = info["total_episodes"] + new["total_episodes"]
@@ -180,7 +182,7 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
         info["splits"] = {"train": f"0:{total}"}
     info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
     record, part = stored_record(whole), stored_record(added)
-    notes = {**record.get("notes", {}), **part.pop("notes")}
+    notes = {**record.get("notes", {}), **part.pop("notes", {})}
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
     _renew_minimal_card(whole)
@@ -197,7 +199,7 @@ def _renew_minimal_card(root: Path) -> None:
     path = root / CARD_FILE
     if path.exists() and not is_minimal_card(path):
         return
-    tables = [read_table(file) for file in numbered_files(root / "meta" / "episodes").values()]
+    tables = [read_parquet(file) for file in numbered_files(root / "meta" / "episodes").values()]
     path.unlink(missing_ok=True)  # a link
     licences = {text or "" for table in tables for text in table.column("license").to_pylist()}
     path.write_text(minimal_card(licences), encoding="utf-8")
@@ -234,7 +236,7 @@ def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
 
 
 def _uuids(path: Path) -> list[str]:
-    table = read_table(path)
+    table = read_parquet(path)
     if "episode_uuid" not in table.column_names:
         raise FileFormatError(path, "the episode columns of copolicy", "no episode_uuid")
     return table.column("episode_uuid").to_pylist()

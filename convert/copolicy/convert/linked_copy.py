@@ -4,11 +4,13 @@ import os
 import shutil
 from pathlib import Path
 
+from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.episode import LATER_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files import broken_links
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 
-from .shifted_tables import numbered_files, read_table, write_like
+from .shifted_tables import write_like
 
 try:
     import pyarrow as pa
@@ -46,7 +48,7 @@ def add_later_columns(whole: Path) -> list[str]:
     """Gives the episodes of an earlier version the columns that it lacked, as not known; returns their names."""
     added: list[str] = []
     for path in numbered_files(whole / "meta" / "episodes").values():
-        table = read_table(path)
+        table = read_parquet(path)
         missing = [name for name in LATER_COLUMNS if name not in table.column_names]
         for name in missing:
             table = table.append_column(name, pa.array([LATER_DEFAULTS[name]] * table.num_rows))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.edit.subset.numbered_files import Place
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 
 try:
@@ -12,9 +13,6 @@ try:
     import pyarrow.parquet as pq
 except ModuleNotFoundError:
     raise MissingExtraError("pyarrow") from None
-
-Place = tuple[int, int]
-"""Numbers of a chunk and of a file in it."""
 
 _PLACE = ("chunk_index", "file_index")
 _COUNTED = ("count", "std")  # statistics that do not move with the values
@@ -74,25 +72,6 @@ class Shift:
                 rows = [[value + by for value in row] for row in table.column(name).to_pylist()]
                 table = _replaced(table, name, rows)
         return table
-
-
-def numbered_files(folder: Path, suffix: str = "parquet") -> dict[Place, Path]:
-    """The files `chunk-000/file-000.parquet` of a folder by their numbers, in order."""
-    files = sorted(folder.glob(f"chunk-*/file-*.{suffix}"))
-    return dict(sorted(((int(path.parent.name[6:]), int(path.stem[5:])), path) for path in files))
-
-
-def read_table(path: Path) -> "pa.Table":
-    """One Parquet file.
-
-    Raises:
-        FileFormatError: it is not complete.
-    """
-    try:
-        with pq.ParquetFile(path) as file:
-            return file.read()
-    except (pa.ArrowException, OSError) as error:
-        raise FileFormatError(path, "a complete Parquet file", str(error).splitlines()[0]) from None
 
 
 def write_like(table: "pa.Table", example: "Path | pa.Schema", path: Path) -> None:

@@ -10,9 +10,8 @@ from copolicy.collect.reward import reward
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE, map_of
 from copolicy.dataset.files import visible_files
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.task import MapConfig
-
-from .shifted_tables import read_table
 
 _REWARD = "next.reward"
 _TOLERANCE = 1e-3  # rewards and positions are stored in single precision
@@ -35,7 +34,7 @@ def foreign_rewards(roots: Sequence[Path]) -> list[str]:
 
 def _largest_error(path: Path) -> float:
     """The reward of a frame is that of the state that follows; what follows an episode's last one is not stored."""
-    table = read_table(path).sort_by("index")
+    table = read_parquet(path).sort_by("index")
     episodes, index = (table.column(name).to_numpy() for name in ("episode_index", "index"))
     followed = np.flatnonzero((np.diff(episodes) == 0) & (np.diff(index) == 1))
     places = followed[:: max(1, len(followed) // _FRAMES)]

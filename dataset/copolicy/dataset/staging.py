@@ -14,14 +14,15 @@ _REFUSALS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 _FILE = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only what is open for writing
 
 
-def require_new(path: Path) -> None:
-    """Checks that there is nothing at `path`.
+def require_new(*paths: Path, overwrite: bool = False) -> None:
+    """Checks that nothing would be overwritten that should not be.
 
     Raises:
-        OutputExistsError: there is something, be it a broken link.
+        OutputExistsError: there is something at one of the paths, be it a broken link, and `overwrite` is off.
     """
-    if os.path.lexists(path):
-        raise OutputExistsError(path)
+    for path in paths:
+        if os.path.lexists(path) and not overwrite:
+            raise OutputExistsError(path)
 
 
 @contextmanager

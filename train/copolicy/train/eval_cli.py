@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command, command_parser, progress_bar, run
+from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS, map_set
 
 from .comparison import add_compare_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans_command import add_plans_command
-from .result_file import require_new, write_json
+from .result_file import write_json
 from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
 
 

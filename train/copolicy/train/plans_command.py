@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS, RECORD_HZ, identify
 
-from .result_file import require_new
 from .study_flags import add_study_flags, planner_of, protocol_of, require_positive
 
 if TYPE_CHECKING:

@@ -5,18 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import OutputExistsError
 from copolicy.dataset.staging import replace_text
-
-
-def require_new(*paths: Path, overwrite: bool = False) -> None:
-    """
-    Raises:
-        OutputExistsError: one of them exists and must not be overwritten.
-    """
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise OutputExistsError(path)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -33,14 +33,15 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> dict:
+    from copolicy.dataset.staging import require_new
+
     from ..facts import DatasetFacts
-    from ..new_file import require_new
     from .page import render_page
     from .payload import build_payload
 
     path = arguments.out or arguments.root / REPORT_NAME
     facts = DatasetFacts.read(arguments.root)
-    require_new(path, arguments.overwrite)
+    require_new(path, overwrite=arguments.overwrite)
     findings = kept_findings(arguments.root, arguments.findings)
     if findings is None and arguments.findings is not None:
         raise FileFormatError(arguments.findings, "a file with the output of `copolicy-dataset check --json`", "none")

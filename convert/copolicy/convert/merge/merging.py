@@ -11,20 +11,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.edit.subset.stored_set import write_record
+from copolicy.dataset.edit.subset.numbered_files import numbered_files
+from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 from copolicy.dataset.versions.content import Content, read_content
 
 from ..joined_sets import join_data_sets
 from ..mixtures import Mixtures, converter_versions
-from ..shifted_tables import numbered_files, read_table
 from ..stored_rewards import foreign_rewards
 from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
-from .source import MergeSource, require_alike
+from .source import read_source, require_alike
 
 try:
     import pyarrow as pa
@@ -64,7 +65,7 @@ def merge_datasets(
     require_new(root)
     if prefixes is not None:
         require_prefixes(prefixes, len(roots))
-    sources = [MergeSource.read(path) for path in roots]
+    sources = [read_source(path) for path in roots]
     require_alike(sources)
     if prefixes is None and not same_people:
         require_strangers(sources)
@@ -84,7 +85,7 @@ def merge_datasets(
         write_record(partial, record)
         card = minimal_card({text or "" for text in expected.column("license").to_pylist()})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
-    left_behind = {str(source.root): names for source in sources if (names := source.left_behind())}
+    left_behind = {str(source.root): names for source in sources if (names := source.left_behind(licences_too=True))}
     return {
         "root": str(root),
         "repo_id": repo_id,
@@ -97,7 +98,7 @@ def merge_datasets(
     }
 
 
-def _mixtures(episodes: "pa.Table", sources: Sequence[MergeSource]) -> Mixtures:
+def _mixtures(episodes: "pa.Table", sources: Sequence[StoredSet]) -> Mixtures:
     named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
     try:
         mixtures = Mixtures.of(episodes.select(named).to_pylist())
@@ -108,7 +109,7 @@ def _mixtures(episodes: "pa.Table", sources: Sequence[MergeSource]) -> Mixtures:
     return replace(mixtures, mixed=[*mixtures.mixed, *versions, *foreign_rewards([source.root for source in sources])])
 
 
-def _joined(sources: Sequence[MergeSource], tables: Sequence["pa.Table"]) -> "pa.Table":
+def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.Table":
     """All rows of meta/episodes as they were; where a data set lacks a column, null or what a later column is then."""
     types = {field.name: field.type for field in tables[0].schema}
     for source, table in zip(sources, tables, strict=True):
@@ -144,7 +145,7 @@ def _without_nan(name: str, column: "pa.ChunkedArray") -> "pa.ChunkedArray":
 def _restore_episodes(root: Path, expected: "pa.Table") -> None:
     start = 0
     for path in numbered_files(root / "meta" / "episodes").values():
-        merged = read_table(path)
+        merged = read_parquet(path)
         rows = expected.slice(start, merged.num_rows)
         for name in rows.column_names:
             if name in _NUMBERS or name.startswith(_MOVED):
@@ -161,7 +162,7 @@ def _restore_frames(root: Path) -> None:
     features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
     schema = get_hf_features_from_features(features).arrow_schema
     for path in numbered_files(root / "data").values():
-        table = read_table(path).select(schema.names).cast(schema)
+        table = read_parquet(path).select(schema.names).cast(schema)
         episodes = table.column("episode_index").to_pylist()
         with pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True) as writer:
             start = 0
@@ -171,7 +172,7 @@ def _restore_frames(root: Path) -> None:
                     start = row
 
 
-def _verify(content: Content, sources: Sequence[MergeSource], renamed_columns: set[str]) -> None:
+def _verify(content: Content, sources: Sequence[StoredSet], renamed_columns: set[str]) -> None:
     before = [episode for source in sources for episode in source.content.episodes]
     if len(content.episodes) != len(before):
         raise RunError(f"merge: expected {len(before)} episodes, found {len(content.episodes)}; nothing was written")
@@ -191,7 +192,7 @@ def _verify(content: Content, sources: Sequence[MergeSource], renamed_columns: s
             )
 
 
-def _record(sources: Sequence[MergeSource], prefixes: Sequence[str] | None) -> dict[str, Any]:
+def _record(sources: Sequence[StoredSet], prefixes: Sequence[str] | None) -> dict[str, Any]:
     notes: dict[str, Any] = {}
     merged = []
     for place, source in enumerate(sources):

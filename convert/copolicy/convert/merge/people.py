@@ -9,9 +9,8 @@ everywhere; they are neither compared nor renamed.
 import re
 from collections.abc import Sequence
 
+from copolicy.dataset.edit.subset.stored_set import StoredSet
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
-
-from .source import MergeSource
 
 try:
     import pyarrow as pa
@@ -37,13 +36,13 @@ def require_prefixes(prefixes: Sequence[str], count: int) -> None:
             raise InvalidValueError("--prefix-people", "names of letters, digits and underscores", prefix)
 
 
-def require_strangers(sources: Sequence[MergeSource]) -> None:
+def require_strangers(sources: Sequence[StoredSet]) -> None:
     """Checks that no pair, player or consent record has the same name in two data sets.
 
     Raises:
         InvalidValueError: one has.
     """
-    seen: dict[tuple[str, str], MergeSource] = {}
+    seen: dict[tuple[str, str], StoredSet] = {}
     for source in sources:
         names = {(kind, name): source for column, kind in _KINDS.items() for name in _given(source, column)}
         for kind, name in sorted(names):
@@ -71,6 +70,6 @@ def renamed(episodes: "pa.Table", prefix: str) -> "pa.Table":
     return episodes
 
 
-def _given(source: MergeSource, column: str) -> set[str]:
+def _given(source: StoredSet, column: str) -> set[str]:
     rows = source.episodes.select([column, "source"]).to_pylist()
     return {row[column] for row in rows if row[column] and row["source"] != "simulated"}

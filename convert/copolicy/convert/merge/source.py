@@ -1,76 +1,34 @@
 """One of the data sets that are merged, and whether it fits to the others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from copolicy.dataset.documents import RECORD_FILE
-from copolicy.dataset.edit.subset.stored_set import stored_record
+from copolicy.dataset.edit.subset.stored_set import StoredSet
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
-from copolicy.dataset.lerobot_folder.loading import require_loadable
-from copolicy.dataset.minimal_card import CARD_FILE, is_minimal_card
-from copolicy.dataset.versions.content import Content, read_content
-from copolicy.dataset.versions.manifest import data_set_files
-
-from ..shifted_tables import numbered_files, read_table
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
 
 try:
-    import pyarrow as pa
     from lerobot.datasets.feature_utils import features_equal_for_merge
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-_CARRIED = ("data/", "meta/episodes/", "videos/")
-_REWRITTEN = {INFO_FILE.as_posix(), STATS_FILE.as_posix(), TASKS_FILE.as_posix(), RECORD_FILE.as_posix()}
 
-
-@dataclass(frozen=True)
-class MergeSource:
+def read_source(root: Path) -> StoredSet:
     """A data set to merge.
 
-    Attributes:
-        info: `meta/info.json`.
-        episodes: the rows of meta/episodes, in the order of `episode_index`.
-        content: what it holds, by digests.
-        record: `meta/copolicy.json`, empty where there is none.
+    Raises:
+        FileFormatError: no data set of this project, or one that contradicts itself.
     """
-
-    root: Path
-    info: dict[str, Any]
-    episodes: "pa.Table"
-    content: Content
-    record: dict[str, Any]
-
-    @classmethod
-    def read(cls, root: Path) -> "MergeSource":
-        """Reads a data set completely, which also verifies that its files agree with each other.
-
-        Raises:
-            FileFormatError: no data set of this project, or one that contradicts itself.
-        """
-        require_loadable(root)
-        content = read_content(root)
-        tables = [read_table(path) for path in numbered_files(root / "meta" / "episodes").values()]
-        try:
-            episodes = pa.concat_tables(tables, promote_options="permissive").sort_by("episode_index")
-        except pa.ArrowException as error:
-            raise FileFormatError(root / "meta" / "episodes", "files with the same columns", str(error)) from None
-        missing = [name for name in EPISODE_COLUMNS if name not in {*episodes.column_names, *LATER_COLUMNS}]
-        if missing:
-            raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
-        return cls(root, read_info(root), episodes, content, stored_record(root))
-
-    def left_behind(self) -> list[str]:
-        """Files that are about this data set alone and are not carried over: its statistics, releases, card, ..."""
-        names = [name for name in data_set_files(self.root) if name not in _REWRITTEN and not name.startswith(_CARRIED)]
-        names = [name for name in names if name != CARD_FILE or not is_minimal_card(self.root / name)]
-        return names + [f"{folder}/" for folder in ("raw",) if (self.root / folder).is_dir()]
+    source = StoredSet.read(root)
+    there = {*source.episodes.column_names, *LATER_COLUMNS}
+    missing = [name for name in EPISODE_COLUMNS if name not in there]
+    if missing:
+        raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
+    return source
 
 
-def require_alike(sources: Sequence[MergeSource]) -> None:
+def require_alike(sources: Sequence[StoredSet]) -> None:
     """Checks that data sets have one format, rate and feature table, and no episode in common.
 
     Raises:

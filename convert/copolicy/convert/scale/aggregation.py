@@ -5,11 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 from ..joined_sets import join_data_sets
-from ..shifted_tables import numbered_files, read_table, write_like
+from ..shifted_tables import write_like
 
 
 def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) -> dict[str, Any]:
@@ -39,5 +41,5 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
     example = next(iter(numbered_files(roots[0] / "meta" / "episodes").values()))
     for path in numbered_files(target / "meta" / "episodes").values():
-        write_like(read_table(path), example, path)
+        write_like(read_parquet(path), example, path)
     return info

@@ -3,14 +3,15 @@
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from copolicy.dataset.checks.checking import DATA_SET_RULES, check_table
 from copolicy.dataset.checks.finding import SEVERITIES, Finding
 from copolicy.dataset.checks.read_lerobot import read_lerobot
 
+from .plan import ShardRecord
 
-def all_findings(root: Path, records: Sequence[dict[str, Any]]) -> list[Finding]:
+
+def all_findings(root: Path, records: Sequence[ShardRecord]) -> list[Finding]:
     """What the shards found in their recordings, then what the other rules find in the data set; worst first.
 
     Args:

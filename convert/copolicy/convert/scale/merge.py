@@ -8,19 +8,20 @@ from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
 from copolicy.dataset.documents import STATISTICS_FILE
+from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.staging import new_folder, require_new
 
 from ..lerobot_writer import WrittenDataset
 from ..mixtures import Mixtures
 from ..prepare import LeftOut, RepeatedEpisodeError
-from ..shifted_tables import numbered_files, read_table
 from .aggregation import aggregate
 from .findings import all_findings
-from .plan import DATA_SET, ShardPlan
+from .plan import DATA_SET, ShardPlan, ShardRecord
 
 FINDINGS_FILE = "findings.json"
 
@@ -54,7 +55,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
-        tables = [read_table(path) for path in numbered_files(partial / "meta" / "episodes").values()]
+        tables = [read_parquet(path) for path in numbered_files(partial / "meta" / "episodes").values()]
         rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
         card = minimal_card({row["license"] or "" for row in rows})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
@@ -78,7 +79,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     }
 
 
-def _require_once(records: list[dict[str, Any]]) -> None:
+def _require_once(records: list[ShardRecord]) -> None:
     origins: dict[str, str] = {}
     for rank, record in enumerate(records):
         # A shard of an earlier version does not name its files.
@@ -93,7 +94,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
     """Writes what is known of the conversion; returns the notes by episode."""
     notes: dict[str, list[str]] = {}
     for part in roots:
-        notes |= stored_record(part)["notes"]
+        notes |= stored_record(part).get("notes", {})
     document = {
         "converter": "copolicy-convert mcap",
         "version": version("lerobot_policy_copolicy"),

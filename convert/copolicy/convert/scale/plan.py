@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files import is_hidden
+from copolicy.dataset.json_file import read_json
 
 from ..prepare import Conversion
 
@@ -20,6 +21,31 @@ OPTIONS_FILE = "options.json"
 RECORD_FILE = "shard.json"
 DATA_SET = "set"
 """Folder of a shard's own LeRobot data set; missing where every recording of the shard was left out."""
+
+
+class LeftOutRecord(TypedDict):
+    """The recordings that a shard left out, see `LeftOut`."""
+
+    damaged: list[str]
+    discarded: list[str]
+    messages: list[str]
+
+
+class ShardRecord(TypedDict):
+    """`shard.json`: what a finished shard holds.
+
+    Attributes:
+        digest: of all that the shard depends on.
+        episodes: `episode_uuid`s in the order of the shard.
+        origins: the file of each; a shard of an earlier version does not say.
+        findings: of the recordings, see `Finding`.
+    """
+
+    digest: str
+    episodes: list[str]
+    origins: NotRequired[list[str]]
+    left_out: LeftOutRecord
+    findings: list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -86,11 +112,11 @@ class ShardPlan:
         files = [(str(path), *_state(path)) for path in self.files_of(rank)]
         return hashlib.sha256(json.dumps([self.options, files], sort_keys=True).encode()).hexdigest()
 
-    def record(self, rank: int) -> dict[str, Any] | None:
-        """What a finished shard says of itself, None where it is not finished."""
+    def record(self, rank: int) -> "ShardRecord | None":
+        """What a finished shard says of itself, None where it is not finished or says something else."""
         try:
-            return json.loads((self.shard(rank) / RECORD_FILE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            return read_json(self.shard(rank) / RECORD_FILE, ShardRecord, "the record of a shard")
+        except FileFormatError:
             return None
 
     def require_own(self) -> None:
@@ -121,7 +147,7 @@ class ShardPlan:
         for path in sorted((self.folder / "shards").glob("[0-9]*")):
             rank = int(path.name)
             record = self.record(rank)
-            if rank < len(self) and record is not None and record.get("digest") == self.digest(rank):
+            if rank < len(self) and record is not None and record["digest"] == self.digest(rank):
                 finished += 1
             else:
                 shutil.rmtree(path)
@@ -131,10 +157,7 @@ class ShardPlan:
         return finished
 
     def _compare(self, stored: Path, options: dict[str, Any]) -> None:
-        try:
-            found = dict(json.loads(stored.read_text(encoding="utf-8")))
-        except (ValueError, TypeError) as error:
-            raise FileFormatError(stored, "the options of a conversion", str(error)) from None
+        found = read_json(stored, dict[str, Any], "the options of a conversion")
         differ = [name for name in {**found, **options} if found.get(name) != options.get(name)]
         if differ:
             name = differ[0]

@@ -55,6 +55,18 @@ def data_path(info: Mapping[str, Any], row: Mapping[str, Any]) -> str:
     return _filled("data_path", info.get("data_path", DATA_TEMPLATE), row, "data/", {})
 
 
+def data_file(root: Path, info: Mapping[str, Any], row: Mapping[str, Any]) -> Path:
+    """The file with an episode's frames.
+
+    Raises:
+        FileFormatError: the row or the template does not say.
+    """
+    try:
+        return root / data_path(info, row)
+    except ValueError as error:
+        raise FileFormatError(root / "meta" / "episodes", "where the frames of an episode are", str(error)) from None
+
+
 def video_path(info: Mapping[str, Any], row: Mapping[str, Any], key: str) -> str:
     """The same for the file with an episode's pictures of a video feature."""
     template = info.get("video_path", VIDEO_TEMPLATE)

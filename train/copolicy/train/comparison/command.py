@@ -5,9 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.staging import replace_text
-
-from ..result_file import require_new
+from copolicy.dataset.staging import replace_text, require_new
 
 
 def add_compare_command(commands: argparse._SubParsersAction) -> None:

@@ -10,9 +10,10 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import visible_files
 from copolicy.dataset.licences import checked_licence
+from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
 
-from ..result_file import require_new, write_json
+from ..result_file import write_json
 from ..study_flags import add_protocol_flags, policy_settings, protocol_of, require_positive
 
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from copolicy.collect.pilots.partners import PARTNERS
 from copolicy.dataset.commandline import add_command, progress_bar
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
 
-from ..result_file import require_new, write_json
+from ..result_file import write_json
 from ..study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
 
 if TYPE_CHECKING:

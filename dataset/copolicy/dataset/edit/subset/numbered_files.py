@@ -1,14 +1,13 @@
 """The numbered files of a LeRobot v3 data set, `chunk-000/file-000.parquet`."""
 
+import re
 from pathlib import Path
 from typing import Any
-
-from ...exceptions import FileFormatError
-from ...lerobot_folder.info import INFO_FILE
 
 Place = tuple[int, int]
 """Numbers of a chunk and of a file in it."""
 
+_NAME = r"chunk-(\d+)/file-(\d+)\."
 _FILES_IN_A_CHUNK = 1000  # LeRobot's, where meta/info.json does not say
 
 
@@ -17,17 +16,10 @@ def numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
     return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
 
 
-def file_of(root: Path, info: dict[str, Any], key: str, **numbers: Any) -> Path:
-    """The file that `data_path` or `video_path` of meta/info.json names for some numbers.
-
-    Raises:
-        FileFormatError: no such path, or numbers that are none.
-    """
-    try:
-        return root / info[key].format(**numbers)
-    except (KeyError, AttributeError, IndexError, TypeError, ValueError):
-        found = f"{key} {info.get(key)!r} and {numbers}"
-        raise FileFormatError(root / INFO_FILE, "the path of a file for its numbers", found) from None
+def numbered_files(folder: Path, suffix: str = "parquet") -> dict[Place, Path]:
+    """The numbered files of a folder, in the order of their numbers; files of other names are passed over."""
+    found = ((re.fullmatch(_NAME + suffix, path.relative_to(folder).as_posix()), path) for path in folder.glob("*/*"))
+    return dict(sorted(((int(match[1]), int(match[2])), path) for match, path in found if match))
 
 
 def next_place(place: Place | None, info: dict[str, Any]) -> Place:

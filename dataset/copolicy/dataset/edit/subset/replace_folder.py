@@ -11,7 +11,8 @@ from pathlib import Path
 from ...staging import sync_folder, sync_tree
 
 _BEFORE = "before-edit"
-_LEFT = re.compile(rf"\.(?P<name>.+)\.(?:{_BEFORE}|before-append)")
+_DELETED = "deleted"
+_LEFT = re.compile(rf"\.(?P<name>.+)\.(?P<kind>{_BEFORE}|before-append|{_DELETED})")
 _UNFINISHED = re.compile(r"\..+\.(?:(?:[0-9a-f]{8}|[0-9a-f]{12})\.partial|merging)")
 
 
@@ -45,13 +46,22 @@ def finish_interrupted(root: Path) -> None:
     place = root.resolve()
     if not place.parent.is_dir():
         return
-    for before in sorted(place.parent.glob(".*.before-*")):
+    for before in sorted(place.parent.glob(".*")):
         match = _LEFT.fullmatch(before.name)
         if match and match["name"] == place.name and before.is_dir():
-            if os.path.lexists(place):
+            if match["kind"] == _DELETED or os.path.lexists(place):
                 shutil.rmtree(before)
             else:
                 before.rename(place)
+
+
+def delete_folder(root: Path) -> None:
+    """Deletes a folder; where that is interrupted, the next call for it deletes the rest and never brings it back."""
+    place = root.resolve()
+    hidden = place.parent / f".{place.name}.{_DELETED}"
+    place.rename(hidden)
+    shutil.rmtree(hidden)
+    sync_folder(place.parent)
 
 
 def finish_all_interrupted(folder: Path) -> None:

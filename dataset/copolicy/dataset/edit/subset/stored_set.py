@@ -91,13 +91,16 @@ class StoredSet:
                 types[field.name] = kind
         return types
 
-    def left_behind(self) -> list[str]:
-        """Files about this very data set, which a part of it does not take along: card, releases, findings, ..."""
+    def left_behind(self, licences_too: bool = False) -> list[str]:
+        """Files about this very data set, which a new one does not take along: card, releases, findings, ...
+
+        Args:
+            licences_too: files that state licences stay, too, as in a merge.
+        """
         minimal = {CARD_FILE} if is_minimal_card(self.root / CARD_FILE) else set()
+        taken = _WRITTEN | minimal | (set() if licences_too else set(self.licences()))
         names = [
-            name
-            for name in data_set_files(self.root)
-            if name not in _WRITTEN | minimal and not name.startswith(_WRITTEN_FOLDERS) and name not in self.licences()
+            name for name in data_set_files(self.root) if name not in taken and not name.startswith(_WRITTEN_FOLDERS)
         ]
         return names + [f"{folder}/" for folder in ("raw",) if (self.root / folder).is_dir()]
 

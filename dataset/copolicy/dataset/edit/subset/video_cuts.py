@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ...exceptions import FileFormatError, MissingExtraError
-from .numbered_files import Place, file_of, next_place, numbered
+from ...lerobot_folder.references import video_span
+from .numbered_files import Place, next_place, numbered
 
 Row = dict[str, Any]
 _NOT_WRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -42,16 +43,14 @@ def cut_videos(
     wanted = set(chosen)
     columns: dict[int, Row] = {}
     target: Place | None = None
-    for source, places in sorted(by_file.items()):
+    for _, places in sorted(by_file.items()):
         inside = sorted((place for place in places if place in wanted), key=lambda p: _start(episodes[p], key))
         if not inside:
             continue
         target = next_place(target, info)
         path = numbered(folder / "videos" / key, target, "mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
-        video = file_of(root, info, "video_path", video_key=key, chunk_index=source[0], file_index=source[1])
-        if not video.is_file():
-            raise FileFormatError(video, f"the video of episode {episodes[inside[0]]['episode_index']}", "no file")
+        video, *_ = video_span(root, info, episodes[inside[0]], key)
         if len(inside) == len(places):
             shutil.copyfile(video, path)
             times = [(_start(episodes[place], key), episodes[place][f"videos/{key}/to_timestamp"]) for place in inside]

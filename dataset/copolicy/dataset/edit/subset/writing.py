@@ -10,12 +10,12 @@ import numpy as np
 
 from ...exceptions import FileFormatError, MissingExtraError, RunError
 from ...lerobot_folder.info import INFO_FILE, TASKS_FILE
-from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE
+from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
 from ...lerobot_folder.tables import read_parquet
 from ...minimal_card import CARD_FILE, minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
-from .numbered_files import Place, file_of, next_place, numbered
+from .numbered_files import Place, next_place, numbered
 from .stored_set import StoredSet
 from .video_cuts import cut_videos
 
@@ -131,8 +131,7 @@ def _frames(source: StoredSet, numbers: Sequence[int]) -> "Iterator[pa.Table]":
     opened: tuple[Path, pa.Table, np.ndarray] | None = None
     keys = source.episodes.select(["data/chunk_index", "data/file_index"]).to_pylist()
     for number in numbers:
-        chunk, file = keys[number]["data/chunk_index"], keys[number]["data/file_index"]
-        path = file_of(source.root, source.info, "data_path", chunk_index=chunk, file_index=file)
+        path = data_file(source.root, source.info, keys[number])
         if opened is None or opened[0] != path:
             opened = (path, *_read(path, number))
         _, table, owners = opened

@@ -13,14 +13,13 @@ from ...exceptions import CopolicyError
 from ...hub.raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
 from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE
 from ...minimal_card import CARD_FILE
-from ...staging import sync_folder
 from ...versions.changelog import CHANGELOG_FILE
 from ...versions.content import EpisodeContent
 from ...versions.manifest import MANIFEST_FILE, Manifest
 from ...versions.release_record import EARLIER_FOLDER, ReleaseRecord
 from ...versions.withdrawals import WITHDRAWALS_FILE, anonymised, read_withdrawals, withdrawals_text
 from ..amend import today
-from ..subset.replace_folder import is_unfinished, replaced_folder
+from ..subset.replace_folder import delete_folder, is_unfinished, replaced_folder
 from ..subset.stored_set import StoredSet, without_episodes, write_record
 from ..subset.writing import kept_splits, write_subset
 from .traces import Traces
@@ -76,11 +75,7 @@ def without_withdrawn(found: FoundSet, traces: Traces, episodes: int) -> dict[st
     numbers = [row["episode_index"] for row in source.rows if row["episode_index"] not in gone]
     _delete_left_over(root)
     if not numbers:
-        place = root.resolve()
-        hidden = place.with_name(f".{place.name}.before-edit")
-        place.rename(hidden)
-        shutil.rmtree(hidden)
-        sync_folder(place.parent)
+        delete_folder(root)
         return {"removed": "the whole data set: no episode is left"}
     with replaced_folder(root) as partial:
         write_subset(source, numbers, partial, kept_splits(source.info, numbers))

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...exceptions import CopolicyError
-from ...log import read_metadata
+from ... import log
+from ...exceptions import CopolicyError, ForeignRecordingError
 from ...staging import replace_text, sync_folder
 from ..selection import consents_of
 from .traces import Traces
@@ -24,12 +24,14 @@ class FoundRecording:
     Attributes:
         consents: consent ids; None where the file cannot be read.
         people: pair, players and session, as far as they are named.
+        foreign: the file is whole and another project's.
     """
 
     path: Path
     episode_uuid: str = ""
     consents: frozenset[str] | None = None
     people: frozenset[str] = frozenset()
+    foreign: bool = False
 
 
 def is_recording(name: str) -> bool:
@@ -40,11 +42,11 @@ def is_recording(name: str) -> bool:
 def read_recording(path: Path) -> FoundRecording:
     """The metadata of a recording that may have broken off."""
     try:
-        records = read_metadata(path)
+        records = log.read_metadata(path)
     except CopolicyError:
         return FoundRecording(path)
     if "consent" not in records and "episode" not in records:
-        return FoundRecording(path)
+        return FoundRecording(path, foreign=_is_foreign(path))
     players, session = records.get("players", {}), records.get("session", {})
     people = {players.get(name, "") for name in _PEOPLE} | {session.get("session_id", "")}
     consents = consents_of(records.get("consent", {}))
@@ -88,6 +90,16 @@ def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
                 replace_text(journal, rest)
         sync_folder(folder)
     return beside
+
+
+def _is_foreign(path: Path) -> bool:
+    try:
+        log.read_recording(path)
+    except ForeignRecordingError:
+        return True
+    except CopolicyError:
+        pass
+    return False
 
 
 def hard_links(path: Path) -> int:

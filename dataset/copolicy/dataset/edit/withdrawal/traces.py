@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 REMOVED = "(withdrawn)"
-_TEXTS = {".json", ".jsonl", ".md", ".txt", ".csv", ".html", ".yaml", ".yml", ".toml"}
-_LARGEST = 64 << 20
+_BINARY = {".parquet", ".mp4", ".mcap", ".png", ".jpg", ".jpeg", ".gif", ".safetensors", ".hdf5", ".npz"}
+_PART = 1 << 20
+"""Characters of a file that are searched at a time."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,28 @@ class Traces:
         return "".join(line for line in text.splitlines(keepends=True) if not self._in_line(line))
 
     def files_with(self, folder: Path) -> Iterable[Path]:
-        """Text files below a folder that still name one of them."""
+        """Files below a folder that still name one of them, whatever their length; a file of bytes is none of text."""
         for path in sorted(folder.rglob("*")):
-            text = path.suffix in _TEXTS and path.is_file() and path.stat().st_size <= _LARGEST
-            if text and self.in_text(path.read_text(encoding="utf-8", errors="replace")):
+            if path.is_file() and path.suffix not in _BINARY and not _is_binary(path) and self._in_file(path):
                 yield path
+
+    def _in_file(self, path: Path) -> bool:
+        pattern = self._pattern
+        if pattern is None:
+            return False
+        overlap = max(len(name) for name in self.names) + 1  # and the character before it
+        with path.open(encoding="utf-8", errors="replace") as file:
+            text, first = file.read(_PART), True
+            while text:
+                more = file.read(_PART)
+                for match in pattern.finditer(text):
+                    # At an edge that is not the file's, the character beyond may make it a part of a longer name.
+                    if (match.start() or first) and (match.end() < len(text) or not more):
+                        return True
+                if not more:
+                    return False
+                text, first = text[-overlap - 1 :] + more, False
+        return False
 
     @property
     def _pattern(self) -> re.Pattern[str] | None:
@@ -67,6 +85,12 @@ class Traces:
         except ValueError:
             return self.in_text(line)
         return bool(values & (self.names | self.files)) or any(self.in_text(value) for value in values)
+
+
+def _is_binary(path: Path) -> bool:
+    """By a zero byte near its beginning, as git tells."""
+    with path.open("rb") as file:
+        return b"\0" in file.read(8000)
 
 
 def _texts(value: Any) -> Iterable[str]:

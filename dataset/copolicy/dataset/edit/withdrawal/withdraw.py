@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...episode_rows import episode_tables
 from ...exceptions import FileFormatError, InvalidValueError, RunError
 from ...json_file import read_json
+from ...lerobot_folder.folder import LeRobotFolder
 from ...lerobot_folder.info import INFO_FILE, stripped_hint
 from ..selection import consents_of
 from ..subset.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
@@ -34,7 +34,7 @@ class _Below:
 
     Attributes:
         sets: the rows of each data set.
-        foreign: data sets of other projects.
+        foreign: data sets and recordings of other projects.
         unfinished: folders that a running or killed command has not finished.
     """
 
@@ -52,7 +52,7 @@ class Survey:
         sets: the data sets that lose something.
         recordings: the recordings to delete, apart from those in `raw/` of a data set.
         unreadable: recordings that do not tell whose they are.
-        foreign: data sets of other projects, which have no consent ids.
+        foreign: data sets and recordings of other projects, which have no consent ids.
         unfinished: folders that a running or killed command has not finished, and nobody looked into.
         traces: the names that must not be found any more.
         direct: whether a path's own consent ids led to it, by data set or recording.
@@ -130,7 +130,7 @@ def withdraw(consent: str, paths: Sequence[Path], really: bool = False) -> dict[
     reports |= {
         "hard_links_elsewhere": linked,
         "git_history": [str(found.root) for found in survey.sets if (found.root / ".git").exists()],
-        "other_data_sets": [str(path) for path in survey.foreign],
+        "of_other_projects": [str(path) for path in survey.foreign],
         "unfinished": [str(path) for path in survey.unfinished if path.exists()],
         "unreadable": [str(path) for path in survey.unreadable],
         "on_the_hub": ON_THE_HUB,
@@ -189,12 +189,15 @@ def _read_below(paths: Sequence[Path]) -> _Below:
                 continue
             known.add(item.resolve())
             if not item.is_dir():
-                below.recordings[item] = read_recording(item)
+                recording = read_recording(item)
+                if recording.foreign:
+                    below.foreign.append(item)
+                else:
+                    below.recordings[item] = recording
             elif _is_foreign(item):
                 below.foreign.append(item)
             else:
-                tables = episode_tables(item, ("episode_index", "episode_uuid", "consent_id"))
-                below.sets[item] = [row for table in tables.values() for row in _columns(table).to_pylist()]
+                below.sets[item] = _rows(item)
     return below
 
 
@@ -207,9 +210,15 @@ def _is_foreign(root: Path) -> bool:
     return bool(info) and not stripped_hint(info, root)
 
 
-def _columns(table: Any) -> Any:
-    names = ("episode_index", "episode_uuid", "consent_id", "source_sha256", *PEOPLE)
-    return table.select([name for name in names if name in table.column_names])
+def _rows(root: Path) -> list[dict[str, Any]]:
+    """Number, name, consent and people of each episode of a data set, their types checked.
+
+    Raises:
+        FileFormatError: no data set of this project, or one that does not tell.
+    """
+    folder = LeRobotFolder.open(root)
+    there = [name for name in ("source_sha256", *PEOPLE) if name in folder.episodes.column_names]
+    return folder.rows(["episode_uuid", "consent_id", *there])
 
 
 def _inside(path: Path, root: Path) -> str | None:
