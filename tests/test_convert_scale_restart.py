@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
+import pytest
 from sharded_calls import EPISODES, call, content, damage, times_of
 
 from copolicy.convert.cli import main
@@ -152,6 +153,30 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
     ]
     assert times_of(shards) == before
     assert list(other.iterdir()) == [other / "one.jpg"]
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", "null", '{"digest": 1, "episodes": 3}', "{"])
+def test_a_shard_with_another_record_is_made_again(unsharded, tmp_path, capsys, content):
+    flags = ("--shards", str(tmp_path / "shards"), "--shard-episodes", "4")
+    assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
+    record = next((tmp_path / "shards").rglob("shard.json"))
+    record.write_text(content, encoding="utf-8")
+    assert main(call(unsharded / "recordings", tmp_path / "again", *flags)) == 0
+    assert json.loads(record.read_text(encoding="utf-8"))["episodes"]
+
+
+@pytest.mark.parametrize("content", ["[]", "3", "{"])
+def test_options_of_another_form_are_refused(unsharded, tmp_path, capsys, content):
+    shards = tmp_path / "shards"
+    shards.mkdir()
+    (shards / "options.json").write_text(content, encoding="utf-8")
+    assert main(call(unsharded / "recordings", tmp_path / "set", "--shards", str(shards))) == 2
+    error = capsys.readouterr().err
+    expected = f"{shards / 'options.json'}: expected the options of a conversion, found "
+    assert error.startswith(f"copolicy-convert: {expected}")
+        f"copolicy-convert: {shards / 'options.json'}: expected the options of a conversion, found "
+    )
+    assert error.count("\n") == 1
 
 
 def test_two_calls_do_not_work_in_one_folder(unsharded, tmp_path, capsys):

@@ -4,14 +4,18 @@ import json
 import shutil
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from checked_data import contents, set_columns
+from checked_data import EPISODES, contents, set_columns
 from edited_data import columns, digests, info, load, make_people
+from mcap.writer import Writer
 
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
 from copolicy.dataset.edit.subset import replace_folder
 from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
+from copolicy.dataset.edit.withdrawal import traces as traces_module
 from copolicy.dataset.edit.withdrawal.traces import Traces
 from copolicy.dataset.edit.withdrawal.withdraw import withdraw
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
@@ -228,6 +232,24 @@ def test_a_set_without_an_episode_left_goes(folder):
     assert not (folder / "set").exists()
 
 
+def test_a_deletion_that_was_killed_is_finished_and_never_undone(folder, monkeypatch):
+    class Killed(BaseException):
+        pass
+
+    def half(path):
+        (path / "meta" / "info.json").unlink()
+        raise Killed
+
+    set_columns(folder / "set", consent_id=["C-5"] * 8)
+    monkeypatch.setattr(replace_folder.shutil, "rmtree", half)
+    with pytest.raises(Killed):
+        withdraw("C-5", [folder / "set"], really=True)
+    monkeypatch.undo()
+    with pytest.raises(FileFormatError, match="nothing there"):
+        withdraw("C-5", [folder / "set"], really=True)
+    assert [path.name for path in folder.iterdir()] == ["recordings"]
+
+
 def test_files_of_somebody_else_are_named_and_left(folder):
     notes = folder / "recordings" / "notes.md"
     notes.write_text("C-1 was tired", encoding="utf-8")
@@ -236,6 +258,38 @@ def test_files_of_somebody_else_are_named_and_left(folder):
     assert summary["still_named_in"] == [str(notes)]
     assert summary["data_sets"][str(folder / "set")]["still_named_in"] == ["notes.txt"]
     assert notes.read_text(encoding="utf-8") == "C-1 was tired"
+
+
+def test_files_are_searched_whatever_their_name_and_length(folder):
+    long, odd = folder / "recordings" / "notes.md", folder / "recordings" / "LIST"
+    long.write_text("x" * (1 << 20) + " C-1 " + "y" * (1 << 20), encoding="utf-8")
+    odd.write_text("P01", encoding="utf-8")
+    (folder / "recordings" / "bytes.bin").write_bytes(b"\0C-1 ")
+    summary = withdraw("C-1", [folder], really=True)
+    assert summary["still_named_in"] == [str(odd), str(long)]
+
+
+def test_an_mcap_file_of_another_project_is_no_unreadable_recording(folder, capsys):
+    arm = folder / "recordings" / "arm.mcap"
+    with arm.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Joints", "jsonschema", b"{}")
+        writer.add_message(writer.register_channel("/joints", "json", schema), 0, b"{}", 0)
+        writer.finish()
+    assert main(["withdraw", "C-1", str(folder), "--yes", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["of_other_projects"] == [str(arm)]
+    assert arm.exists()
+
+
+def test_columns_of_another_type_are_refused(folder):
+    table = pq.ParquetFile(folder / "set" / EPISODES).read()
+    column = table.column_names.index("session_id")
+    lists = [[text] for text in table.column("session_id").to_pylist()]
+    pq.write_table(table.set_column(column, "session_id", pa.array(lists)), folder / "set" / EPISODES)
+    with pytest.raises(FileFormatError, match="texts of session_id, found list"):
+        withdraw("C-1", [folder / "set"], really=True)
 
 
 def test_an_unreadable_recording_is_named(folder, capsys):
@@ -262,9 +316,6 @@ def test_a_wrong_call_changes_nothing(folder, consent, paths, error, line):
 
 
 def test_a_stripped_set_stops_everything(folder):
-    import pyarrow.parquet as pq
-    from checked_data import EPISODES
-
     other = Path(shutil.copytree(folder / "set", folder / "other"))
     table = pq.ParquetFile(other / EPISODES).read()
     pq.write_table(table.drop_columns(["episode_uuid", "consent_id"]), other / EPISODES)
@@ -328,3 +379,13 @@ def test_names_are_found_as_words():
         "id": "(withdrawn)",
         "text": "by (withdrawn)",
     }
+
+
+def test_a_name_across_the_parts_of_a_long_file_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(traces_module, "_PART", 7)
+    traces = Traces(frozenset({"C-1", "P01-long-name"}))
+    for number in range(40):
+        path = tmp_path / f"{number}.txt"
+        path.write_text("x" * number + " P01-long-name" + " y" * 9, encoding="utf-8")
+        (tmp_path / f"{number}-no.txt").write_text("x" * number + " P01-long-names" + " yC-1 " * 9, encoding="utf-8")
+    assert {path.name for path in traces.files_with(tmp_path)} == {f"{number}.txt" for number in range(40)}

@@ -4,7 +4,7 @@ import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.staging import about, new_file, new_folder, replacement
+from copolicy.dataset.staging import about, new_file, new_folder, replacement, require_new
 
 
 def names(folder):
@@ -38,6 +38,16 @@ def test_an_error_leaves_nothing(tmp_path, error):
     with pytest.raises(error):
         build_and_fail(tmp_path / "set", error)
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("place", range(2))
+def test_a_link_that_leads_nowhere_is_something(tmp_path, place):
+    paths = [tmp_path / "first", tmp_path / "second"]
+    require_new(*paths)
+    paths[place].symlink_to(tmp_path / "nowhere")
+    with pytest.raises(OutputExistsError, match=paths[place].name):
+        require_new(*paths)
+    require_new(*paths, overwrite=True)
 
 
 def test_what_is_there_stays(tmp_path):
