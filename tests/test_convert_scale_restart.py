@@ -174,8 +174,6 @@ def test_options_of_another_form_are_refused(unsharded, tmp_path, capsys, conten
     error = capsys.readouterr().err
     expected = f"{shards / 'options.json'}: expected the options of a conversion, found "
     assert error.startswith(f"copolicy-convert: {expected}")
-        f"copolicy-convert: {shards / 'options.json'}: expected the options of a conversion, found "
-    )
     assert error.count("\n") == 1
 
 

@@ -3,6 +3,8 @@
 import shutil
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
@@ -76,3 +78,39 @@ def test_a_damaged_data_set_is_named_and_not_looked_for_on_the_hub(copied_table,
     with pytest.raises(FileFormatError) as caught:
         check_local_dataset(copied_table)
     assert str(caught.value).startswith(message.format(root=copied_table))
+
+
+def frames(root: Path, name: str, change) -> None:
+    path = root / "data" / "chunk-000" / "file-000.parquet"
+    table = pq.ParquetFile(path).read()
+    values = pa.array([change(value) for value in table.column(name).to_pylist()])
+    pq.write_table(table.set_column(table.column_names.index(name), name, values), path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "expected", "found"),
+    [
+        ("observation.human_action", str, "2 numbers of type float32", "string"),
+        ("action", lambda value: [*value, 0.0], "4 numbers of type float32", "5 numbers in a row"),
+        ("action", lambda value: [value], "4 numbers of type float32", "list<"),
+        ("observation.state", lambda value: value[0], None, "double"),
+        ("next.reward", lambda value: {"value": 1.0}, "a number of type float32", "struct<"),
+        ("next.reward", lambda value: None, "a number of type float32", "null"),
+        ("task_index", lambda value: value + 0.5, "a number of type int64", "fractions"),
+    ],
+)
+def test_a_column_that_lerobot_cannot_cast_is_named(copied_table, name, change, expected, found):
+    frames(copied_table, name, change)
+    path = copied_table / "data" / "chunk-000" / "file-000.parquet"
+    with pytest.raises(FileFormatError) as caught:
+        check_local_dataset(copied_table)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: expected ")
+    assert expected is None or f"{expected} in every row of {name}" in message
+    assert f"found {found}" in message
+
+
+def test_whole_numbers_stored_as_others_and_empty_values_are_left_to_lerobot(copied_table):
+    frames(copied_table, "frame_index", float)
+    frames(copied_table, "observation.human_action", lambda value: None if value[0] > 0.9 else value)
+    check_local_dataset(copied_table)

@@ -19,7 +19,7 @@ from .references import (
     video_features,
     video_span,
 )
-from .tables import ColumnError, column_types, episode_values, pa, read_parquet, row_count, scalars, vectors
+from .tables import ColumnError, column_types, episode_values, misfit, pa, read_parquet, row_count, scalars, vectors
 
 STATISTICS = ("min", "max", "mean", "std")
 """The statistics of a feature that normalisation may use."""
@@ -62,6 +62,7 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
             raise FileFormatError(path, "the features of meta/info.json", f"no column {missing[0]}")
         if missing := [name for name in ("episode_index", "index", "task_index", "timestamp") if name not in types]:
             raise FileFormatError(path, "the columns of a LeRobot data set", f"no column {missing[0]}")
+        _require_features(path, info["features"])
         table = read_parquet(path, ["episode_index", "task_index"])
         numbers, tasks = (_whole_numbers(table, name, path) for name in table.column_names)
         episodes_of_files[path.relative_to(root).as_posix()] = frozenset(np.unique(numbers).tolist())
@@ -79,6 +80,18 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
             where = "" if problem.episode is None else f"episode {problem.episode}: "
             raise FileFormatError(root, "a data set that LeRobot can load", f"this: {where}{problem.message}")
     return folder
+
+
+def _require_features(path: Path, features: Mapping[str, Any]) -> None:
+    """Checks that a data file holds numbers where its features say so; LeRobot casts each column to its feature."""
+    for name, feature in features.items():
+        dtype, shape = feature["dtype"], feature["shape"]
+        if not dtype.startswith(("float", "int", "uint", "bool")) or len(shape) != 1:
+            continue
+        found = misfit(read_parquet(path, [name]).column(name), dtype, shape)
+        if found:
+            what = f"{math.prod(shape)} numbers" if math.prod(shape) > 1 else "a number"
+            raise FileFormatError(path, f"{what} of type {dtype} in every row of {name}", found)
 
 
 def file_problems(

@@ -185,6 +185,33 @@ def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path)
     return values.reshape(-1) if width == 1 else values
 
 
+def misfit(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> str:
+    """What a column of frames holds where a feature of one axis needs numbers; empty where it fits.
+
+    Empty values fit: whether they are read depends on the episodes in use.
+
+    Args:
+        dtype: of the feature, such as `float32`.
+        shape: of the feature, such as `(4,)`; numbers of a feature of one may stand alone.
+    """
+    values, width = column.combine_chunks(), math.prod(shape)
+    is_list = any(test(values.type) for test in _LISTS)
+    kind = values.type.value_type if is_list else values.type
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
+        return str(values.type)
+    if is_list:
+        lengths = _lengths(values)
+        wrong = lengths[values.is_valid().to_numpy(zero_copy_only=False) & (lengths != width)]
+        if len(wrong):
+            return f"{int(wrong[0])} numbers in a row"
+        values = values.flatten()
+    elif width > 1:
+        return str(values.type)
+    if "int" in dtype and pa.types.is_floating(kind) and not pc.all(pc.equal(values, pc.round(values))).as_py():
+        return "fractions"
+    return ""
+
+
 def episode_values(table: pa.Table, name: str, kind: str, path: Path, unknown: Any = None) -> np.ndarray:
     """`(E,)` an episode column, see `scalars`.
 
