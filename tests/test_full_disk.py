@@ -4,13 +4,13 @@ A limit on the size of a file stands in for the full disk: no right to mount any
 in the same place, with EFBIG for ENOSPC.
 """
 
-import contextlib
 import errno
 import os
 import shutil
 from pathlib import Path
 
 import pytest
+from full_disk import full_disk
 
 from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
@@ -19,19 +19,6 @@ from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.commandline import system_line
 from copolicy.dataset.staging import new_file, new_folder, replacements
 from copolicy.train.cli import main as train
-
-resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
-
-
-@contextlib.contextmanager
-def full_disk(limit: int):
-    """No file may grow beyond `limit` bytes; Python ignores the signal that the system would send."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture(scope="module")

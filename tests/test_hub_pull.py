@@ -8,6 +8,7 @@
 | no such data set, revision or version; no token for a private one | one line | |
 """
 
+import errno
 import json
 import os
 import shutil
@@ -16,6 +17,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from full_disk import full_disk
 from hub_user import HubUser
 from local_hub import LocalHub
 from versioned_data_set import EPISODES, FRAMES, set_value, simulated_data_set
@@ -71,6 +73,20 @@ def test_what_comes_back_is_what_went_up(user, hub, released, tmp_path):
     }
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert user.run("diff", tmp_path / "out", "lab/table@data-1.0.0").status == 0
+
+
+def test_a_full_disk_leaves_nothing_at_out(user, hub, tmp_path):
+    home = tmp_path / "home"
+    home.mkdir()
+    with full_disk(3_000), HubUser(hub, home) as limited:  # its process inherits the limit
+        done = limited.run("pull", "lab/table", "--root", tmp_path / "out")
+    assert done.status == 1
+    assert len(done.err.splitlines()) == 1, done.err
+    assert done.err.startswith(f"copolicy-dataset: {tmp_path / 'out'}")
+    assert os.strerror(errno.EFBIG) in done.err
+    assert not (tmp_path / "out").exists()
+    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"home", "out"}
 
 
 def test_recordings_come_when_asked_for(user, hub, released, tmp_path):

@@ -5,6 +5,7 @@ import logging
 from collections.abc import Iterator
 
 from ..exceptions import CopolicyError, MissingExtraError, RunError
+from ..staging import refusal
 
 try:
     import httpx
@@ -33,6 +34,8 @@ __all__ = [
 
 # The client tells of every request at the level that our commands show.
 logging.getLogger("httpx").setLevel(logging.WARNING)
+# It warns where it cannot keep a list that only speeds up the next download; a full disk says so itself.
+logging.getLogger("huggingface_hub._tree_cache").setLevel(logging.ERROR)
 
 _MEANINGS = {
     401: "the Hub does not accept the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`",
@@ -58,6 +61,8 @@ def hub_api() -> HfApi:
 def hub_errors(repo_id: str, doing: str) -> Iterator[None]:
     """Turns an error of the client into a `HubError` of one line that never holds the token.
 
+    An error of a disk that is full or takes no more passes through: it is not the Hub's.
+
     Args:
         doing: what is going on, such as `uploading`.
     """
@@ -66,6 +71,8 @@ def hub_errors(repo_id: str, doing: str) -> Iterator[None]:
     except CopolicyError:
         raise
     except (OSError, ValueError, RuntimeError, httpx.HTTPError) as error:
+        if refusal(error) is not None:
+            raise
         raise HubError(_without_token(f"{repo_id}: {doing}: {_meaning(error)}")) from None
 
 

@@ -4,9 +4,10 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..exceptions import FileFormatError, OutputExistsError, RunError
+from ..exceptions import FileFormatError, RunError
 from ..files import visible_files
 from ..repo_id import checked_repo_id
+from ..staging import about, require_new
 from ..versions.content import read_content
 from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release
@@ -40,23 +41,27 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
         OutputExistsError: there is something at `root`.
         HubError: the Hub does not answer, or has no such data set or revision.
         RunError: what arrived is not what its manifest and its release say.
+        OSError: the disk refuses; nothing is kept.
     """
     checked_repo_id(repo_id, "data set on the Hub")
-    if root.exists() or root.is_symlink():
-        raise OutputExistsError(root)
+    require_new(root)
     revision, commit = resolve(repo_id, revision)
     partial = root.parent / f".{root.name}.{commit[:12]}.partial"
-    download(repo_id, partial, commit, skip=None if raw else f"{RAW_FOLDER}/*")
-    try:
-        forget_progress(partial)
-        (partial / ".gitattributes").unlink(missing_ok=True)
-        record, files = _verify(partial, f"{repo_id}@{revision}")
-        if root.exists():
-            raise OutputExistsError(root)
-        partial.rename(root)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+    with about(root, partial):
+        try:
+            download(repo_id, partial, commit, skip=None if raw else f"{RAW_FOLDER}/*")
+        except OSError:
+            shutil.rmtree(partial, ignore_errors=True)  # a full disk would stay full
+            raise
+        try:
+            forget_progress(partial)
+            (partial / ".gitattributes").unlink(missing_ok=True)
+            record, files = _verify(partial, f"{repo_id}@{revision}")
+            require_new(root)
+            partial.rename(root)
+        except BaseException:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise
     return Pulled(str(root), repo_id, revision, commit, record.version, record.content_hash, files)
 
 
