@@ -11,6 +11,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from copolicy.dataset.episode import EPISODE_COLUMNS
+
 JSON_VALUES: tuple[Any, ...] = (None, "text", -1, 1.5, math.nan, [], {}, True)
 """What a JSON field is replaced by."""
 _LIST_ITEMS = 2  # of a long list, the fields of so many entries
@@ -186,6 +188,13 @@ def harmless(damage: Damage) -> bool:
         empty = damage.field in _MEASURED and damage.kind in ("one empty value", "all empty", "no type")
         return empty or (damage.field in _FREE_COLUMNS and damage.kind in ("negative", "huge", "a nan", "infinite"))
     return damage.file.startswith("meta/copolicy")
+
+
+def unused_in_training(damage: Damage) -> bool:
+    """Whether training does not read what was damaged: documents, names of numbers, what is known of an episode."""
+    if damage.file.startswith("meta/episodes"):
+        return damage.field in EPISODE_COLUMNS
+    return damage.field.endswith(".names") or damage.file.startswith("meta/copolicy")
 
 
 _QUANTILES = ("q01", "q10", "q50", "q90", "q99")

@@ -6,13 +6,13 @@ import shutil
 
 import pytest
 from checked_data import make_data_set, make_recordings
-from damaged_sets import copy_of, damages, harmless
+from damaged_sets import copy_of, damages, harmless, unused_in_training
 
 from copolicy.cards.cli import main as cards
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import CopolicyError
-from copolicy.dataset.lerobot_folder.loading import require_loadable
+from copolicy.train.local_dataset import check_local_dataset
 
 EVERY = 211
 """One damage of so many is tried, of some eleven thousand; a prime, so that all kinds come up."""
@@ -56,6 +56,12 @@ def test_damage_is_found_or_refused_in_one_line(sound, tmp_path):
             status, line = run(main, *arguments)
             if len(line.splitlines()) > 1 or (status == 2 and not line):
                 wrong.append(f"{arguments[0]} {status}: {damage}: {line}")
-        with contextlib.suppress(CopolicyError):
-            require_loadable(root)
+        try:
+            check_local_dataset(root)
+        except CopolicyError as error:
+            if len(str(error).splitlines()) > 1:
+                wrong.append(f"train: {damage}: {error}")
+        else:
+            if not harmless(damage) and not unused_in_training(damage):
+                wrong.append(f"train passes: {damage}")
     assert not wrong

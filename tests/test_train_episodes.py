@@ -52,6 +52,15 @@ def test_an_empty_mark_excludes_nothing_and_the_marks_are_read_by_episode(copied
     assert chosen_episodes(_meta(copied_table), [1, 5]) == [5]
 
 
+@pytest.mark.parametrize("value", ["False", 0.5, [False]])
+def test_a_mark_that_is_neither_true_nor_false_is_refused(copied_table, value):
+    for path in (copied_table / "meta" / "episodes").glob("*/*.parquet"):
+        table = pq.ParquetFile(path).read().drop_columns("discarded")
+        pq.write_table(table.append_column("discarded", pa.array([value] * table.num_rows)), path)
+    with pytest.raises(RunError, match="expected true or false in the episode column discarded, found "):
+        chosen_episodes(_meta(copied_table), None)
+
+
 @pytest.mark.parametrize("mark", ["robot_type", "action", "file"])
 def test_a_set_of_ours_without_its_columns_is_refused_unless_episodes_are_named(copied_table, mark):
     _strip(copied_table, mark)

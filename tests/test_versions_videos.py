@@ -52,6 +52,13 @@ def test_an_episode_has_the_same_digest_in_a_file_of_its_own_and_in_a_joined_one
     assert video_digest(one, 0, 1.1, FPS) != video_digest(one, 0, 1.2, FPS)
 
 
+def test_a_file_in_the_place_of_another_has_a_digest_of_its_own(tmp_path):
+    path, other = encode(tmp_path / "one.mp4", 1, 12), encode(tmp_path / "two.mp4", 2, 12)
+    before, expected = (video_digest(file, 0, 1.2, FPS) for file in (path, other))
+    other.replace(path)
+    assert video_digest(path, 0, 1.2, FPS) == expected != before
+
+
 def test_what_is_no_video_is_named(tmp_path):
     (tmp_path / "x.mp4").write_bytes(b"no video")
     with pytest.raises(FileFormatError, match=r"x.mp4: expected a video, found"):

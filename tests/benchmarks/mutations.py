@@ -21,7 +21,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from damaged_sets import Damage, copy_of, damages, harmless
+from damaged_sets import Damage, copy_of, damages, harmless, unused_in_training
 
 Run = Callable[[list[str]], int]
 _PRINTED = ("traceback", "passed wrongly", "several lines", "unlike check")
@@ -81,8 +81,11 @@ def outcome(run: Run, arguments: list[str]) -> tuple[str, str]:
 
 
 def wrongly(name: str, damage: Damage) -> bool:
-    """Whether a command that passes used what was damaged: `check` must find all that a data set needs."""
-    return name == "check" and not harmless(damage)
+    """Whether a command that passes used what was damaged: `check` must find all that a data set needs, training all
+    that it reads."""
+    if harmless(damage):
+        return False
+    return name == "check" or (name == "train" and not unused_in_training(damage))
 
 
 def small_set(folder: Path) -> Path:

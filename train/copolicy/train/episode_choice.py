@@ -24,11 +24,17 @@ def excluded_episodes(meta: Any) -> frozenset[int]:
 
     Args:
         meta: LeRobot's metadata of the data set.
+
+    Raises:
+        RunError: the column holds something else than true, false or nothing.
     """
     episodes = meta.episodes
     if episodes is None or _MARK not in episodes.column_names:
         return frozenset()
-    pairs = zip(episodes["episode_index"], episodes[_MARK], strict=True)
+    pairs = list(zip(episodes["episode_index"], episodes[_MARK], strict=True))
+    other = next((value for _, value in pairs if not (value is None or isinstance(value, bool))), None)
+    if other is not None:
+        raise RunError(f"{meta.root}: expected true or false in the episode column {_MARK}, found {other!r}")
     return frozenset(int(episode) for episode, marked in pairs if marked)
 
 

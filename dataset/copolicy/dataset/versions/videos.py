@@ -18,15 +18,23 @@ def video_digest(path: Path, start: float, end: float, fps: float) -> str:
     """
     total = hashlib.sha256()
     half = 0.5 / fps  # times in containers are rounded
-    for time, packet in _packets(path):
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise FileFormatError(path, "a video", error.strerror or str(error)) from None
+    for time, packet in _packets(path, (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)):
         if start - half <= time < end - half:
             total.update(packet)
     return total.hexdigest()
 
 
 @functools.lru_cache(maxsize=4)
-def _packets(path: Path) -> tuple[tuple[float, bytes], ...]:
-    """Time and sha256 of every packet of the first video stream, in the order they are shown."""
+def _packets(path: Path, _: tuple[int, ...]) -> tuple[tuple[float, bytes], ...]:
+    """Time and sha256 of every packet of the first video stream, in the order they are shown.
+
+    Args:
+        _: state of the file: another file may take its place while the program runs.
+    """
     try:
         import av
         from av.error import FFmpegError
