@@ -197,6 +197,24 @@ def unused_in_training(damage: Damage) -> bool:
     return damage.field.endswith(".names") or damage.file.startswith("meta/copolicy")
 
 
+def look_before_training(root: Path) -> None:
+    """What `copolicy-train` looks at before the first step, all episodes being chosen.
+
+    Raises:
+        CopolicyError: the data set cannot be trained on.
+    """
+    from copolicy.dataset.lerobot_folder.info import read_info
+    from copolicy.dataset.lerobot_folder.loading import read_statistics
+    from copolicy.train.finite_data import mended_statistics, require_finite_frames
+    from copolicy.train.local_dataset import check_local_dataset
+
+    check_local_dataset(root)
+    info = read_info(root)
+    require_finite_frames(root, None, info["features"])
+    episodes = range(info["total_episodes"])
+    mended_statistics(root, read_statistics(root), episodes, len(episodes))
+
+
 _QUANTILES = ("q01", "q10", "q50", "q90", "q99")
 _MEASURED = ("achieved_hz", "replay_drift_px", "obstacle_size")
 _FREE_COLUMNS = ("achieved_hz", "replay_drift_px", "seed", "late_ticks")

@@ -6,13 +6,12 @@ import shutil
 
 import pytest
 from checked_data import make_data_set, make_recordings
-from damaged_sets import copy_of, damages, harmless, unused_in_training
+from damaged_sets import copy_of, damages, harmless, look_before_training, unused_in_training
 
 from copolicy.cards.cli import main as cards
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import CopolicyError
-from copolicy.train.local_dataset import check_local_dataset
 
 EVERY = 211
 """One damage of so many is tried, of some eleven thousand; a prime, so that all kinds come up."""
@@ -57,7 +56,7 @@ def test_damage_is_found_or_refused_in_one_line(sound, tmp_path):
             if len(line.splitlines()) > 1 or (status == 2 and not line):
                 wrong.append(f"{arguments[0]} {status}: {damage}: {line}")
         try:
-            check_local_dataset(root)
+            look_before_training(root)
         except CopolicyError as error:
             if len(str(error).splitlines()) > 1:
                 wrong.append(f"train: {damage}: {error}")

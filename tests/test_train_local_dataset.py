@@ -114,3 +114,21 @@ def test_whole_numbers_stored_as_others_and_empty_values_are_left_to_lerobot(cop
     frames(copied_table, "frame_index", float)
     frames(copied_table, "observation.human_action", lambda value: None if value[0] > 0.9 else value)
     check_local_dataset(copied_table)
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "found"),
+    [
+        ("dataset_from_index", lambda values: [value + 2**62 for value in values], "dataset_from_index 4611686018427"),
+        ("dataset_to_index", lambda values: [value - 1 for value in values], "dataset_to_index"),
+        ("dataset_from_index", lambda values: [0] * len(values), "dataset_from_index 0 and"),
+    ],
+)
+def test_episodes_whose_frames_are_others_are_named(copied_table, column, change, found):
+    for path in (copied_table / "meta" / "episodes").glob("*/*.parquet"):
+        table = pq.ParquetFile(path).read()
+        values = pa.array(change(table.column(column).to_pylist()))
+        pq.write_table(table.set_column(table.column_names.index(column), column, values), path)
+    with pytest.raises(FileFormatError, match="expected episodes that follow each other") as caught:
+        check_local_dataset(copied_table)
+    assert found in str(caught.value)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from damaged_sets import Damage, copy_of, damages, harmless, unused_in_training
+from damaged_sets import Damage, copy_of, damages, harmless, look_before_training, unused_in_training
 
 Run = Callable[[list[str]], int]
 _PRINTED = ("traceback", "passed wrongly", "several lines", "unlike check")
@@ -57,10 +57,9 @@ def commands(root: Path, scratch: Path, sound: Path, before: bool) -> Iterator[t
 def train(arguments: list[str]) -> int:
     """What `copolicy-train` looks at before the first step."""
     from copolicy.dataset.exceptions import CopolicyError
-    from copolicy.train.local_dataset import check_local_dataset
 
     try:
-        check_local_dataset(Path(arguments[0]))
+        look_before_training(Path(arguments[0]))
     except CopolicyError as error:
         print(error, file=sys.stderr)
         return error.exit_status

@@ -53,6 +53,7 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
             raise FileFormatError(root / name, f"{expected} rows, as meta/info.json says", f"{rows}")
     for name in POSITIONS:
         episode_values(folder.episodes, name, "int", root / "meta" / "episodes")
+    _require_spans(folder)
     episodes_of_files: dict[str, frozenset[int]] = {}
     task_numbers: set[int] = set()
     for path in folder.data_files:
@@ -80,6 +81,21 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
             where = "" if problem.episode is None else f"episode {problem.episode}: "
             raise FileFormatError(root, "a data set that LeRobot can load", f"this: {where}{problem.message}")
     return folder
+
+
+def _require_spans(folder: LeRobotFolder) -> None:
+    """Checks that every frame belongs to one episode, by `dataset_from_index` and `dataset_to_index`."""
+    first, end = (folder.episodes.column(name).to_numpy() for name in POSITIONS[2:])
+    lengths = np.asarray(folder.lengths)
+    wrong = np.flatnonzero(end - first != lengths)
+    if not len(wrong):
+        order = np.argsort(first, kind="stable")
+        wrong = order[first[order] != np.cumsum(lengths[order]) - lengths[order]]
+    if len(wrong):
+        episode = int(wrong[0])
+        expected = f"episodes that follow each other, episode {episode} with {lengths[episode]} frames"
+        found = f"dataset_from_index {first[episode]} and dataset_to_index {end[episode]}"
+        raise FileFormatError(folder.root / "meta" / "episodes", expected, found)
 
 
 def _require_features(path: Path, features: Mapping[str, Any]) -> None:
