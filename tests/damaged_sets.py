@@ -194,6 +194,10 @@ def unused_in_training(damage: Damage) -> bool:
     """Whether training does not read what was damaged: documents, names of numbers, what is known of an episode."""
     if damage.file.startswith("meta/episodes"):
         return damage.field in EPISODE_COLUMNS
+    if damage.file == "meta/stats.json" and damage.kind == "NaN":
+        return damage.field.startswith(
+            ("frame_index", "episode_index", "index", "task_index", "next.done", "next.succ")
+        )
     return damage.field.endswith(".names") or damage.file.startswith("meta/copolicy")
 
 
