@@ -191,7 +191,9 @@ def test_minaris_environment_has_the_rate_and_the_limits_of_the_data(
 ):
     root = make_data_set(recordings, tmp_path / "table", "--no-drift", "--fps", str(fps))
     set_columns(root, physics=[physics_text(Physics(**physics))] * 3)
-    metadata = json.loads((export(root, "minari", tmp_path / "table-v0") / "data/metadata.json").read_text("utf-8"))
+    metadata = json.loads(
+        (export(root, "minari", tmp_path / "table-v0") / "data/metadata.json").read_text(encoding="utf-8")
+    )
     # What `recover_environment` does.
     env = gymnasium.make(EnvSpec.from_json(metadata["env_spec"]))
     assert env.spec is not None

@@ -263,6 +263,7 @@ def test_policy_features_are_the_data_sets():
         (lambda: TableCarryingEnvConfig(map_set="v2"), UnknownNameError, "unknown map set 'v2'; available: holdout"),
         (lambda: TableCarryingEnv(partner="S99"), UnknownNameError, "unknown simulated pair 'S99'; available: S01"),
         (lambda: TableCarryingEnv(step_limit=0), InvalidValueError, "step_limit: expected at least 1, found 0"),
+        (lambda: TableCarryingEnvConfig(step_limit=0), InvalidValueError, "step_limit: expected at least 1, found 0"),
         (
             lambda: TableCarryingEnv(observation_width=63),
             InvalidValueError,

@@ -21,6 +21,7 @@ from copolicy.dataset.features import (
     SCENE_SIZE,
 )
 from copolicy.dataset.maps import MAP_SETS
+from copolicy.dataset.task import Physics
 
 FEATURES_MAP = {**OBSERVATION_KEYS, SCENE_IMAGE: SCENE_IMAGE, ACTION: ACTION}
 """Keys of the environment, and the columns of a data set that they stand for.
@@ -53,7 +54,8 @@ class TableCarryingEnvConfig(EnvConfig):
 
     Raises:
         UnknownNameError: no such map set.
-        InvalidValueError: `fps` does not divide 30, or a size that no image of a data set has.
+        InvalidValueError: `fps` does not divide 30, a limit that is not positive, or a size that no image of a data
+            set has.
     """
 
     task: str | None = "TableCarrying-v0"  # name of the environment in gymnasium's registry
@@ -73,6 +75,7 @@ class TableCarryingEnvConfig(EnvConfig):
         stride(self.fps)
         if self.map_set not in MAP_SETS:
             raise UnknownNameError("map set", self.map_set, MAP_SETS)
+        Physics(self.angular_acceleration_limit, self.step_limit)
         shape = require_image_size(self.observation_width, self.observation_height)
         self.features.pop(SCENE_IMAGE, None)  # a stored configuration may come with another choice of `pixels`
         if self.pixels:
