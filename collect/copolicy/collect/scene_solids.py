@@ -10,8 +10,9 @@ from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 
 from copolicy.dataset.task import GOAL_SIZE, MapConfig
-from copolicy.dataset.topics import MAP_SOLIDS, TABLE_FRAME, TABLE_SOLIDS, Topic
+from copolicy.dataset.topics import MAP_SOLIDS, TABLE_FRAME, TABLE_SOLIDS
 
+from .episode_messages import Record
 from .scene import (
     BOARD_CENTRE,
     COLOURS,
@@ -27,13 +28,10 @@ from .table import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 
 TABLE_FRAME_ID = "table"
 
-_INSET = 0.002  # m: inside the solids of the SceneUpdate, so that Foxglove, which draws both, shows no flicker
+_INSET = 0.002  # m: inside the solids of the SceneUpdate, so that a viewer which draws both shows no flicker
 _CHANNELS = ("red", "green", "blue", "alpha")
-_TRIANGLE_BOX = tuple(
-    choose(point[axis] for point in TRIANGLE) for choose in (min, max) for axis in (0, 1)
-)  # left, top, right, bottom, px
-
-Record = tuple[Topic, bytes]
+# Left, top, right, bottom, px.
+_TRIANGLE_BOX = tuple(choose(point[axis] for point in TRIANGLE) for choose in (min, max) for axis in (0, 1))
 
 
 def solid_records(map_config: MapConfig, time_ns: int) -> list[Record]:

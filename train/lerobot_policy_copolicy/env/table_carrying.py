@@ -98,7 +98,8 @@ class TableCarryingEnv(gymnasium.Env):
         self._max_episode_steps = frames(step_limit, fps)  # by this name LeRobot asks for it
         if partner:
             _check_pair(partner)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2 if partner else 4,), np.float32)
+        self._action_shape = (2,) if partner else (4,)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self._action_shape, np.float32)
         spaces: dict[str, gymnasium.Space] = {key: _box(column) for key, column in OBSERVATION_KEYS.items()}
         shape = require_image_size(observation_width, observation_height)
         self._image_size = (observation_width, observation_height) if pixels else None
@@ -107,12 +108,12 @@ class TableCarryingEnv(gymnasium.Env):
         self.observation_space = gymnasium.spaces.Dict(spaces)
 
     @property
-    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def spec(self) -> EnvSpec | None:
         """The registered specification, with the frames after which this environment truncates."""
         return self._spec
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
         if spec is not None and spec.max_episode_steps is None:
             spec = replace(spec, max_episode_steps=self._max_episode_steps)
         self._spec = spec
@@ -145,8 +146,8 @@ class TableCarryingEnv(gymnasium.Env):
             ShapeError: an action of another shape.
         """
         given = np.asarray(action, dtype=float)
-        if given.shape != self.action_space.shape:
-            raise ShapeError("action", self.action_space.shape, given.shape)
+        if given.shape != self._action_shape:
+            raise ShapeError("action", self._action_shape, given.shape)
         given = np.clip(given, -1.0, 1.0)
         executed, forces = [], []
         outcome = RUNNING
