@@ -3,19 +3,24 @@
 import contextlib
 import io
 import json
+import math
 from pathlib import Path
 
+import gymnasium
 import h5py
 import numpy as np
 import pytest
 from checked_data import EPISODES, contents, make_data_set, make_recordings, set_columns
+from gymnasium.envs.registration import EnvSpec
 
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
 from copolicy.convert.zarr_store import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.features import BOUNDS, STATE
+from copolicy.dataset.features import BOUNDS, GYM_ID, OBSERVATION_KEYS, STATE
 from copolicy.dataset.log import read_episode
+from copolicy.dataset.physics_text import physics_text
+from copolicy.dataset.task import Physics
 
 
 def run(*arguments: object) -> None:
@@ -133,7 +138,11 @@ def test_robomimic_gets_transitions_masks_and_the_episode_columns(data_set, tmp_
             assert set(EPISODE_COLUMNS) <= set(demo.attrs)
             assert demo.attrs["source"] == "simulated"
             np.testing.assert_array_equal(demo["actions"], episode.actions)
-            np.testing.assert_array_equal(np.asarray(demo["next_obs/state"])[:-1], np.asarray(demo["obs/state"])[1:])
+            before, after = np.asarray(demo["obs/agent_pos"]), np.asarray(demo["next_obs/agent_pos"])
+            np.testing.assert_array_equal(before, episode.states)
+            np.testing.assert_array_equal(after[:-1], before[1:])
+            assert {f"{group}/{key}" in demo for group in ("obs", "next_obs") for key in OBSERVATION_KEYS} == {True}
+            assert "obs/state" not in demo
             next_human = np.asarray(demo["next_obs/human_action"])
             np.testing.assert_array_equal(next_human[:-1], np.asarray(demo["obs/human_action"])[1:])
             assert np.flatnonzero(np.asarray(demo["dones"])).tolist() == [len(episode) - 1]
@@ -147,14 +156,14 @@ def test_minari_gets_one_more_observation_than_actions_within_its_spaces(data_se
     assert (metadata["dataset_id"], metadata["data_format"], metadata["total_episodes"]) == ("table-v0", "hdf5", 3)
     assert metadata["total_steps"] == sum(map(len, expected))
     assert metadata["copolicy"]["sources"] == {"simulated": 3}
-    box = json.loads(metadata["observation_space"])["subspaces"]["state"]
+    box = json.loads(metadata["observation_space"])["subspaces"]["agent_pos"]
     with h5py.File(folder / "main_data.hdf5", "r") as file:
         for number, episode in enumerate(expected):
             group = file[f"episode_{number}"]
             assert isinstance(group, h5py.Group)
             assert (group.attrs["id"], group.attrs["total_steps"]) == (number, len(episode))
             assert group.attrs["episode_uuid"] == episode.meta["episode_uuid"]
-            states = np.asarray(group["observations/state"])
+            states = np.asarray(group["observations/agent_pos"])
             assert len(states) == len(episode) + 1
             assert (states >= np.float32(box["low"])).all()
             assert (states <= np.float32(box["high"])).all()
@@ -165,6 +174,45 @@ def test_minari_gets_one_more_observation_than_actions_within_its_spaces(data_se
             )
             assert bool(np.asarray(group["infos/success"])[-1]) == episode.meta["success"]
     assert np.float32(box["high"][0]) == np.float32(BOUNDS[STATE][1, 0])
+
+
+LIMITED = {"step_limit": 400, "angular_acceleration_limit": math.pi / 8}
+
+
+@pytest.mark.parametrize(
+    ("fps", "physics", "kwargs", "frames"),
+    [
+        (10, {}, {"fps": 10, "step_limit": 1000}, 334),
+        (30, {}, {"fps": 30, "step_limit": 1000}, 1000),
+        (15, LIMITED, {"fps": 15, **LIMITED}, 200),
+    ],
+)
+def test_minaris_environment_has_the_rate_and_the_limits_of_the_data(
+    recordings, tmp_path, fps, physics, kwargs, frames
+):
+    root = make_data_set(recordings, tmp_path / "table", "--no-drift", "--fps", str(fps))
+    set_columns(root, physics=[physics_text(Physics(**physics))] * 3)
+    metadata = json.loads(
+        (export(root, "minari", tmp_path / "table-v0") / "data/metadata.json").read_text(encoding="utf-8")
+    )
+    # What `recover_environment` does.
+    env = gymnasium.make(EnvSpec.from_json(metadata["env_spec"]))
+    assert env.spec is not None
+    assert (env.spec.id, env.spec.kwargs, env.spec.max_episode_steps) == (GYM_ID, kwargs, frames)
+    space = json.loads(metadata["observation_space"])["subspaces"]
+    assert list(space) == list(OBSERVATION_KEYS)
+    observation, _ = env.reset(seed=0)
+    assert {key: list(value.shape) for key, value in observation.items()} == {
+        key: box["shape"] for key, box in space.items()
+    }
+    assert list(env.action_space.shape or ()) == json.loads(metadata["action_space"])["shape"]
+    steps = [env.step(np.zeros(4, np.float32)) for _ in range(frames)]
+    assert [truncated for *_, truncated, _ in steps] == [False] * (frames - 1) + [True]
+    assert steps[-1][-1]["termination_reason"] == "timeout"
+    exported = export(root, "robomimic", tmp_path / "table.hdf5")
+    with h5py.File(exported, "r") as file:
+        environment = json.loads(str(file["data"].attrs["env_args"]))
+    assert {"step_limit": 1000, **environment["env_kwargs"]} == kwargs
 
 
 def test_the_final_state_is_the_one_that_the_recording_ends_with(data_set, recordings):

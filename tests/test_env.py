@@ -6,16 +6,30 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from gymnasium.utils.env_checker import check_env
+from lerobot.configs import FeatureType
 from lerobot.envs import make_env
+from lerobot.envs.factory import make_env_pre_post_processors
 from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 
 from copolicy.collect.world import TableWorld
+from copolicy.convert.scene_pictures import scene_pictures
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.features import (
+    ACTION,
+    ENVIRONMENT_STATE,
+    FEATURES,
+    GYM_ID,
+    HUMAN_ACTION,
+    SCENE_IMAGE,
+    STATE,
+    environment_state,
+)
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import MAP_SETS
-from lerobot_policy_copolicy.env.configuration_table_carrying import GYM_ID, TableCarryingEnvConfig
+from lerobot_policy_copolicy import CopolicyConfig
+from lerobot_policy_copolicy.env.configuration_table_carrying import TableCarryingEnvConfig
 from lerobot_policy_copolicy.env.table_carrying import TableCarryingEnv
 
 # pygame imports setuptools' old API where that is installed.
@@ -24,7 +38,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:pkg_resources is deprecated")
 PUSH = np.array([1.0, 0.2, 1.0, 0.2], np.float32)
 
 
-def episode(env: TableCarryingEnv, action=PUSH, frames: int = 400) -> list[tuple]:
+def episode(env: gymnasium.Env, action=PUSH, frames: int = 400) -> list[tuple]:
     steps = []
     for _ in range(frames):
         steps.append(env.step(action))
@@ -33,15 +47,30 @@ def episode(env: TableCarryingEnv, action=PUSH, frames: int = 400) -> list[tuple
     return steps
 
 
-@pytest.mark.parametrize("partner", ["", "S01"])
-def test_passes_gymnasiums_checks(partner):
-    check_env(gymnasium.make(GYM_ID, partner=partner).unwrapped)
+@pytest.mark.parametrize(("partner", "size"), [("", 4), ("S01", 2)])
+@pytest.mark.parametrize("pixels", [False, True])
+def test_passes_gymnasiums_checks(partner, size, pixels):
+    env = gymnasium.make(GYM_ID, partner=partner, pixels=pixels, observation_width=64, observation_height=64)
+    check_env(env.unwrapped)
+    assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
 
 
-def test_is_registered_with_a_limit():
-    env = gymnasium.make(GYM_ID)
+@pytest.mark.parametrize(
+    ("settings", "frames"),
+    [({}, 334), ({"fps": 30}, 1000), ({"fps": 5, "step_limit": 100}, 17), ({"fps": 30, "step_limit": 400}, 400)],
+)
+def test_is_truncated_where_rate_and_step_limit_say_and_says_why(settings, frames):
+    env = gymnasium.make(GYM_ID, **settings)
+    env.reset(seed=0)
+    steps = episode(env, np.zeros(4, np.float32), frames=frames + 1)
+    assert len(steps) == frames
+    assert steps[-1][2:4] == (False, True)
+    assert steps[-1][4]["termination_reason"] == "timeout"
     assert env.spec is not None
-    assert env.spec.max_episode_steps == math.ceil(1000 / 3)
+    assert env.spec.max_episode_steps == frames
+    again = gymnasium.make(env.spec)  # as Minari and others do
+    again.reset(seed=0)
+    assert len(episode(again, np.zeros(4, np.float32), frames=frames + 1)) == frames
 
 
 @pytest.mark.parametrize(("fps", "held"), [(30, 1), (10, 3), (5, 6)])
@@ -136,18 +165,20 @@ def test_interaction_force_is_the_frames_mean_magnitude():
     assert info["interaction_force"] == pytest.approx(abs(interaction_force(env.world.pose[2], action)))
 
 
-def test_partner_replaces_the_human_half():
+def test_partner_acts_for_the_human():
     env = TableCarryingEnv(partner="S01")
+    robot = np.array([0.5, 0], np.float32)
     runs = []
-    for human in (1.0, -1.0):
+    for _ in range(2):
         env.reset(seed=3)
-        runs.append([env.step(np.array([0.5, 0, human, human], np.float32)) for _ in range(10)])
+        runs.append([env.step(robot) for _ in range(10)])
     for a, b in zip(*runs, strict=True):
         np.testing.assert_array_equal(a[0]["agent_pos"], b[0]["agent_pos"])
         np.testing.assert_array_equal(a[0]["human_action"], a[4]["action"][2:].astype(np.float32))
+        np.testing.assert_array_equal(a[4]["action"][:2], robot)
     assert any(step[0]["human_action"].any() for step in runs[0])
     env.reset(seed=3 + len(env.maps))  # same map, another mood
-    other = [env.step(np.array([0.5, 0, 0, 0], np.float32)) for _ in range(10)]
+    other = [env.step(robot) for _ in range(10)]
     assert not all(np.array_equal(a[0]["agent_pos"], b[0]["agent_pos"]) for a, b in zip(other, runs[0], strict=True))
 
 
@@ -155,8 +186,26 @@ def test_partner_and_passive_robot_get_somewhere():
     env = TableCarryingEnv(partner="S01")
     env.reset(options={"map_index": 0})
     start = env.world.pose[0]
-    episode(env, np.zeros(4, np.float32), frames=60)
+    episode(env, np.zeros(2, np.float32), frames=60)
     assert env.world.pose[0] > start + 50
+
+
+@pytest.mark.parametrize("size", [(600, 300), (96, 96)])
+def test_observes_the_images_of_a_data_set(size):
+    env = TableCarryingEnv(pixels=True, observation_width=size[0], observation_height=size[1])
+    observation, _ = env.reset(options={"map_index": 20})
+    states, images = [env.world.observation], [observation["pixels"]["scene"]]
+    for _ in range(2):
+        observation, *_ = env.step(PUSH)
+        assert env.observation_space.contains(observation)
+        states.append(env.world.observation)
+        images.append(observation["pixels"]["scene"])
+    expected = list(scene_pictures(np.stack(states), env.maps[20], size))
+    np.testing.assert_array_equal(images, expected)
+    batch = preprocess_observation(observation)
+    assert tuple(batch[SCENE_IMAGE].shape) == (1, 3, size[1], size[0])
+    assert set(batch) == {STATE, ENVIRONMENT_STATE, HUMAN_ACTION, SCENE_IMAGE}
+    assert "pixels" not in TableCarryingEnv().reset(seed=0)[0]
 
 
 def test_picture_shows_the_players():
@@ -173,25 +222,38 @@ def test_picture_shows_the_players():
     assert TableCarryingEnv(render_mode=None).render() is None
 
 
-def test_lerobot_makes_vector_environments():
-    config = TableCarryingEnvConfig(fps=5, map_set="holdout", step_limit=100)
+@pytest.mark.parametrize(("partner", "size"), [("", 4), ("S01", 2)])
+def test_lerobot_makes_vector_environments(partner, size):
+    config = TableCarryingEnvConfig(fps=5, map_set="holdout", step_limit=100, partner=partner, pixels=True)
     env: Any = make_env(config, n_envs=2)["table_carrying"][0]
     try:
         observation, _ = env.reset(seed=[0, 1])
-        assert tuple(preprocess_observation(observation)[STATE].shape) == (2, 7)
+        batch = preprocess_observation(observation)
+        assert tuple(batch[STATE].shape) == (2, 7)
+        assert tuple(batch[SCENE_IMAGE].shape) == (2, 3, 300, 600)
         assert env.call("_max_episode_steps")[0] == 17
         assert env.metadata["render_fps"] == 5
-        *_, info = env.step(np.zeros((2, 4), np.float32))
+        assert env.single_action_space.shape == (size,)
+        *_, info = env.step(np.zeros((2, size), np.float32))
         assert info["is_success"].tolist() == [False, False]
     finally:
         env.close()
 
 
+@pytest.mark.parametrize(("partner", "size"), [("", 4), ("S01", 2)])
+def test_of_a_policys_action_a_partner_leaves_the_robots_half(partner, size):
+    _, postprocessor = make_env_pre_post_processors(TableCarryingEnvConfig(partner=partner), CopolicyConfig())
+    action = torch.arange(8.0).reshape(2, 4)
+    assert postprocessor({ACTION: action})[ACTION].tolist() == action[:, :size].tolist()
+
+
 def test_policy_features_are_the_data_sets():
     features = env_to_policy_features(TableCarryingEnvConfig())
-    assert {key: tuple(feature.shape) for key, feature in features.items()} == {
-        key: FEATURES[key]["shape"] for key in (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)
-    }
+    columns = {key: FEATURES[key]["shape"] for key in (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)}
+    assert {key: tuple(feature.shape) for key, feature in features.items()} == columns
+    features = env_to_policy_features(TableCarryingEnvConfig(pixels=True, observation_width=96, observation_height=64))
+    assert {key: tuple(feature.shape) for key, feature in features.items()} == {**columns, SCENE_IMAGE: (3, 64, 96)}
+    assert features[SCENE_IMAGE].type is FeatureType.VISUAL
 
 
 @pytest.mark.parametrize(
@@ -200,6 +262,18 @@ def test_policy_features_are_the_data_sets():
         (lambda: TableCarryingEnvConfig(fps=7), InvalidValueError, "fps: expected a divisor of 30"),
         (lambda: TableCarryingEnvConfig(map_set="v2"), UnknownNameError, "unknown map set 'v2'; available: holdout"),
         (lambda: TableCarryingEnv(partner="S99"), UnknownNameError, "unknown simulated pair 'S99'; available: S01"),
+        (lambda: TableCarryingEnv(step_limit=0), InvalidValueError, "step_limit: expected at least 1, found 0"),
+        (lambda: TableCarryingEnvConfig(step_limit=0), InvalidValueError, "step_limit: expected at least 1, found 0"),
+        (
+            lambda: TableCarryingEnv(observation_width=63),
+            InvalidValueError,
+            "observation_width: expected an even number of px from 64 to 3840, found 63",
+        ),
+        (
+            lambda: TableCarryingEnvConfig(observation_height=4000),
+            InvalidValueError,
+            "observation_height: expected an even number of px from 64 to 3840, found 4000",
+        ),
     ],
 )
 def test_wrong_settings_are_named(make, error, message):
@@ -207,8 +281,9 @@ def test_wrong_settings_are_named(make, error, message):
         make()
 
 
-def test_wrong_action_is_named():
-    env = TableCarryingEnv()
+@pytest.mark.parametrize(("partner", "expected", "given"), [("", 4, 2), ("S01", 2, 4), ("S01", 2, 1)])
+def test_wrong_action_is_named(partner, expected, given):
+    env = TableCarryingEnv(partner=partner)
     env.reset(seed=0)
-    with pytest.raises(ShapeError, match=r"^action: expected shape \(4,\), got \(2,\)$"):
-        env.step(np.zeros(2, np.float32))
+    with pytest.raises(ShapeError, match=rf"^action: expected shape \({expected},\), got \({given},\)$"):
+        env.step(np.zeros(given, np.float32))

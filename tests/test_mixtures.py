@@ -215,7 +215,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(made, tmp_path):
         assert json.loads(str(file["data"].attrs["copolicy"]))["physics"] == counts
         assert json.loads(str(file["data/demo_0"].attrs["physics"])) == asdict(EIGHTH)
         assert json.loads(str(file["data"].attrs["env_args"]))["env_kwargs"] == {"fps": 10}
-        after = np.asarray(file["data/demo_0/next_obs/state"])[-1]
+        after = np.asarray(file["data/demo_0/next_obs/agent_pos"])[-1]
         np.testing.assert_array_equal(after, next(iter(source.episodes())).final_state())
     metadata = json.loads((tmp_path / "a-v0/data/metadata.json").read_text(encoding="utf-8"))
     assert metadata["copolicy"]["physics"] == counts

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
@@ -31,6 +32,7 @@ MAP = MAP_SETS["training"][6]
 META = EpisodeMeta("uuid-1", pair_id="S01", source="simulated")
 START_NS = 1_700_000_000_000_000_000
 ACTION = (0.5, -0.25, 1.0, 0.0)
+SOLIDS = ("goal", *(f"obstacle_{slot}" for slot in range(len(MAP.obstacles))), "table", "robot", "human")
 
 
 def recorder(path, **options):
@@ -92,6 +94,8 @@ def test_other_programs_decode_it_by_its_own_schemas(finished):
         "/episode/event": 2,
         "/scene": 96,
         "/scene/map": 1,
+        "/scene/transform": 96,
+        **{f"/scene/solid/{name}": 1 for name in SOLIDS},
     }
     time_ns, state = messages["/table/state"][30]
     assert (state.step, state.sim_time, time_ns) == (30, 1.0, START_NS + 10**9)
@@ -126,6 +130,7 @@ def test_records_that_describe_the_file(finished):
     assert {schema.name for schema in summary.schemas.values()} == {
         "copolicy.v1.TableState", "copolicy.v1.PlayerInput", "copolicy.v1.PlayerAction", "copolicy.v1.Interaction",
         "copolicy.v1.LoopTiming", "copolicy.v1.EpisodeEvent", "foxglove.SceneUpdate",
+        "foxglove.FrameTransform", "foxglove.VoxelGrid",
     }  # fmt: skip
 
 
@@ -158,6 +163,47 @@ def test_the_scene_is_in_metres_with_y_up(finished):
         ((x - 78 * math.cos(theta)) / 100, 6 - (y + 78 * math.sin(theta)) / 100), abs=2e-4
     )
     assert moving["table"].timestamp.seconds == START_NS // 10**9 + 3
+
+
+def box(grid) -> tuple[list[float], list[float]]:
+    """Lowest and highest corner of a grid of one cell, m."""
+    low, size = grid.pose.position, grid.cell_size
+    return [low.x, low.y, low.z], [low.x + size.x, low.y + size.y, low.z + size.z]
+
+
+def test_viewers_without_scene_updates_get_boxes_and_the_tables_frame(finished):
+    path, world, _ = finished
+    messages = decoded(path)
+    still = {entity.id: entity.cubes[0] for entity in messages["/scene/map"][0][1].entities if entity.cubes}
+    for name, cube in still.items():
+        time_ns, grid = messages[f"/scene/solid/{name}"][0]
+        assert (time_ns, grid.frame_id, grid.row_count, grid.column_count) == (START_NS, "world", 1, 1)
+        centre, size = cube.pose.position, cube.size
+        expected = [[at + end * side / 2 for at, side in zip(numbers(centre), numbers(size), strict=True)]
+                    for end in (-1, 1)]  # fmt: skip
+        np.testing.assert_allclose(box(grid), expected, atol=0.003)  # just inside, so that nothing flickers
+        channels = {field.name: grid.data[field.offset] / 255 for field in grid.fields}
+        assert channels["red"] == pytest.approx(cube.color.r, abs=0.01)
+        assert channels["alpha"] == 1.0
+    low, high = zip(*(box(messages[f"/scene/solid/{name}"][0][1]) for name in ("human", "table", "robot")), strict=True)
+    assert [grid[1].frame_id for name in ("table", "robot", "human") for grid in messages[f"/scene/solid/{name}"]] == [
+        "table"
+    ] * 3
+    left, right = np.array(low)[:, 0], np.array(high)[:, 0]
+    np.testing.assert_allclose([left, right], [[-0.955, -0.565, 0.555], [-0.605, 0.515, 0.955]], atol=0.003)
+    for step in (0, 60, 95):
+        time_ns, frame = messages["/scene/transform"][step]
+        state = messages["/table/state"][step][1]
+        assert (frame.parent_frame_id, frame.child_frame_id) == ("world", "table")
+        assert time_ns == frame.timestamp.seconds * 10**9 + frame.timestamp.nanos == START_NS + step * 10**9 // 30
+        assert (frame.translation.x, frame.translation.y) == pytest.approx((state.x / 100, 6 - state.y / 100), abs=2e-4)
+        yaw = 2 * math.atan2(frame.rotation.z, frame.rotation.w)
+        assert math.cos(yaw - state.theta) == pytest.approx(1, abs=1e-6)
+    assert (state.x, state.y) == world.pose[:2]
+
+
+def numbers(vector) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
 
 
 def test_a_real_time_recording_keeps_the_clock_of_its_session(tmp_path):

@@ -12,8 +12,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks import damage, kill
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
+from mcap_variants import library_records, write
 
 from copolicy.collect.cli import main
 from copolicy.collect.recorder import EpisodeRecorder
@@ -124,8 +128,46 @@ def test_every_topic_is_copied_with_its_times_up_to_the_same_step(tmp_path, whol
         ("/loop/timing", LoopTiming, 60),
     ):
         assert messages(output, message, topic) == messages(truth_path, message, topic)[:count]
+    for topic, message in (("/scene", SceneUpdate), ("/scene/transform", FrameTransform)):
+        copied, truth = (messages(file, message, topic) for file in (output, truth_path))
+        assert copied[:60] == truth[:60]
+        assert [step for _, step, _ in copied] == list(range(61))
+        assert copied[60][0] == truth[60][0]
+    assert copied[60] == truth[60]  # the table's frame; in the scene no force acts any more
+    solid = messages(output, VoxelGrid, "/scene/solid/table")
+    assert solid == messages(truth_path, VoxelGrid, "/scene/solid/table")
+    assert len(solid) == 1
     events = [(step, event.kind) for _, step, event in messages(output, EpisodeEvent, "/episode/event")]
     assert events == [(0, "start"), (60, "recovered")]
+
+
+def test_a_part_of_an_earlier_version_is_recovered_without_what_it_did_not_record(tmp_path, whole):
+    truth_path, truth = whole
+    earlier = tmp_path / "earlier.mcap"
+    kept = {record.id for record in library_records(truth_path) if isinstance(record, Channel) and not later(record)}
+    records = [
+        record
+        for record in library_records(truth_path)
+        if not (isinstance(record, Channel) and later(record))
+        and not (isinstance(record, Message) and record.channel_id not in kept)
+    ]
+    write(records, earlier, chunk_size=8192)
+    episode = read_episode(earlier)
+    assert (episode.states == truth.states).all()
+    part = broken_off(tmp_path / "episode.mcap.part", earlier, 3)
+    recover(tmp_path)
+    output = part.with_name("episode.recovered.mcap")
+    recovered = read_episode(output)
+    assert 10 < len(recovered.states) < 95
+    assert recovered.states.tobytes() == truth.states[: len(recovered.states)].tobytes()
+    assert len(messages(output, SceneUpdate, "/scene")) == len(recovered.states) + 1
+    with output.open("rb") as file:
+        assert not [record for record in StreamReader(file).records if isinstance(record, Channel) and later(record)]
+
+
+def later(channel: Channel) -> bool:
+    """Whether earlier versions had no such channel."""
+    return channel.topic.startswith(("/scene/transform", "/scene/solid/"))
 
 
 def test_what_happened_in_the_session_is_not_forgotten(tmp_path):

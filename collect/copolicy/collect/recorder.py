@@ -24,6 +24,7 @@ from . import episode_messages
 from .episode_file import EpisodeFile
 from .episode_messages import Record, Triple, checked_forces, checked_state
 from .scene import TableScene, map_scene
+from .scene_solids import TableFrame, solid_records
 from .wall_clock import WallClockAnchor
 
 # A killed process loses what came after the last flush, and the action of the step before it, whose outcome was not
@@ -93,7 +94,7 @@ class EpisodeRecorder:
         self._pose, self._velocity = checked_state(map_config.start if pose is None else pose, velocity)
         self._positions = array("d", self._pose[:2])
         self._total_reward = 0.0
-        self._scene = TableScene()
+        self._scene, self._frame = TableScene(), TableFrame()
         self._ended = False
 
     def __enter__(self) -> "EpisodeRecorder":
@@ -242,7 +243,7 @@ class EpisodeRecorder:
         map_json = self._map_config.to_json().encode()
         self._file.add_attachment(episode_records.MAP_ATTACHMENT, "application/json", map_json, time_ns)
         self._file.declare_topics()
-        self._write([(SCENE_MAP, map_scene(self._map_config, time_ns))])
+        self._write([(SCENE_MAP, map_scene(self._map_config, time_ns)), *solid_records(self._map_config, time_ns)])
         self.event("start")
 
     def _end(self, success: bool, termination_reason: str, notes: str = "", **columns: Any) -> None:
@@ -265,7 +266,9 @@ class EpisodeRecorder:
 
     def _state_records(self, forces: tuple[float, ...]) -> list[Record]:
         state = episode_messages.state_record(self.steps, self._pose, self._velocity, self._time_ns)
-        return [state, (SCENE, self._scene.update(self._anchor.at(self._time_ns), self._pose, forces))]
+        time_ns = self._anchor.at(self._time_ns)
+        scene = SCENE, self._scene.update(time_ns, self._pose, forces)
+        return [state, scene, self._frame.record(time_ns, self._pose)]
 
     def _write(self, records: list[Record]) -> None:
         time_ns = self._anchor.at(self._time_ns)

@@ -26,6 +26,7 @@ from .episode_file import sync_folder
 from .episode_messages import Record, event_record
 from .intact_records import IntactPart, intact_records
 from .scene import TableScene
+from .scene_solids import TableFrame
 from .session.recorded import PRACTICE
 
 RECOVERED = "recovered"
@@ -118,9 +119,9 @@ class _Copy:
 
     def end(self, stopped_by: str) -> None:
         """Adds the scene of the final state, in which no force acts any more, and the event of the recovery."""
-        state = self._final
-        scene = TableScene().update(self._time_ns, (state.x, state.y, state.theta), (0.0, 0.0, 0.0, 0.0))
-        self._add_ours((SCENE, scene))
+        pose = self._final.x, self._final.y, self._final.theta
+        self._add_ours((SCENE, TableScene().update(self._time_ns, pose, (0.0, 0.0, 0.0, 0.0))))
+        self._add_ours(TableFrame().record(self._time_ns, pose))
         self._add_ours(event_record(self._steps, RECOVERED, stopped_by))
 
     def _take_message(self, message: Message) -> None:

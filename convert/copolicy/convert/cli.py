@@ -8,6 +8,7 @@ from typing import get_args
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import SCENE_SIZE
 from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.repo_id import checked_repo_id
 
@@ -117,11 +118,11 @@ def _video(arguments: argparse.Namespace) -> tuple[int, int] | None:
         raise InvalidValueError("--video-size", "--video beside it", arguments.video_size)
     if not arguments.video and not arguments.append:
         return None
-    from .scene_video import DEFAULT_SIZE, parse_size
+    from .scene_video import parse_size
 
     asked = parse_size(arguments.video_size) if arguments.video_size else None
     if not arguments.append:
-        return asked or DEFAULT_SIZE
+        return asked or SCENE_SIZE
     from .append import stored_video
 
     return stored_video(arguments.root, arguments.video, asked)

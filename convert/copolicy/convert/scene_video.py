@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.features import SCENE_IMAGE, SCENE_SIDES
 
 from .statistics import QUANTILES
 
@@ -23,14 +24,12 @@ try:
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
-SCENE = "observation.images.scene"
+SCENE = SCENE_IMAGE
 """Name of the feature."""
 
 VideoSize = tuple[int, int]
 """Width and height, px."""
 
-DEFAULT_SIZE: VideoSize = (600, 300)
-_SMALLEST, _LARGEST = 64, 3840  # px
 _SAMPLED = 4  # every so many pixels of a row and of a column go into the statistics
 _LEVELS = 256
 
@@ -58,8 +57,9 @@ def parse_size(text: str) -> VideoSize:
     """
     width, _, height = text.partition("x")
     size = tuple(int(part) if part.isdecimal() else 0 for part in (width, height))
-    if any(side % 2 or not _SMALLEST <= side <= _LARGEST for side in size):
-        raise InvalidValueError("--video-size", f"WIDTHxHEIGHT in even px from {_SMALLEST} to {_LARGEST}", text)
+    shortest, longest = SCENE_SIDES
+    if any(side % 2 or not shortest <= side <= longest for side in size):
+        raise InvalidValueError("--video-size", f"WIDTHxHEIGHT in even px from {shortest} to {longest}", text)
     return size[0], size[1]
 
 

@@ -28,6 +28,11 @@ def stride(fps: int) -> int:
     return RECORD_HZ // fps
 
 
+def frames(steps: int, fps: int) -> int:
+    """Frames that some recorded steps fill, the last one perhaps in part."""
+    return -(-steps // stride(fps))
+
+
 def frame_states(states: np.ndarray, fps: int) -> np.ndarray:
     """States of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`."""
     return states[:: stride(fps)]

@@ -15,6 +15,24 @@ STATE = "observation.state"
 ENVIRONMENT_STATE = "observation.environment_state"
 HUMAN_ACTION = "observation.human_action"
 ACTION = "action"
+SCENE_IMAGE = "observation.images.scene"
+"""The optional image of map and table, without the forces."""
+
+SCENE_SIZE = (600, 300)
+"""Its width and height, px, unless other ones are asked for."""
+
+SCENE_SIDES = (64, 3840)
+"""The shortest and the longest side that it may have, px."""
+
+OBSERVATION_KEYS = {"agent_pos": STATE, "environment_state": ENVIRONMENT_STATE, "human_action": HUMAN_ACTION}
+"""Names of the observations in the environment and in exports, and their columns.
+
+`agent_pos` and `environment_state` are what LeRobot reads from a gymnasium environment as `observation.state` and
+`observation.environment_state`.
+"""
+
+GYM_ID = "copolicy/TableCarrying-v0"
+"""Name of the environment in gymnasium's registry; importing `lerobot_policy_copolicy` registers it."""
 
 ENVIRONMENT_NAMES = (
     "start_x",

@@ -4,13 +4,15 @@ import functools
 from dataclasses import dataclass, field
 from typing import Any
 
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from .messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, PlayerInput, TableState
-from .task import PLAYERS
+from .task import MAX_OBSTACLES, PLAYERS
 
 ENCODING = "protobuf"
 """Encoding of every message and of every schema."""
@@ -63,7 +65,21 @@ EVENT = Topic("/episode/event", EpisodeEvent)
 SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
 SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
 
-TOPICS = (TABLE_STATE, *INPUTS, *ACTIONS, INTERACTION, LOOP_TIMING, EVENT, SCENE_MAP, SCENE)
+# The same scene in the messages that Rerun's importer maps, which SceneUpdate is not one of.
+TABLE_FRAME = Topic("/scene/transform", FrameTransform, {"units": "m", "frame": SCENE_FRAME})
+MAP_SOLIDS = tuple(
+    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": SCENE_FRAME})
+    for name in ("goal", *(f"obstacle_{slot}" for slot in range(MAX_OBSTACLES)))
+)
+TABLE_SOLIDS = tuple(
+    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": "table: origin in its middle, turns with it"})
+    for name in ("table", *PLAYERS)
+)
+
+TOPICS = (
+    *(TABLE_STATE, *INPUTS, *ACTIONS, INTERACTION, LOOP_TIMING, EVENT),
+    *(SCENE_MAP, SCENE, TABLE_FRAME, *MAP_SOLIDS, *TABLE_SOLIDS),
+)
 """Every topic of a recording, in the order of its channels."""
 
 _SCHEMA_NAMES = {(topic.name, topic.schema_name) for topic in TOPICS}

@@ -2,25 +2,33 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import gymnasium
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs import EnvConfig
 
 from copolicy.dataset.clock import stride
-from copolicy.dataset.exceptions import UnknownNameError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.features import (
+    ACTION,
+    ENVIRONMENT_STATE,
+    FEATURES,
+    GYM_ID,
+    OBSERVATION_KEYS,
+    SCENE_IMAGE,
+    SCENE_SIDES,
+    SCENE_SIZE,
+)
 from copolicy.dataset.maps import MAP_SETS
+from copolicy.dataset.task import Physics
 
-GYM_ID = "copolicy/TableCarrying-v0"
+FEATURES_MAP = {**OBSERVATION_KEYS, SCENE_IMAGE: SCENE_IMAGE, ACTION: ACTION}
+"""Keys of the environment, and the columns of a data set that they stand for.
 
-FEATURES_MAP = {
-    "agent_pos": STATE,
-    "environment_state": ENVIRONMENT_STATE,
-    "human_action": HUMAN_ACTION,
-    "action": ACTION,
-}
-"""Keys of the environment, and the columns of a data set that they stand for."""
+The image is under `pixels` in an observation, where LeRobot looks for it; its key here is the one by which
+`lerobot-eval --eval.recording=true` finds it.
+"""
 
 
 def _features() -> dict[str, PolicyFeature]:
@@ -28,6 +36,7 @@ def _features() -> dict[str, PolicyFeature]:
     return {
         key: PolicyFeature(type=kinds.get(column, FeatureType.STATE), shape=FEATURES[column]["shape"])
         for key, column in FEATURES_MAP.items()
+        if column != SCENE_IMAGE
     }
 
 
@@ -36,12 +45,17 @@ def _features() -> dict[str, PolicyFeature]:
 class TableCarryingEnvConfig(EnvConfig):
     """Settings of the environment; see `TableCarryingEnv` for what it does.
 
+    `features` are those of a policy, which LeRobot builds by them: a policy that learned from this project's data acts
+    for both players. With a partner the environment itself takes two numbers, and `get_env_processors` leaves out the
+    human's half.
+
     LeRobot seeds episode i with `seed + i` and the environment takes map `seed % maps`, so that as many episodes as
     the set has maps visit each map once.
 
     Raises:
         UnknownNameError: no such map set.
-        InvalidValueError: `fps` does not divide 30.
+        InvalidValueError: `fps` does not divide 30, a limit that is not positive, or a size that no image of a data
+            set has.
     """
 
     task: str | None = "TableCarrying-v0"  # name of the environment in gymnasium's registry
@@ -50,7 +64,10 @@ class TableCarryingEnvConfig(EnvConfig):
     orientations: bool = False  # start each map in the four orientations 0, pi/2, pi and 3 pi/2
     step_limit: int = 1000  # steps of 1/30 s after which an episode is truncated
     angular_acceleration_limit: float = math.pi / 2  # rad/s^2; the paper's training-time rollouts used pi/8
-    partner: str = ""  # simulated pair whose human plays the human half, e.g. "S01"; empty: the action's own half
+    partner: str = ""  # simulated pair whose human acts, e.g. "S01", beside the robot's half of the policy's action
+    pixels: bool = False  # observe the image of the scene too, for policies that learned from `--video` data sets
+    observation_width: int = SCENE_SIZE[0]  # px, of the image, as in the data set
+    observation_height: int = SCENE_SIZE[1]  # px, of the image, as in the data set
     features: dict[str, PolicyFeature] = field(default_factory=_features)  # fixed by the task
     features_map: dict[str, str] = field(default_factory=FEATURES_MAP.copy)  # fixed by the task
 
@@ -58,6 +75,11 @@ class TableCarryingEnvConfig(EnvConfig):
         stride(self.fps)
         if self.map_set not in MAP_SETS:
             raise UnknownNameError("map set", self.map_set, MAP_SETS)
+        Physics(self.angular_acceleration_limit, self.step_limit)
+        shape = require_image_size(self.observation_width, self.observation_height)
+        self.features.pop(SCENE_IMAGE, None)  # a stored configuration may come with another choice of `pixels`
+        if self.pixels:
+            self.features[SCENE_IMAGE] = PolicyFeature(FeatureType.VISUAL, shape)
 
     @property
     def package_name(self) -> str:
@@ -79,18 +101,35 @@ class TableCarryingEnvConfig(EnvConfig):
             "step_limit": self.step_limit,
             "angular_acceleration_limit": self.angular_acceleration_limit,
             "partner": self.partner,
-            "max_episode_steps": frames(self.step_limit, self.fps),
+            "pixels": self.pixels,
+            "observation_width": self.observation_width,
+            "observation_height": self.observation_height,
         }
 
+    def get_env_processors(self) -> tuple[Any, Any]:
+        """What LeRobot puts between environment and policy: with a partner, the robot's half of the action is taken."""
+        observations, actions = super().get_env_processors()
+        if self.partner:
+            from .processor_table_carrying import RobotHalfProcessorStep
 
-def frames(step_limit: int, fps: int) -> int:
-    """Frames that a limit in steps of the world covers, the last one perhaps in part."""
-    return math.ceil(step_limit / stride(fps))
+            actions.steps = [RobotHalfProcessorStep()]
+        return observations, actions
+
+
+def require_image_size(width: int, height: int) -> tuple[int, int, int]:
+    """The shape of an image of the scene, `(height, width, 3)`.
+
+    Raises:
+        InvalidValueError: a side that no data set can have.
+    """
+    shortest, longest = SCENE_SIDES
+    for name, side in (("observation_width", width), ("observation_height", height)):
+        if side % 2 or not shortest <= side <= longest:
+            raise InvalidValueError(name, f"an even number of px from {shortest} to {longest}", side)
+    return height, width, 3
 
 
 if GYM_ID not in gymnasium.registry:
-    gymnasium.register(
-        id=GYM_ID,
-        entry_point="lerobot_policy_copolicy.env.table_carrying:TableCarryingEnv",
-        max_episode_steps=frames(1000, 10),
-    )
+    # Without max_episode_steps: how many frames an episode may have follows from `step_limit` and `fps`, and the
+    # environment itself truncates there and says why.
+    gymnasium.register(id=GYM_ID, entry_point="lerobot_policy_copolicy.env.table_carrying:TableCarryingEnv")

@@ -1,38 +1,43 @@
 """The gymnasium environment of the table-carrying task."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
 from copolicy.collect.world import RUNNING, TableWorld
-from copolicy.dataset.clock import stride
-from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.features import BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.clock import frames, stride
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
+from copolicy.dataset.features import BOUNDS, OBSERVATION_KEYS, SCENE_SIZE, environment_state, theta_of
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import WINDOW, MapConfig, Physics
 from copolicy.dataset.task import map_set as maps_of
+
+from .configuration_table_carrying import require_image_size
 
 _TASK = "table_carrying"
 
 
 class TableCarryingEnv(gymnasium.Env):
-    """Two players carry a table past obstacles to a goal; an action holds the forces of both.
+    """Two players carry a table past obstacles to a goal.
 
     ## Action space
     `Box(-1, 1, (4,), float32)`: robot_fx, robot_fy, human_fx, human_fy in units of a player's full force, x to the
-    right, y down. Held for 30 / fps steps of the world. With a simulated `partner`, the human half of the action is
-    ignored and the partner acts instead, at every step of the world.
+    right, y down. Held for 30 / fps steps of the world. With a simulated `partner` it is `Box(-1, 1, (2,), float32)`,
+    the robot's half: the partner acts for the human, at every step of the world.
 
     ## Observation space
-    A `Dict` of float32 in px, rad and s:
+    A `Dict` of float32 in px, rad and s, under the names that LeRobot knows:
 
     | key | shape | LeRobot column |
     |---|---|---|
     | agent_pos | (7,) | observation.state: x, y, cos_theta, sin_theta, vx, vy, omega |
     | environment_state | (11,) | observation.environment_state: start pose, goal, three obstacles padded with zeros |
     | human_action | (2,) | observation.human_action: what the human did in the previous frame, zero at the first |
+    | pixels | {"scene": (height, width, 3) uint8}, with `pixels=True` only | observation.images.scene |
 
     ## Reward
     Of the state that the frame ends in (`copolicy.collect.reward`).
@@ -42,7 +47,8 @@ class TableCarryingEnv(gymnasium.Env):
 
     ## Termination
     The goal, an obstacle or a wall is touched, also within a frame; `info["termination_reason"]` tells which.
-    Truncated after `step_limit` steps of the world.
+    Truncated after `step_limit` steps of the world, for the reason `timeout`; that is the frame
+    `ceil(step_limit * fps / 30)`. A `max_episode_steps` of `gymnasium.make` comes on top and gives no reason.
 
     ## Starting state
     At rest at the start of a map. `reset(seed=s)` takes map `s % maps`, `reset(options={"map_index": i})` map i, and
@@ -55,11 +61,14 @@ class TableCarryingEnv(gymnasium.Env):
         step_limit: steps of 1/30 s after which an episode is truncated.
         angular_acceleration_limit: rad/s^2.
         partner: simulated pair whose human plays the human half; empty for none.
+        pixels: observe the image of the scene too, as `copolicy-convert mcap --video` draws it.
+        observation_width: of the image, px.
+        observation_height: of the image, px.
         render_mode: "rgb_array" or None.
 
     Raises:
         UnknownNameError: no such map set or pair.
-        InvalidValueError: `fps` does not divide 30.
+        InvalidValueError: `fps` does not divide 30, or a limit or a size that cannot be.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (as gymnasium declares it)
@@ -72,6 +81,9 @@ class TableCarryingEnv(gymnasium.Env):
         step_limit: int = 1000,
         angular_acceleration_limit: float = math.pi / 2,
         partner: str = "",
+        pixels: bool = False,
+        observation_width: int = SCENE_SIZE[0],
+        observation_height: int = SCENE_SIZE[1],
         render_mode: str | None = "rgb_array",
     ):
         self.metadata = {**type(self).metadata, "render_fps": fps}
@@ -80,14 +92,31 @@ class TableCarryingEnv(gymnasium.Env):
         self.maps = maps_of(map_set, orientations)
         self.physics = Physics(angular_acceleration_limit, step_limit)
         self.partner = partner
+        self._spec: EnvSpec | None = None
         self._stride = stride(fps)
         self._next_map = 0
+        self._max_episode_steps = frames(step_limit, fps)  # by this name LeRobot asks for it
         if partner:
             _check_pair(partner)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (4,), np.float32)
-        self.observation_space = gymnasium.spaces.Dict(
-            {"agent_pos": _box(STATE), "environment_state": _box(ENVIRONMENT_STATE), "human_action": _box(HUMAN_ACTION)}
-        )
+        self._action_shape = (2,) if partner else (4,)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self._action_shape, np.float32)
+        spaces: dict[str, gymnasium.Space] = {key: _box(column) for key, column in OBSERVATION_KEYS.items()}
+        shape = require_image_size(observation_width, observation_height)
+        self._image_size = (observation_width, observation_height) if pixels else None
+        if pixels:
+            spaces["pixels"] = gymnasium.spaces.Dict({"scene": gymnasium.spaces.Box(0, 255, shape, np.uint8)})
+        self.observation_space = gymnasium.spaces.Dict(spaces)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The registered specification, with the frames after which this environment truncates."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        if spec is not None and spec.max_episode_steps is None:
+            spec = replace(spec, max_episode_steps=self._max_episode_steps)
+        self._spec = spec
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[dict, dict]:
         """Puts the table at the start of a map.
@@ -107,16 +136,25 @@ class TableCarryingEnv(gymnasium.Env):
         if self.partner:
             self._human = _simulated_human(map_config, self.partner, int(self.np_random.integers(2**31)))
         self._action = np.zeros(4)
+        self._image = _scene_image(map_config, self._image_size) if self._image_size else None
         return self._observation(), self._info("", False, 0.0)
 
     def step(self, action: np.ndarray) -> tuple[dict, float, bool, bool, dict]:
-        """Holds an action `(4,)` for a frame."""
+        """Holds an action, `(4,)` or with a partner `(2,)`, for a frame.
+
+        Raises:
+            ShapeError: an action of another shape.
+        """
+        given = np.asarray(action, dtype=float)
+        if given.shape != self._action_shape:
+            raise ShapeError("action", self._action_shape, given.shape)
+        given = np.clip(given, -1.0, 1.0)
         executed, forces = [], []
         outcome = RUNNING
         for _ in range(self._stride):
-            held = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+            held = given
             if self._human is not None:
-                held[2:] = np.clip(self._human.act(self.world.observation), -1.0, 1.0)
+                held = np.concatenate((given, np.clip(self._human.act(self.world.observation), -1.0, 1.0)))
             outcome = self.world.step(held)
             executed.append(held)
             forces.append(interaction_force(self.world.pose[2], held))
@@ -140,12 +178,14 @@ class TableCarryingEnv(gymnasium.Env):
         TableView(self.world.map_config).draw(surface, surface.get_rect(), self.world.pose, self._action.tolist())
         return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(*surface.get_size()[::-1], 3)
 
-    def _observation(self) -> dict[str, np.ndarray]:
-        return {
-            "agent_pos": self.world.observation.astype(np.float32),
-            "environment_state": self._environment.copy(),
-            "human_action": self._action[2:].astype(np.float32),
-        }
+    def _observation(self) -> dict[str, Any]:
+        state = self.world.observation
+        values = state.astype(np.float32), self._environment.copy(), self._action[2:].astype(np.float32)
+        observation: dict[str, Any] = dict(zip(OBSERVATION_KEYS, values, strict=True))
+        if self._image is not None:
+            x, y = state[:2].tolist()
+            observation["pixels"] = {"scene": self._image.draw((x, y, float(theta_of(state))))}
+        return observation
 
     def _info(self, reason: str, success: bool, force: float) -> dict[str, Any]:
         return {
@@ -157,7 +197,7 @@ class TableCarryingEnv(gymnasium.Env):
         }
 
 
-# The pilots are imported where they are used, since only a simulated partner needs the planner behind them.
+# Imported where they are used: only a simulated partner needs the planner behind it, only images need pygame.
 
 
 def _check_pair(pair_id: str) -> None:
@@ -171,6 +211,12 @@ def _simulated_human(map_config: MapConfig, pair_id: str, seed: int):
     from copolicy.collect.pilots import simulated_pair
 
     return simulated_pair(map_config, pair_id, seed)[1]
+
+
+def _scene_image(map_config: MapConfig, size: tuple[int, int]):
+    from copolicy.collect.screen.scene_image import SceneImage
+
+    return SceneImage(map_config, size)
 
 
 def _box(column: str) -> gymnasium.spaces.Box:

@@ -1,8 +1,9 @@
 """Exports to a Minari data set: a folder NAME-vN with `data/metadata.json` and `data/main_data.hdf5`.
 
 It is read with `minari.load_dataset("NAME-vN")` where MINARI_DATASETS_PATH is the folder that holds it, or with
-`minari.MinariDataset(".../NAME-vN/data")`. An episode has T actions and T + 1 observations; its metadata are the
-episode columns. Format: https://minari.farama.org/content/dataset_standards/
+`minari.MinariDataset(".../NAME-vN/data")`. An episode has T actions and T + 1 observations, under the names of the
+environment; its metadata are the episode columns. `recover_environment()` makes the environment at the data set's rate
+and under its physics, where `lerobot_policy_copolicy[train]` is installed. Format: https://minari.farama.org/content/dataset_standards/
 """
 
 import json
@@ -12,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.clock import frames
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
-from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, TASK
+from copolicy.dataset.features import ACTION, BOUNDS, GYM_ID, OBSERVATION_KEYS, TASK
 from copolicy.dataset.staging import new_folder
+from copolicy.dataset.task import Physics
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
@@ -27,7 +30,7 @@ except ModuleNotFoundError:
 _FORMAT_VERSION = "0.5.0"
 """Version of Minari whose layout this is; a later one reads it, an earlier one says that it cannot."""
 
-_OBSERVATIONS = {"state": STATE, "environment_state": ENVIRONMENT_STATE, "human_action": HUMAN_ACTION}
+_ENTRY_POINT = "lerobot_policy_copolicy.env.table_carrying:TableCarryingEnv"
 _TERMINATIONS = ("goal", "collision_obstacle", "collision_wall")  # any other end cuts the episode off
 
 
@@ -45,13 +48,13 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
         folder.mkdir(parents=True)
         path = folder / "main_data.hdf5"
         with new_hdf5(path, track_order=True) as (file, storage):
-            bounds = {feature: BOUNDS[feature].astype(np.float32) for feature in (*_OBSERVATIONS.values(), ACTION)}
+            bounds = {feature: BOUNDS[feature].astype(np.float32) for feature in (*OBSERVATION_KEYS.values(), ACTION)}
             for number, episode in enumerate(source.episodes()):
                 group = file.create_group(f"episode_{number}")
                 _write_episode(group, number, episode)
                 _widen(bounds, group)
                 storage.check()
-        subspaces = {name: _box(bounds[feature]) for name, feature in _OBSERVATIONS.items()}
+        subspaces = {name: _box(bounds[feature]) for name, feature in OBSERVATION_KEYS.items()}
         metadata = {
             "total_episodes": len(source.rows),
             "total_steps": source.frames,
@@ -59,6 +62,8 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
             # Minari keeps spaces as JSON texts inside the JSON file.
             "observation_space": json.dumps({"type": "Dict", "subspaces": subspaces}),
             "action_space": json.dumps(_box(bounds[ACTION])),
+            "env_spec": json.dumps(_environment(source)),
+            "requirements": ["lerobot_policy_copolicy[train]"],
             "dataset_id": out.name,
             "minari_version": _FORMAT_VERSION,
             "dataset_size": round(path.stat().st_size / 1e6, 1),
@@ -69,9 +74,26 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
     return {"frames": source.frames, "dataset_id": out.name}
 
 
+def _environment(source: ExportSource) -> dict[str, Any]:
+    """The entries of gymnasium's `EnvSpec`."""
+    kwargs = {"step_limit": Physics().step_limit, **source.environment}
+    return {
+        "id": GYM_ID,
+        "entry_point": _ENTRY_POINT,
+        "reward_threshold": None,
+        "nondeterministic": False,
+        "max_episode_steps": frames(kwargs["step_limit"], source.fps),
+        "order_enforce": True,
+        "disable_env_checker": False,
+        "kwargs": kwargs,
+        "additional_wrappers": [],
+        "vector_entry_point": None,
+    }
+
+
 def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
     # The task's bounds scale the values for training, a table can turn a little faster; a space must hold all.
-    paths = {feature: f"observations/{name}" for name, feature in _OBSERVATIONS.items()} | {ACTION: "actions"}
+    paths = {feature: f"observations/{name}" for name, feature in OBSERVATION_KEYS.items()} | {ACTION: "actions"}
     for feature, path in paths.items():
         values = np.asarray(group[path])
         low, high = bounds[feature]
@@ -88,10 +110,13 @@ def _box(bounds: np.ndarray) -> dict[str, Any]:
 def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> None:
     last = np.arange(len(episode)) == len(episode) - 1
     terminated = episode.meta["termination_reason"] in _TERMINATIONS
+    observations = (
+        np.vstack((episode.states, episode.final_state())),
+        np.tile(episode.environment, (len(episode) + 1, 1)),
+        np.vstack((episode.human_actions, episode.actions[-1:, 2:])),
+    )
     arrays = {
-        "observations/state": np.vstack((episode.states, episode.final_state())),
-        "observations/environment_state": np.tile(episode.environment, (len(episode) + 1, 1)),
-        "observations/human_action": np.vstack((episode.human_actions, episode.actions[-1:, 2:])),
+        **{f"observations/{key}": values for key, values in zip(OBSERVATION_KEYS, observations, strict=True)},
         "actions": episode.actions,
         "rewards": episode.rewards,
         "terminations": last & terminated,

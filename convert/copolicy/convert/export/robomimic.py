@@ -1,8 +1,9 @@
 """Exports to the HDF5 layout of robomimic, one file.
 
-`data/demo_i` with `actions`, `obs/*`, `next_obs/*`, `rewards`, `dones` and `states`; its attributes are the episode
-columns, `source` among them. Filter keys under `mask`: each split of the data set (`val` and `validation` as
-robomimic's `valid`), or `train` and `valid` as asked for, `success` and `failure`, and one for each source.
+`data/demo_i` with `actions`, `obs/*` and `next_obs/*` (named as in the environment), `rewards`, `dones` and `states`;
+its attributes are the episode columns, `source` among them. Filter keys under `mask`: each split of the data set (`val`
+and `validation` as robomimic's `valid`), or `train` and `valid` as asked for, `success` and `failure`, and one for each
+source.
 Format: https://robomimic.github.io/docs/datasets/overview.html
 """
 
@@ -18,8 +19,8 @@ import numpy as np
 from copolicy.dataset.edit.groups import By, groups
 from copolicy.dataset.edit.parts import Part, deal
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS
 from copolicy.dataset.staging import new_file
-from copolicy.dataset.task import Physics
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
@@ -30,7 +31,6 @@ except ModuleNotFoundError:
     raise MissingExtraError("h5py") from None
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
-_ENVIRONMENT = "copolicy/TableCarrying-v0"  # registered by importing lerobot_policy_copolicy
 _SPLITS = {"val": "valid", "validation": "valid"}
 
 
@@ -80,8 +80,7 @@ def export_robomimic(source: ExportSource, out: Path, validation: Validation | N
                 masks[mask].append(name)
         if validation is not None:
             masks |= _set_apart(source, motions, validation)
-        kwargs = {"fps": source.fps, **_physics_kwargs(source.physics)}
-        environment = {"env_name": _ENVIRONMENT, "type": _GYM, "env_kwargs": kwargs}
+        environment = {"env_name": GYM_ID, "type": _GYM, "env_kwargs": source.environment}
         data.attrs.update({"total": source.frames, "env_args": json.dumps(environment)})
         data.attrs["copolicy"] = json.dumps(source.facts())
         for mask, names in masks.items():
@@ -92,31 +91,20 @@ def export_robomimic(source: ExportSource, out: Path, validation: Validation | N
 def _write_demo(group: h5py.Group, episode: ExportEpisode) -> None:
     count = len(episode)
     environment = np.tile(episode.environment, (count, 1))
-    after = episode.next_states()
+    before = episode.states, environment, episode.human_actions
+    after = episode.next_states(), environment, episode.actions[:, 2:]
     arrays = {
         "actions": episode.actions,
         "rewards": episode.rewards,
         "dones": (np.arange(count) == count - 1).astype(np.int64),
         # Enough to set the environment to: the table's state and the map.
         "states": np.hstack((episode.states, environment)),
-        "obs/state": episode.states,
-        "obs/environment_state": environment,
-        "obs/human_action": episode.human_actions,
-        "next_obs/state": after,
-        "next_obs/environment_state": environment,
-        "next_obs/human_action": episode.actions[:, 2:],
+        **{f"obs/{key}": values for key, values in zip(OBSERVATION_KEYS, before, strict=True)},
+        **{f"next_obs/{key}": values for key, values in zip(OBSERVATION_KEYS, after, strict=True)},
     }
     for name, values in arrays.items():
         group.create_dataset(name, data=values)
     group.attrs.update({"num_samples": count, "episode_index": episode.index, **episode.meta})
-
-
-def _physics_kwargs(physics: Physics | None) -> dict[str, float]:
-    """What the environment must be told to go on as the episodes did; nothing where it does by default or no one
-    physics holds for all (the attribute `copolicy` says which do)."""
-    default = Physics().angular_acceleration_limit
-    limit = default if physics is None else physics.angular_acceleration_limit
-    return {} if limit == default else {"angular_acceleration_limit": limit}
 
 
 def _masks(source: ExportSource, episode: ExportEpisode, splits: bool) -> list[str]:

@@ -143,10 +143,19 @@ class ExportSource:
         }
 
     @property
-    def physics(self) -> Physics | None:
-        """The settings that led from state to state in all exported episodes; None where they differ or are unknown."""
-        settings = {physics_of(row["physics"]) for row in self.rows}
-        return next(iter(settings)) if len(settings) == 1 else None
+    def environment(self) -> dict[str, Any]:
+        """What the environment must be told to go on as the episodes did, beside its defaults.
+
+        A setting in which the episodes differ keeps its default; `facts` says which physics they have.
+        """
+        default = Physics()
+        settings = [physics_of(row["physics"]) or default for row in self.rows]
+        kwargs: dict[str, Any] = {"fps": self.fps}
+        for name in ("step_limit", "angular_acceleration_limit"):
+            values = {getattr(physics, name) for physics in settings}
+            if len(values) == 1 and values != {getattr(default, name)}:
+                kwargs[name] = values.pop()
+        return kwargs
 
     def episodes(self) -> Iterator[ExportEpisode]:
         """The exported episodes in order; one data file is in memory at a time.
