@@ -354,3 +354,20 @@ def test_a_long_recording_is_on_the_disk_not_in_memory(tmp_path):
             tracemalloc.stop()
         recording.finish(False, "timeout")
     assert kept < 200 * steps
+
+
+@pytest.mark.parametrize(
+    ("action", "flags", "expected"),
+    [
+        ((0.5, -0.25, 0.5, -0.25), "", "identical_actions"),
+        ((0.5, -0.25, 0.5, -0.25), "paused", "paused,identical_actions"),
+        ((0.0, 0.0, 0.0, 0.0), "", ""),
+        ((0.5, -0.25, 0.5, 0.25), "paused", "paused"),
+    ],
+)
+def test_an_episode_in_which_one_device_moved_both_is_flagged(tmp_path, action, flags, expected):
+    path = tmp_path / "episode.mcap"
+    with recorder(path) as recording:
+        carry(recording, 12, action)
+        recording.finish(False, "timeout", quality_flags=flags)
+    assert read_episode(path).meta.quality_flags == expected

@@ -134,6 +134,7 @@ def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
     world = TableWorld(MAP)
     recording = EpisodeRecorder(path, MAP, META, WallClockAnchor.simulated(10**18)).__enter__()
     recording.event("practice")
+    recording.event("stick_off_centre", "human: pushes with 0.15 at rest")
     for _ in range(40):
         world.step((1.0, 0.0, 1.0, 0.0))
         recording.step((1.0, 0.0, 1.0, 0.0), world.pose, world.velocity, world.reward())
@@ -147,7 +148,9 @@ def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
     episode = read_episode(tmp_path / "copy.recovered.mcap")
     assert len(episode.actions) == 39
     meta = episode.meta
-    assert (meta.quality_flags, meta.discarded) == ("practice,paused,recovered", True)
+    # Both players gave the same throughout.
+    assert meta.quality_flags == "practice,paused,stick_off_centre,identical_actions,recovered"
+    assert meta.discarded
     notes = read_metadata(tmp_path / "copy.recovered.mcap")["episode_result"]["notes"]
     assert notes == "the phone rang; ended at step 40 with timeout, without a verdict"
 

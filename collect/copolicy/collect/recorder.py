@@ -13,6 +13,7 @@ import numpy as np
 from copolicy.dataset import episode_records
 from copolicy.dataset.episode import EpisodeMeta, TerminationReason
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
+from copolicy.dataset.interaction import identical
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
 from copolicy.dataset.routes import route_class
@@ -31,6 +32,10 @@ from .wall_clock import WallClockAnchor
 _FLUSH_NS = 9 * 10**8
 
 
+IDENTICAL_ACTIONS = "identical_actions"
+"""Quality flag of an episode in which both players gave the same actions, as one device listed twice makes them do."""
+
+
 class EpisodeRecorder:
     """Writes one episode to `NAME.mcap.part`, which becomes `NAME.mcap` once it is complete and on the disk.
 
@@ -47,7 +52,8 @@ class EpisodeRecorder:
     every event, so that a killed process loses at most a second, and its `.part` stays. A block that is left
     without `finish` completes its file all the same, up to the last state: as `operator_discard`, marked
     discarded, where it was left in order or by Ctrl-C; as `crash_recovered` with the quality flag `aborted` where
-    it was left by another exception. Should that file not read back, it stays a `.part`.
+    it was left by another exception. Should that file not read back, it stays a `.part`. An episode of identical
+    actions gets the flag `identical_actions`.
 
     Attributes:
         meta: the episode's columns, complete after `finish`.
@@ -93,6 +99,7 @@ class EpisodeRecorder:
         self._pose, self._velocity = checked_state(map_config.start if pose is None else pose, velocity)
         self._positions = array("d", self._pose[:2])
         self._total_reward = 0.0
+        self._forces = array("d")
         self._scene = TableScene()
         self._ended = False
 
@@ -178,6 +185,7 @@ class EpisodeRecorder:
         self._pose, self._velocity = after
         self._positions.extend(self._pose[:2])
         self._total_reward += float(reward)
+        self._forces.extend(forces)
         if monotonic_ns is None:
             self._time_ns = self._begin_ns + self.steps * 10**9 // RECORD_HZ
         else:
@@ -247,6 +255,8 @@ class EpisodeRecorder:
 
     def _end(self, success: bool, termination_reason: str, notes: str = "", **columns: Any) -> None:
         path = np.asarray(self._positions).reshape(-1, 2)
+        if identical(np.asarray(self._forces).reshape(-1, 4)):
+            columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,
             success=success,

@@ -5,6 +5,7 @@ object, and pygame 2.6 warns about a package of setuptools that it uses.
 """
 
 import os
+import sys
 import warnings
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
@@ -17,4 +18,54 @@ with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="pkg_resources is deprecated", category=UserWarning)
     import pygame
 
-__all__ = ["pygame"]
+__all__ = ["NoDisplayError", "init_events", "open_display", "pygame"]
+
+_INVISIBLE = frozenset(("offscreen", "dummy", "evdev"))  # drivers of SDL that show nothing
+_DRIVER = "SDL_VIDEODRIVER"
+
+
+class NoDisplayError(Exception):
+    """There is nothing to show a window on."""
+
+
+def open_display() -> None:
+    """Starts SDL's video system for a window that somebody is to see.
+
+    Without a display SDL falls back on a driver that draws nowhere; whoever wants that one names it in
+    `SDL_VIDEODRIVER`.
+
+    Raises:
+        NoDisplayError: there is no display.
+    """
+    wanted = os.environ.get(_DRIVER, "").split(",")
+    try:
+        if pygame.display.get_init() and pygame.display.get_driver() in _INVISIBLE.difference(wanted):
+            pygame.display.quit()  # as `init_events` left it
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+    except pygame.error as error:
+        raise NoDisplayError(str(error)) from None
+    if driver in _INVISIBLE.difference(wanted):
+        pygame.display.quit()
+        raise NoDisplayError(_why_invisible(driver))
+
+
+def _why_invisible(driver: str) -> str:
+    if sys.platform != "linux":
+        return f"SDL offers nothing but its driver {driver!r}"
+    named = [f"{name}={os.environ[name]}" for name in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)]
+    return f"no answer from {' and '.join(named)}" if named else "neither DISPLAY nor WAYLAND_DISPLAY is set"
+
+
+def init_events() -> None:
+    """Starts what delivers the events of joysticks, SDL's video system; opens no window and needs no display."""
+    if pygame.display.get_init():
+        return
+    before = os.environ.get(_DRIVER)
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        os.environ.setdefault(_DRIVER, "dummy")
+    try:
+        pygame.display.init()
+    finally:
+        if before is None:
+            os.environ.pop(_DRIVER, None)

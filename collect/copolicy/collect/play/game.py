@@ -11,6 +11,8 @@ from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import RECORD_HZ, MapConfig, identify
 
+from ..inputs import KeyboardHalf, Pad
+from ..inputs.gamepads import Labels
 from ..screen import TableView
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
@@ -223,6 +225,20 @@ class Game:
 
     # The screen.
 
+    def labels(self) -> list[Labels]:
+        """What is printed on the gamepads in hand, each kind once."""
+        pads = [player.device for player in self.players if isinstance(player.device, Pad)]
+        return list({tuple(pad.labels[name] for name in ("a", "b", "x", "y")): pad.labels for pad in pads}.values())
+
+    def hint(self, *actions: tuple[str, str, str]) -> str:
+        """How to choose: each action by its control of a gamepad, its key and its word; for all devices in hand."""
+        ways = [[labels[control] for control, _, _ in actions] for labels in self.labels()]
+        if any(isinstance(player.device, KeyboardHalf) for player in self.players):
+            ways.append([key for _, key, _ in actions])
+        words = [word for _, _, word in actions]
+        texts = ("   ".join(f"{how} {word}" for how, word in zip(way, words, strict=True) if how) for way in ways)
+        return "     |     ".join(texts)
+
     def say(self, text: str) -> None:
         """Shows a short message for three seconds."""
         self._toast = (text, self.clock() + _TOAST_NS)
@@ -245,11 +261,14 @@ class Game:
         kept = self.folder.counts.kept_here.total()
         return f"{self.settings.pair}   episode {min(kept + 1, self.settings.episodes)} of {self.settings.episodes}"
 
-    def hud(self, trial: Trial) -> Hud:
-        """What the bars show of an episode."""
+    def hud(self, trial: Trial, carrying: bool = True) -> Hud:
+        """What the bars show of an episode, or of one that is about to begin."""
         robot, human = self.seats(trial)
         forces = ((trial.forces[0], trial.forces[1]), (trial.forces[2], trial.forces[3]))
-        statuses = [SeatStatus(p.label, force, p.missing) for p, force in zip((robot, human), forces, strict=True)]
+        statuses = [
+            SeatStatus(player.label if carrying else f"{player.player_id}: {player.label}", force, player.missing)
+            for player, force in zip((robot, human), forces, strict=True)
+        ]
         return Hud(
             title=self.title(trial),
             done=self.folder.counts.kept_here.total() / self.settings.episodes,
@@ -261,4 +280,5 @@ class Game:
             late=trial.loop.late + trial.loop.skipped,
             hz=trial.loop.achieved_hz,
             practice=trial.practice,
+            carrying=carrying,
         )
