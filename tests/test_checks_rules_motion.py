@@ -86,7 +86,7 @@ def _copied(table, episode, jitter=0.0):
 
 @pytest.mark.parametrize(
     ("source", "controller", "severity"),
-    [("human", "joystick", "error"), ("human", "keyboard", "warning"), ("simulated", "scripted", "warning")],
+    [("human", "joystick", "error"), ("human", "keyboard", "warning"), ("simulated", "scripted", "info")],
 )
 def test_one_device_that_moved_both_players(sound, source, controller, severity):
     table = with_column(_copied(sound, 2), "source", [source] * 6)

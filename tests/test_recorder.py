@@ -357,17 +357,20 @@ def test_a_long_recording_is_on_the_disk_not_in_memory(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("action", "flags", "expected"),
+    ("action", "changes", "expected"),
     [
-        ((0.5, -0.25, 0.5, -0.25), "", "identical_actions"),
-        ((0.5, -0.25, 0.5, -0.25), "paused", "paused,identical_actions"),
-        ((0.0, 0.0, 0.0, 0.0), "", ""),
-        ((0.5, -0.25, 0.5, 0.25), "paused", "paused"),
+        ((0.5, -0.25, 0.5, -0.25), {}, "paused,identical_actions"),
+        ((0.0, 0.0, 0.0, 0.0), {}, "paused"),
+        ((0.5, -0.25, 0.5, 0.25), {}, "paused"),
+        ((0.5, -0.25, 0.5, -0.25), {"controller_1": "keyboard"}, "paused"),
+        ((0.5, -0.25, 0.5, -0.25), {"source": "simulated"}, "paused"),
     ],
 )
-def test_an_episode_in_which_one_device_moved_both_is_flagged(tmp_path, action, flags, expected):
+def test_an_episode_in_which_one_gamepad_moved_both_is_flagged(tmp_path, action, changes, expected):
     path = tmp_path / "episode.mcap"
-    with recorder(path) as recording:
+    people = {"source": "human", "controller_0": "joystick", "controller_1": "joystick"}
+    meta = EpisodeMeta("uuid-1", **(people | changes))
+    with EpisodeRecorder(path, MAP, meta, WallClockAnchor.simulated(START_NS)) as recording:
         carry(recording, 12, action)
-        recording.finish(False, "timeout", quality_flags=flags)
+        recording.finish(False, "timeout", quality_flags="paused")
     assert read_episode(path).meta.quality_flags == expected

@@ -13,7 +13,7 @@ import numpy as np
 from copolicy.dataset import episode_records
 from copolicy.dataset.episode import EpisodeMeta, TerminationReason
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
-from copolicy.dataset.interaction import identical
+from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
 from copolicy.dataset.routes import route_class
@@ -33,7 +33,7 @@ _FLUSH_NS = 9 * 10**8
 
 
 IDENTICAL_ACTIONS = "identical_actions"
-"""Quality flag of an episode in which both players gave the same actions, as one device listed twice makes them do."""
+"""Quality flag of an episode in which two people at gamepads gave the same actions: one is listed twice."""
 
 
 class EpisodeRecorder:
@@ -52,8 +52,8 @@ class EpisodeRecorder:
     every event, so that a killed process loses at most a second, and its `.part` stays. A block that is left
     without `finish` completes its file all the same, up to the last state: as `operator_discard`, marked
     discarded, where it was left in order or by Ctrl-C; as `crash_recovered` with the quality flag `aborted` where
-    it was left by another exception. Should that file not read back, it stays a `.part`. An episode of identical
-    actions gets the flag `identical_actions`.
+    it was left by another exception. Should that file not read back, it stays a `.part`. An episode of two
+    people at gamepads whose actions are the same gets the flag `identical_actions`.
 
     Attributes:
         meta: the episode's columns, complete after `finish`.
@@ -255,7 +255,9 @@ class EpisodeRecorder:
 
     def _end(self, success: bool, termination_reason: str, notes: str = "", **columns: Any) -> None:
         path = np.asarray(self._positions).reshape(-1, 2)
-        if identical(np.asarray(self._forces).reshape(-1, 4)):
+        meta = self.meta
+        suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
+        if suspected and identical(np.asarray(self._forces).reshape(-1, 4)):
             columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,

@@ -15,7 +15,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 from copolicy.dataset import episode_records
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.interaction import identical
+from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import PlayerAction, TableState
 from copolicy.dataset.recording_checks import RECOVERY, UNVERIFIED
@@ -163,12 +163,14 @@ def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
     assert part.map_config is not None
     happened = {event.kind: event for event in part.events}
     practice = PRACTICE in happened
+    columns = {name: text for record in ("episode", "players") for name, text in part.metadata[record].items()}
+    who = (columns["source"], columns["controller_0"], columns["controller_1"])
     flags = {
         PRACTICE: practice,
         "paused": "pause" in happened,
         "slow_loop": part.loop.slow,
         OFF_CENTRE: OFF_CENTRE in happened,
-        IDENTICAL_ACTIONS: identical(actions),
+        IDENTICAL_ACTIONS: may_be_one_device(*who) and identical(actions),
         RECOVERED: True,
     }
     meta = EpisodeMeta(

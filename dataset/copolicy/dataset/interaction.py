@@ -43,3 +43,14 @@ def identical(actions: np.ndarray) -> bool:
     """Both players gave the same actions `(T, 4)` throughout; two who gave none did not."""
     pushed = np.count_nonzero(pushing(actions))
     return bool(pushed and np.count_nonzero(alike(actions)) >= IDENTICAL * pushed)
+
+
+def may_be_one_device(source: str, controller_0: str, controller_1: str) -> bool:
+    """Two people may hold one device that the system lists twice: both have one of a kind that can be, no keyboard.
+
+    Args:
+        source: of the episode.
+        controller_0: of the robot seat.
+        controller_1: of the human seat.
+    """
+    return source == "human" and controller_0 == controller_1 and "keyboard" not in controller_0.lower()

@@ -5,12 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..features import ACTION, BOUNDS, STATE
-from ..interaction import alike, pushing
+from ..interaction import alike, may_be_one_device, pushing
 from ..task import PLAYERS
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit
 from .rule import Rule, each
+
+_WHO = ("source", "controller_0", "controller_1")
 
 
 def _finite(table: EpisodeTable) -> Iterator[Finding]:
@@ -67,13 +69,15 @@ def _identical(table: EpisodeTable) -> Iterator[Finding]:
     share = np.divide(table.share(alike(table.frames[ACTION])), pushed, out=np.zeros_like(pushed), where=pushed > 0)
     bound = limit("identical")
     found = share >= bound
-    # A scripted pair may be made to act as one, and both halves of a keyboard are two devices for sure.
-    keys = np.logical_and(*(_with_keys(table, player) for player in range(len(PLAYERS))))
-    devices = (table.of_framed("source") == "human") & ~keys
+    # A scripted pair may be made to act as one, and two kinds of device, or halves of a keyboard, are two for sure.
+    people = table.of_framed("source") == "human"
+    columns = zip(*(table.of_framed(name).tolist() for name in _WHO), strict=True)
+    devices = np.array([may_be_one_device(*who) for who in columns], bool)
     message = "both players gave the same actions: one device moved both"
     yield from each(table, found & devices, "identical", share, bound, "error", message, table.framed)
     message = "both players gave the same actions"
-    yield from each(table, found & ~devices, "identical", share, bound, "warning", message, table.framed)
+    yield from each(table, found & people & ~devices, "identical", share, bound, "warning", message, table.framed)
+    yield from each(table, found & ~people, "identical", share, bound, "info", message, table.framed)
 
 
 def _with_keys(table: EpisodeTable, player: int) -> np.ndarray:
@@ -105,7 +109,7 @@ RULES = (
         "the players do not act as one",
         _identical,
         (ACTION,),
-        ("source", "controller_0", "controller_1"),
+        _WHO,
     ),
     Rule("saturated", "sticks are not always at their stop", _saturated, (ACTION,), ("controller_0", "controller_1")),
 )
