@@ -7,6 +7,8 @@ object, and pygame 2.6 warns about a package of setuptools that it uses.
 import os
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 # SDL drops the input of all joysticks while a window exists without the keyboard's focus, and in a run without a
@@ -37,35 +39,54 @@ def open_display() -> None:
     Raises:
         NoDisplayError: there is no display.
     """
-    wanted = os.environ.get(_DRIVER, "").split(",")
+    wanted = os.environ.get(_DRIVER, "")
+    invisible = _INVISIBLE.difference(wanted.split(","))
+    if pygame.display.get_init() and pygame.display.get_driver() in invisible:
+        pygame.display.quit()  # as `init_events` left it
+    # Without the folder of its sockets libwayland complains on stderr, and there is no such display.
+    without_wayland = sys.platform == "linux" and not os.environ.get("XDG_RUNTIME_DIR")
     try:
-        if pygame.display.get_init() and pygame.display.get_driver() in _INVISIBLE.difference(wanted):
-            pygame.display.quit()  # as `init_events` left it
-        pygame.display.init()
+        with _driver("x11,kmsdrm" if without_wayland and not wanted else None):
+            pygame.display.init()
         driver = pygame.display.get_driver()
     except pygame.error as error:
-        raise NoDisplayError(str(error)) from None
-    if driver in _INVISIBLE.difference(wanted):
+        raise NoDisplayError(str(error) if wanted else _why_invisible(str(error))) from None
+    if driver in invisible:
         pygame.display.quit()
-        raise NoDisplayError(_why_invisible(driver))
+        raise NoDisplayError(_why_invisible(f"SDL offers nothing but its driver {driver!r}"))
 
 
-def _why_invisible(driver: str) -> str:
+def init_events(window: bool = False) -> None:
+    """Starts what delivers the events of joysticks, SDL's video system; needs no display.
+
+    Args:
+        window: open a window that nobody sees, for what needs one.
+    """
+    if not pygame.display.get_init():
+        named = os.environ.get(_DRIVER) or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        with _driver("dummy" if window or (sys.platform == "linux" and not named) else None):
+            pygame.display.init()
+    if window:
+        pygame.display.set_mode((64, 64))
+
+
+@contextmanager
+def _driver(name: str | None) -> Iterator[None]:
+    """SDL's choice of a driver for as long as it takes; a later window of this process makes its own."""
+    before = os.environ.get(_DRIVER)
+    if name is not None:
+        os.environ[_DRIVER] = name
+    try:
+        yield
+    finally:
+        if name is not None:
+            os.environ.pop(_DRIVER)
+            if before is not None:
+                os.environ[_DRIVER] = before
+
+
+def _why_invisible(otherwise: str) -> str:
     if sys.platform != "linux":
-        return f"SDL offers nothing but its driver {driver!r}"
+        return otherwise
     named = [f"{name}={os.environ[name]}" for name in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)]
     return f"no answer from {' and '.join(named)}" if named else "neither DISPLAY nor WAYLAND_DISPLAY is set"
-
-
-def init_events() -> None:
-    """Starts what delivers the events of joysticks, SDL's video system; opens no window and needs no display."""
-    if pygame.display.get_init():
-        return
-    before = os.environ.get(_DRIVER)
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        os.environ.setdefault(_DRIVER, "dummy")
-    try:
-        pygame.display.init()
-    finally:
-        if before is None:
-            os.environ.pop(_DRIVER, None)

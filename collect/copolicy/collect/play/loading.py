@@ -34,7 +34,7 @@ class Loading:
             job: must leave the window and the devices alone.
 
         Raises:
-            RunError: the window was closed meanwhile; the job goes on and nobody waits for it.
+            RunError: the window was closed meanwhile, or the program told to stop; nobody waits for the job any more.
             Exception: whatever the job raises.
         """
         if self._window is None:
@@ -54,7 +54,7 @@ class Loading:
         while thread.is_alive():
             thread.join(_PICTURE_S)
             if pygame.event.peek(pygame.QUIT):
-                raise RunError("the window was closed before the session began")
+                raise RunError("the session was ended before it began")
             pygame.event.pump()
             self._draw(self._window, what, time.monotonic() - began)
         if "error" in outcome:

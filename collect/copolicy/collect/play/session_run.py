@@ -11,10 +11,10 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from ..sdl import pygame
+from ..sdl import init_events, pygame
 from .loading import Loading
 from .settings import PlaySettings
-from .window import Window, open_without_window
+from .window import Window
 
 if TYPE_CHECKING:
     from .application import Application
@@ -50,7 +50,7 @@ def prepared(settings: PlaySettings, also: tuple[str, Callable[[], Any]] | None 
     with ExitStack() as stack:
         window = None
         if settings.headless:
-            open_without_window()
+            init_events(window=True)
         else:
             window = Window(settings.window, settings.fullscreen)
         stack.callback(_close_pygame)

@@ -1,7 +1,5 @@
 """The window, or what stands in for it where there is no display."""
 
-import os
-
 from copolicy.dataset.exceptions import RunError
 
 from ..screen import SIZE
@@ -58,18 +56,3 @@ class Window:
             pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             pygame.display.set_mode(self._size, pygame.RESIZABLE)
-
-
-def open_without_window() -> None:
-    """What SDL needs to deliver the events of joysticks where there is no window."""
-    before = os.environ.get("SDL_VIDEODRIVER")
-    os.environ["SDL_VIDEODRIVER"] = "dummy"
-    try:
-        pygame.display.init()
-    finally:
-        # A window of this process, later, is not asked to be invisible.
-        if before is None:
-            del os.environ["SDL_VIDEODRIVER"]
-        else:
-            os.environ["SDL_VIDEODRIVER"] = before
-    pygame.display.set_mode((64, 64))
