@@ -100,7 +100,9 @@ def test_one_press_on_a_pad_that_is_listed_twice_seats_one_player(tmp_path):
         assert [player.ready for player in hands.game.players] == [True, False]
         hands.ticks(40)
         assert hands.phase == "Lobby"
-        assert hands.panel(1).notice == "Pad was pressed together with the other one: is one listed twice?"
+        assert hands.panel(1).notice == (
+            "Pad and the other gamepad were pressed at once: press one alone, it may be listed twice"
+        )
         # The other player has a pad of their own.
         third = VirtualJoystick("Other pad", product=2)
         hands.ticks(2)
@@ -381,6 +383,21 @@ def test_a_calibrated_stick_and_one_that_is_let_go_are_not_flagged(tmp_path, res
         hands.ticks(40)
     (path,) = tmp_path.rglob("*.mcap")
     assert flags(path) == set()
+
+
+def test_a_calibration_that_no_longer_holds_is_noticed_after_two_seconds(tmp_path):
+    pad = VirtualJoystick("Worn", product=6)
+    CalibrationStore(tmp_path / "config").put(pad.guid, StickCalibration(low=(-0.9, -0.9), high=(0.9, 0.9)))
+    with lobby(tmp_path) as hands:
+        pad.move(0.0, -0.25)
+        hands.press(0, pad)
+        hands.ticks(20)
+        assert hands.panel().notice == ""
+        hands.ticks(45)
+        assert hands.panel().notice == "pushes with 0.18 at rest: calibrate the stick"
+        pad.move(0.0, 0.0)
+        hands.ticks(61)
+        assert hands.panel().notice == ""
 
 
 def test_a_changed_dead_zone_is_no_calibration(tmp_path):

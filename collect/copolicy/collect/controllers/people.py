@@ -59,7 +59,8 @@ class PersonController:
     def watch_rest(self) -> None:
         """Looks at the stick while no table is carried; once a tick."""
         if self._has_stick:
-            self._rest.add(self.force(self.sample()))
+            still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
+            self._rest.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
         """What the device says now.
@@ -84,7 +85,7 @@ class PersonController:
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
-            self._rest.add(force, played=True)
+            self._rest.add(force, RestWatch.CARRYING)
         age = self._clock() - sample.time_ns
         return Reading(force, PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age))
 

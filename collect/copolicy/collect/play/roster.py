@@ -91,7 +91,10 @@ class Roster:
             number = pad.instance_id
             if any(self._presses.together(number, held.instance_id) for held in self._held() if held is not pad):
                 self._waiting.remove(pad)
-                self._refuse(pad, f"{pad.name} was pressed together with the other one: is one listed twice?")
+                self._refuse(
+                    pad,
+                    f"{pad.name} and the other gamepad were pressed at once: press one alone, it may be listed twice",
+                )
             elif self._presses.settled(number):
                 self._waiting.remove(pad)
                 player = self.give(pad) if self.pads.get(number) is pad else None
@@ -117,7 +120,7 @@ class Roster:
         if not self._twins.twins:
             return None
         self._watched = None
-        self._refuse(second, f"{second.name} and {first.name} never differ: one is listed twice")
+        self._refuse(second, f"{second.name} and {first.name} never differ: one gamepad is listed twice")
         return self.take_away(second)
 
     def give(self, device: Pad | KeyboardHalf) -> Player | None:

@@ -62,7 +62,7 @@ class MappingRun:
         step = self._steps[0]
         if step in _STEER:
             return _STEER[step]
-        return f"press the button for: {_BUTTONS[step]}" + ("" if step == "a" else "   (none: a used one)")
+        return f"press the button for: {_BUTTONS[step]}" + ("" if step == "a" else "   (a used one leaves it out)")
 
     def handle(self, event: pygame.event.Event) -> None:
         """Takes an event of the pad."""
