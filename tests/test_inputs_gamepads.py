@@ -1,5 +1,7 @@
 """What the buttons of a gamepad mean, by SDL's words, by the user's file, and by what is printed on them."""
 
+from typing import Literal
+
 import pytest
 from virtual_joystick import PLAYSTATION, XBOX, VirtualJoystick
 
@@ -34,7 +36,7 @@ def events():
     pygame.display.quit()
 
 
-def mapping(text: str, name: str = "Pad", source="sdl") -> GamepadMapping:
+def mapping(text: str, name: str = "Pad", source: Literal["sdl", "user"] = "sdl") -> GamepadMapping:
     return GamepadMapping.parse(name, dict(part.split(":") for part in text.split(",")), source)
 
 

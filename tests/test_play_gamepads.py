@@ -196,9 +196,9 @@ def test_buttons_go_by_their_meaning_and_by_what_is_printed_on_them(tmp_path):
             assert hands.phase == "Running"
         hands.press(9, sony)
         assert hands.phase == "Paused"
-        hints = hands.game.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
+        hints = hands.game.roster.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
         assert hints == "Cross keep   Square redo   Triangle discard     |     A keep   X redo   Y discard"
-        assert [labels.either("start", "back") for labels in hands.game.labels()] == [
+        assert [labels.either("start", "back") for labels in hands.game.roster.labels()] == [
             "Options or Share",
             "Menu or View",
         ]
@@ -301,6 +301,12 @@ def test_a_device_that_cannot_steer_does_not_join_and_is_told_so(tmp_path):
         assert hands.panel().notice == "Buttons has neither a stick nor a d-pad: it cannot steer"
 
 
+def test_without_pilots_named_only_what_can_steer_counts(tmp_path):
+    VirtualJoystick("Buttons", product=5, axes=1, hats=0, mapping=None)
+    with lobby(tmp_path, pilots=None) as hands:
+        assert [player.spec.kind for player in hands.game.players] == ["keyboard", "keyboard"]
+
+
 def test_the_axes_that_steer_can_be_chosen_and_are_kept(tmp_path):
     pad = VirtualJoystick("Alpha pad", product=1)
     config = tmp_path / "config"
@@ -352,7 +358,9 @@ def test_a_stick_that_pushes_at_rest_is_shown_and_the_episode_flagged(tmp_path):
             hands.ticks()
     (path,) = tmp_path.rglob("*.mcap")
     assert flags(path) == {"stick_off_centre"}
-    assert read_metadata(path)["devices"]["seat_0_measured"] == "False"
+    devices_record = read_metadata(path)["devices"]
+    about = [devices_record[f"seat_0_{name}"] for name in ("measured", "steering", "mapping")]
+    assert about == ["False", "left stick", "sdl"]
 
 
 def test_an_uncalibrated_stick_that_rests_off_centre_in_an_episode_is_flagged(tmp_path):

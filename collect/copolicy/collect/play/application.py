@@ -198,7 +198,7 @@ class Application:
         if game.toast:
             draw_toast(canvas, game.toast)
         if self._help:
-            draw_help(canvas, game.labels())
+            draw_help(canvas, game.roster.labels())
         window.show()
         self.pictures += 1
         self._drawn_ns = game.clock()

@@ -39,7 +39,7 @@ def assemble(settings: PlaySettings, window: Window | None, loading: Loading, st
     config = settings.config_folder or user_config_folder()
     store = CalibrationStore(config)
     pads = Pads(MappingStore(config))
-    pilots = settings.pilots or default_pilots(len(pads))
+    pilots = settings.pilots or default_pilots(sum(bool(pad.steerings) for pad in pads))
     policies = [pilot.detail for pilot in pilots if pilot.kind == "policy"]
     what = f"the policy {policies[0]}, with torch and LeRobot" if policies else "the players"
     players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents))

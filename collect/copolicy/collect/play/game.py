@@ -11,8 +11,6 @@ from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import RECORD_HZ, MapConfig, identify
 
-from ..inputs import KeyboardHalf, Pad
-from ..inputs.gamepads import Labels
 from ..screen import TableView
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
@@ -224,20 +222,6 @@ class Game:
         }
 
     # The screen.
-
-    def labels(self) -> list[Labels]:
-        """What is printed on the gamepads in hand, each kind once."""
-        pads = [player.device for player in self.players if isinstance(player.device, Pad)]
-        return list({tuple(pad.labels[name] for name in ("a", "b", "x", "y")): pad.labels for pad in pads}.values())
-
-    def hint(self, *actions: tuple[str, str, str]) -> str:
-        """How to choose: each action by its control of a gamepad, its key and its word; for all devices in hand."""
-        ways = [[labels[control] for control, _, _ in actions] for labels in self.labels()]
-        if any(isinstance(player.device, KeyboardHalf) for player in self.players):
-            ways.append([key for _, key, _ in actions])
-        words = [word for _, _, word in actions]
-        texts = ("   ".join(f"{how} {word}" for how, word in zip(way, words, strict=True) if how) for way in ways)
-        return "     |     ".join(texts)
 
     def say(self, text: str) -> None:
         """Shows a short message for three seconds."""

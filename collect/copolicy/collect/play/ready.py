@@ -80,7 +80,7 @@ class Ready(Phase):
         if missing:
             hint, colour = f"{missing[0].player_id}: press any button to join", YELLOW
         else:
-            buttons = [labels["a"] for labels in game.labels()]
+            buttons = [labels["a"] for labels in game.roster.labels()]
             hint, colour = f"{' or '.join([*buttons, 'Enter'])} starts", MUTED
         draw_strip_menu(canvas, self._menu.labels, self._menu.cursor, hint, colour)
 

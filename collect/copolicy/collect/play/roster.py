@@ -13,6 +13,7 @@ from ..inputs import (
     StickCalibration,
     TwinWatch,
 )
+from ..inputs.gamepads import Labels
 from .player import Player, keyboard_half
 
 
@@ -159,6 +160,20 @@ class Roster:
             if one.person and isinstance(one.device, Pad) and one.device.guid == device.guid:
                 one.person.calibration = calibration
         self._store.put(device.guid, calibration)
+
+    def labels(self) -> list[Labels]:
+        """What is printed on the gamepads in hand, each kind once."""
+        names = ("a", "b", "x", "y")
+        return list({tuple(pad.labels[name] for name in names): pad.labels for pad in self._held()}.values())
+
+    def hint(self, *actions: tuple[str, str, str]) -> str:
+        """How to choose: each action by its control of a gamepad, its key and its word; for all devices in hand."""
+        ways = [[labels[control] for control, _, _ in actions] for labels in self.labels()]
+        if any(isinstance(player.device, KeyboardHalf) for player in self.players):
+            ways.append([key for _, key, _ in actions])
+        words = [word for _, _, word in actions]
+        texts = ("   ".join(f"{how} {word}" for how, word in zip(way, words, strict=True) if how) for way in ways)
+        return "     |     ".join(texts)
 
     def is_stray(self, press: Press) -> bool:
         """A press came from a joystick that nobody holds, in a session of joysticks: a spare one, or a copy."""

@@ -104,7 +104,7 @@ class GamepadMapping:
         """The control behind a button."""
         return self._buttons.get(index)
 
-    def of_hat(self, index: int, direction: int) -> str | None:
+    def of_hat(self, index: int, direction: int) -> str:
         """The control behind a direction of a hat; a hat that nobody described is a d-pad."""
         for control, one in self.bindings.items():
             if one.kind == "h" and (one.index, one.direction) == (index, direction):
