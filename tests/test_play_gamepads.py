@@ -12,6 +12,7 @@ from copolicy.collect.play.session_run import prepared
 from copolicy.collect.screen import Canvas
 from copolicy.collect.screen.dialogs import draw_toast
 from copolicy.collect.sdl import pygame
+from copolicy.dataset.cli import main as check
 from copolicy.dataset.log import read_episode, read_metadata
 
 
@@ -161,7 +162,7 @@ def test_a_pad_that_nobody_holds_chooses_nothing(tmp_path):
         assert hands.phase == "Ready"
 
 
-def test_an_episode_of_one_device_is_flagged(tmp_path):
+def test_an_episode_of_one_device_is_flagged_and_found_by_check(tmp_path, capsys):
     copies = [VirtualJoystick("Pad"), VirtualJoystick("Pad")]
     with lobby(tmp_path, headless=True, window=None, countdown_s=0.0, episodes=1) as hands:
         hands.ticks(3)
@@ -172,6 +173,9 @@ def test_an_episode_of_one_device_is_flagged(tmp_path):
             hands.ticks()
     (path,) = tmp_path.rglob("*.mcap")
     assert "identical_actions" in flags(path)
+    assert check(["check", str(path.parent), "--json"]) == 1
+    found = [one for one in json.loads(capsys.readouterr().out)["findings"] if one["rule"] == "identical"]
+    assert [(one["severity"], one["episode"], one["figure"]) for one in found] == [("error", path.name, 1.0)]
 
 
 # Other numberings
