@@ -219,7 +219,7 @@ def _hat(x, y):
     return pygame.event.Event(pygame.JOYHATMOTION, hat=0, value=(x, y), instance_id=0)
 
 
-BUTTONS = [_button(index) for index in (3, 1, 9, 3, 3, 3, 3)]
+BUTTONS = [_button(index) for index in (3, 3, 1, 9, 3, 3, 3, 3)]  # back cannot be left out
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ _BUTTONS = {
     "leftshoulder": "add a note",
     "rightshoulder": "undo",
 }
+_NEEDED = ("a", "b")  # the lobby's menu is gone through with these two
 _STEER = {
     "dpright": "push the stick or d-pad that steers to the right",
     "dpdown": "now push it down, towards you",
@@ -26,7 +27,7 @@ class MappingRun:
     """Turns the events of one pad into a mapping of it.
 
     First the buttons, then the stick or d-pad that steers, to the right and down (a d-pad of buttons to all four
-    sides). A button that has its meaning already leaves the present one without any.
+    sides). A button that has its meaning already leaves the present one without any, save for the two of the menu.
     """
 
     def __init__(self, name: str, axes: list[float], hats: int):
@@ -62,7 +63,7 @@ class MappingRun:
         step = self._steps[0]
         if step in _STEER:
             return _STEER[step]
-        return f"press the button for: {_BUTTONS[step]}" + ("" if step == "a" else "   (a used one leaves it out)")
+        return f"press the button for: {_BUTTONS[step]}" + ("" if step in _NEEDED else "   (a used one leaves it out)")
 
     def handle(self, event: pygame.event.Event) -> None:
         """Takes an event of the pad."""
@@ -73,8 +74,11 @@ class MappingRun:
         if self._steps[0] in _STEER:
             self._steer(binding, sign)
         elif binding.kind == "b":
+            used = binding in self._bindings.values()
+            if used and self._steps[0] in _NEEDED:
+                return
             control = self._steps.pop(0)
-            if binding not in self._bindings.values():
+            if not used:
                 self._bindings[control] = binding
 
     def result(self) -> tuple[GamepadMapping, tuple[int, int], tuple[bool, bool]]:
