@@ -76,6 +76,37 @@ def test_idle_players(sound):
     assert ("1", "error") in of(people)
 
 
+def _copied(table, episode, jitter=0.0):
+    def copy(actions):
+        rows = all_frames(table, episode)
+        actions[rows, 2:] = actions[rows, :2] + jitter
+
+    return with_frames(table, ACTION, copy)
+
+
+@pytest.mark.parametrize(
+    ("source", "controller", "severity"),
+    [("human", "joystick", "error"), ("human", "keyboard", "warning"), ("simulated", "scripted", "info")],
+)
+def test_one_device_that_moved_both_players(sound, source, controller, severity):
+    table = with_column(_copied(sound, 2), "source", [source] * 6)
+    table = with_column(with_column(table, "controller_0", [controller] * 6), "controller_1", [controller] * 6)
+    assert of(find(table, "identical")) == [("2", severity)]
+    assert of(find(_copied(table, 4, jitter=0.005), "identical")) == [("2", severity), ("4", severity)]
+    assert of(find(_copied(table, 4, jitter=0.05), "identical")) == [("2", severity)]
+
+
+def test_two_idle_players_are_no_copies_of_each_other(sound):
+    def rest(actions):
+        actions[all_frames(sound, 1)] = 0.0
+        actions[all_frames(sound, 3)] = 0.0
+        # One frame is pushed by both alike, another by one of them.
+        actions[sound.starts[3] + 4] = 0.5
+        actions[sound.starts[3] + 7, 0] = 0.5
+
+    assert find(with_frames(sound, ACTION, rest), "identical") == []
+
+
 def test_saturated_sticks_and_keys(sound):
     def full(actions):
         actions[all_frames(sound, 3), :2] = 1.0

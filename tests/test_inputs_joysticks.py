@@ -65,7 +65,7 @@ def test_an_event_that_is_told_twice_opens_one_pad(pads):
 
 
 def test_buttons_hat_and_stick_become_commands(pads):
-    pad, reader = VirtualJoystick(), CommandReader()
+    pad, reader = VirtualJoystick(), CommandReader(pads)
     _pump(pads)
     number = pad.instance_id
     for button, command in ((0, Command.ACCEPT), (1, Command.BACK), (7, Command.PAUSE)):
@@ -80,7 +80,7 @@ def test_buttons_hat_and_stick_become_commands(pads):
 
 
 def test_a_stick_commands_once_each_time_it_is_tipped(pads):
-    pad, reader = VirtualJoystick(), CommandReader()
+    pad, reader = VirtualJoystick(), CommandReader(pads)
     _pump(pads)
     commands = []
     for y in (0.5, 0.9, 0.7, 0.5, 0.9, 0.1, -0.9):

@@ -400,3 +400,23 @@ def test_a_long_recording_is_on_the_disk_not_in_memory(tmp_path):
             tracemalloc.stop()
         recording.finish(False, "timeout")
     assert kept < 200 * steps
+
+
+@pytest.mark.parametrize(
+    ("action", "changes", "expected"),
+    [
+        ((0.5, -0.25, 0.5, -0.25), {}, "paused,identical_actions"),
+        ((0.0, 0.0, 0.0, 0.0), {}, "paused"),
+        ((0.5, -0.25, 0.5, 0.25), {}, "paused"),
+        ((0.5, -0.25, 0.5, -0.25), {"controller_1": "keyboard"}, "paused"),
+        ((0.5, -0.25, 0.5, -0.25), {"source": "simulated"}, "paused"),
+    ],
+)
+def test_an_episode_in_which_one_gamepad_moved_both_is_flagged(tmp_path, action, changes, expected):
+    path = tmp_path / "episode.mcap"
+    people = {"source": "human", "controller_0": "joystick", "controller_1": "joystick"}
+    meta = EpisodeMeta("uuid-1", **(people | changes))
+    with EpisodeRecorder(path, MAP, meta, WallClockAnchor.simulated(START_NS)) as recording:
+        carry(recording, 12, action)
+        recording.finish(False, "timeout", quality_flags="paused")
+    assert read_episode(path).meta.quality_flags == expected

@@ -176,6 +176,7 @@ def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
     world = TableWorld(MAP)
     recording = EpisodeRecorder(path, MAP, META, WallClockAnchor.simulated(10**18)).__enter__()
     recording.event("practice")
+    recording.event("stick_off_centre", "human: pushes with 0.15 at rest")
     for _ in range(40):
         world.step((1.0, 0.0, 1.0, 0.0))
         recording.step((1.0, 0.0, 1.0, 0.0), world.pose, world.velocity, world.reward())
@@ -189,9 +190,24 @@ def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
     episode = read_episode(tmp_path / "copy.recovered.mcap")
     assert len(episode.actions) == 39
     meta = episode.meta
-    assert (meta.quality_flags, meta.discarded) == ("practice,paused,recovered", True)
+    assert meta.quality_flags == "practice,paused,stick_off_centre,recovered"
+    assert meta.discarded
     notes = read_metadata(tmp_path / "copy.recovered.mcap")["episode_result"]["notes"]
     assert notes == "the phone rang; ended at step 40 with timeout, without a verdict"
+
+
+def test_an_episode_of_one_device_is_flagged_after_a_crash_too(tmp_path):
+    path = tmp_path / "episode.mcap"
+    world, meta = TableWorld(MAP), replace(META, controller_1="joystick")
+    with EpisodeRecorder(path, MAP, meta, WallClockAnchor.simulated(10**18)) as recording:
+        for step in range(40):
+            world.step((0.02 * step, 0.5) * 2)
+            recording.step((0.02 * step, 0.5) * 2, world.pose, world.velocity, world.reward())
+        recording.event("pause", "player")
+        part = tmp_path / "copy.mcap.part"
+        part.write_bytes((tmp_path / "episode.mcap.part").read_bytes())
+    recover_file(part)
+    assert read_episode(tmp_path / "copy.recovered.mcap").meta.quality_flags == "paused,identical_actions,recovered"
 
 
 def test_a_second_run_does_nothing(tmp_path, whole):

@@ -8,7 +8,15 @@ import pytest
 from copolicy.collect.inputs import Command, Press
 from copolicy.collect.play.menu import BACK, Menu
 from copolicy.collect.screen import SIZE, Canvas, TableView, between, draw_text, letterbox, palette, text_size
-from copolicy.collect.screen.dialogs import HELP, Line, draw_countdown, draw_dialog, draw_help, draw_toast
+from copolicy.collect.screen.dialogs import (
+    HELP,
+    Line,
+    draw_countdown,
+    draw_dialog,
+    draw_help,
+    draw_strip_menu,
+    draw_toast,
+)
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.task import MapConfig
@@ -117,6 +125,7 @@ def test_dialogues_stay_in_the_window(size):
         lambda: draw_hud(canvas, hud),
         lambda: draw_dialog(canvas, "A title", [Line("a line of text " * 9)], ["one", "two"] * 3, 1, hint="how"),
         lambda: draw_countdown(canvas, "3", 0.2),
+        lambda: draw_strip_menu(canvas, ["one", "two"] * 3, 1, "how to choose " * 9),
         lambda: draw_help(canvas),
         lambda: draw_toast(canvas, "a message"),
     ):

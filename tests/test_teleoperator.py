@@ -120,6 +120,84 @@ def test_a_press_binds_a_pad_to_a_seat(teleoperator, sticks):
     assert pair.get_action()["robot_fy"] == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.fixture
+def listed_twice(sticks):
+    """Both sticks say what one player does, as one pad that the system lists twice."""
+
+    class Copies:
+        def act(self, press=False, x=0.0):
+            for stick in sticks:
+                while not stick.is_open:
+                    time.sleep(0.01)
+                stick.button(0, press)
+                stick.move(x, 0.0)
+
+    return Copies()
+
+
+def test_a_pad_that_is_listed_twice_does_not_get_both_seats(teleoperator, listed_twice):
+    pair = teleoperator(timeout_s=0.8)
+
+    def presses():
+        for _ in range(8):
+            listed_twice.act(press=True)
+            time.sleep(0.1)
+            listed_twice.act()
+            time.sleep(0.1)
+
+    player = threading.Thread(target=presses)
+    player.start()
+    with pytest.raises(DeviceNotConnectedError, match="found none on another pad: Pad was pressed together"):
+        pair.connect(calibrate=False)
+    player.join()
+    assert not pair.is_connected
+
+
+def test_two_pads_that_never_differ_are_refused(teleoperator, listed_twice):
+    pair = teleoperator(join=False)
+    pair.connect(calibrate=False)
+    assert pair.get_action() == dict.fromkeys(ACTION_NAMES, 0.0)
+    for step in range(1, 10):
+        listed_twice.act(x=0.04 * step)
+        pair.get_action()
+    listed_twice.act(x=0.5)
+    with pytest.raises(DeviceNotConnectedError, match=r"found one that is listed twice \(Pad and Pad\)"):
+        pair.get_action()
+    pair.disconnect()
+
+
+def test_two_people_who_do_much_the_same_are_two(teleoperator, sticks):
+    pair = teleoperator(join=False)
+    pair.connect(calibrate=False)
+    for step in range(1, 20):
+        sticks[0].move(0.04 * step, 0.0)
+        sticks[1].move(0.04 * step + 0.01, 0.0)
+        assert pair.get_action()["human_fx"] >= pair.get_action()["robot_fx"]
+
+
+def test_what_steers_and_rests_is_looked_at(teleoperator, caplog):
+    plain = VirtualJoystick("Plain", product=7, axes=0, mapping=None)
+    resting = VirtualJoystick("Loose", product=8)
+    pair = teleoperator(join=False)
+    pair.connect(calibrate=False)
+    plain.hat(1, 1)
+    resting.move(0.25, 0.0)
+    action = pair.get_action()
+    assert (action["robot_fx"], action["robot_fy"]) == pytest.approx((0.5**0.5, -(0.5**0.5)))
+    pair.disconnect()
+    pair.connect(calibrate=False)
+    assert "human seat: Loose pushes with 0.15 and was never calibrated" in caplog.messages
+    pair.disconnect()
+    plain.unplug()
+    buttons = VirtualJoystick("Buttons", product=9, axes=1, hats=0, mapping=None)
+    with pytest.raises(
+        DeviceNotConnectedError, match="expected a stick or a d-pad to steer with, found none on Buttons"
+    ):
+        pair.connect(calibrate=False)
+    buttons.unplug()
+    resting.unplug()
+
+
 def test_nobody_presses(teleoperator, sticks):
     pair = teleoperator(timeout_s=0.1)
     with pytest.raises(

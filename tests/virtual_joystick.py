@@ -12,6 +12,15 @@ from copolicy.collect.sdl import pygame
 
 _FULL = 32767
 _GAMECONTROLLER = 1
+_DPAD = "dpup:h0.1,dpright:h0.2,dpdown:h0.4,dpleft:h0.8"
+XBOX = f"a:b0,b:b1,x:b2,y:b3,leftshoulder:b4,rightshoulder:b5,back:b6,start:b7,leftx:a0,lefty:a1,{_DPAD}"
+"""How the driver of Linux numbers an Xbox pad."""
+
+PLAYSTATION = (
+    "a:b1,b:b2,x:b0,y:b3,leftshoulder:b4,rightshoulder:b5,lefttrigger:b6,righttrigger:b7,back:b8,start:b9,"
+    f"leftx:a0,lefty:a1,rightx:a2,righty:a5,{_DPAD}"
+)
+"""How many drivers number a PlayStation pad: button 7 is a trigger."""
 
 
 class _Description(ctypes.Structure):
@@ -37,6 +46,10 @@ class _Description(ctypes.Structure):
     ]
 
 
+class _Guid(ctypes.Structure):
+    _fields_ = [("data", ctypes.c_uint8 * 16)]
+
+
 def _library() -> ctypes.CDLL:
     """SDL as it is mapped into this process already: a second copy would have joysticks of its own."""
     for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
@@ -48,6 +61,10 @@ def _library() -> ctypes.CDLL:
     sdl.SDL_JoystickAttachVirtualEx.argtypes = [ctypes.POINTER(_Description)]
     sdl.SDL_JoystickDetachVirtual.argtypes = [ctypes.c_int]
     sdl.SDL_JoystickGetDeviceInstanceID.argtypes = [ctypes.c_int]
+    sdl.SDL_JoystickGetGUIDString.argtypes = [_Guid, ctypes.c_char_p, ctypes.c_int]
+    sdl.SDL_JoystickGetDeviceGUID.argtypes = [ctypes.c_int]
+    sdl.SDL_JoystickGetDeviceGUID.restype = _Guid
+    sdl.SDL_GameControllerAddMapping.argtypes = [ctypes.c_char_p]
     sdl.SDL_JoystickFromInstanceID.argtypes = [ctypes.c_int]
     sdl.SDL_JoystickFromInstanceID.restype = ctypes.c_void_p
     sdl.SDL_JoystickSetVirtualAxis.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int16]
@@ -61,15 +78,29 @@ class VirtualJoystick:
 
     Attributes:
         instance_id: SDL's number of it.
+        guid: SDL's of its make.
     """
 
-    def __init__(self, name: str = "Test pad", vendor: int = 0x1209, product: int = 1, axes=4, buttons=10, hats=1):
+    def __init__(
+        self,
+        name: str = "Test pad",
+        vendor: int = 0x1209,
+        product: int = 1,
+        axes: int = 4,
+        buttons: int = 10,
+        hats: int = 1,
+        mapping: str | None = XBOX,
+    ):
+        """
+        Args:
+            mapping: what SDL knows of its buttons; None for a pad that SDL does not know.
+        """
         if not pygame.joystick.get_init():
             pygame.joystick.init()
         self._sdl = _library()
         self._description = _Description(
             version=1,
-            type=_GAMECONTROLLER,
+            type=_GAMECONTROLLER if mapping else 0,
             naxes=axes,
             nbuttons=buttons,
             nhats=hats,
@@ -81,6 +112,11 @@ class VirtualJoystick:
         if index < 0:
             raise RuntimeError(f"expected SDL to attach a virtual joystick, found {pygame.get_error()!r}")
         self.instance_id: int = self._sdl.SDL_JoystickGetDeviceInstanceID(index)
+        text = ctypes.create_string_buffer(33)
+        self._sdl.SDL_JoystickGetGUIDString(self._sdl.SDL_JoystickGetDeviceGUID(index), text, len(text))
+        self.guid = text.value.decode()
+        if mapping and self._sdl.SDL_GameControllerAddMapping(f"{self.guid},{name},{mapping},".encode()) < 0:
+            raise RuntimeError(f"expected SDL to take the mapping {mapping!r}, found {pygame.get_error()!r}")
 
     @property
     def is_open(self) -> bool:

@@ -16,9 +16,7 @@ from copolicy.dataset.task import MAP_SETS
 from .demonstration.command import add_demo_command
 from .play.command import add_play_command
 from .recipes import RECIPES
-from .recover import recover, summary
 from .replay.command import add_replay_command
-from .simulate import simulate
 
 
 def parser() -> argparse.ArgumentParser:
@@ -88,6 +86,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> dict:
+    # Here and below, what a command needs is loaded by it alone: `play` opens its window before anything else.
+    from .simulate import simulate
+
     flags = {"--seed": "seed", "--maps": "map_set", "--orientations": "orientations", "--start-noise": "start_noise",
              "--clearance": "clearance"}  # fmt: skip
     given = {flag: getattr(arguments, name) for flag, name in flags.items() if getattr(arguments, name) is not None}
@@ -100,6 +101,8 @@ def _simulate(arguments: argparse.Namespace) -> dict:
 
 
 def _recover(arguments: argparse.Namespace) -> dict:
+    from .recover import recover, summary
+
     folder = arguments.folder
     recoveries = recover(folder, finished=True, damaged=arguments.damaged)
     # A session that nobody has recorded in yet is as good as an empty folder.
@@ -109,7 +112,6 @@ def _recover(arguments: argparse.Namespace) -> dict:
 
 
 def _devices(arguments: argparse.Namespace) -> dict:
-    # Loading pygame takes a moment that `--help` should not.
     from .devices import devices_command
 
     return devices_command(arguments.test, arguments.json, arguments.config_dir)

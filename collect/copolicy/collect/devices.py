@@ -1,6 +1,5 @@
 """The pads that are plugged in: what they are, and what they say."""
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -8,8 +7,8 @@ from typing import Any, TextIO
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
-from .inputs import CalibrationStore, InputSample, Pad, Pads, StickCalibration, user_config_folder
-from .sdl import pygame
+from .inputs import CalibrationStore, InputSample, MappingStore, Pad, Pads, StickCalibration, user_config_folder
+from .sdl import init_events, pygame
 
 _PICTURES_HZ = 20
 _OF_JOYSTICKS = (
@@ -20,14 +19,25 @@ _OF_JOYSTICKS = (
     pygame.JOYHATMOTION,
     pygame.JOYBUTTONDOWN,
     pygame.JOYBUTTONUP,
+    # Of looking up what SDL knows of a pad.
+    pygame.CONTROLLERDEVICEADDED,
+    pygame.CONTROLLERDEVICEREMOVED,
 )
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
-def open_pads() -> Pads:
-    """All pads that are plugged in; needs neither a window nor a display."""
-    _init_video()
-    pads = Pads()
+def open_pads(config_folder: Path | None = None) -> Pads:
+    """All pads that are plugged in; needs neither a window nor a display.
+
+    Args:
+        config_folder: of the user's mappings; by default that of this user.
+
+    Raises:
+        FileFormatError: the file of mappings is none.
+    """
+    mappings = MappingStore(config_folder or user_config_folder())
+    init_events()
+    pads = Pads(mappings)
     # Where somebody in this process has taken the events that tell of them, the pads are there all the same.
     for index in range(pygame.joystick.get_count()):
         pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
@@ -108,7 +118,7 @@ def watch(
         for pad in pads:
             sample = pad.sample(time.monotonic_ns())
             _remember(found, pad, sample)
-            lines += _picture(pad, sample, calibrations.get(pad.guid))
+            lines += _picture(pad, sample, calibrations.of(pad))
         if out.isatty():
             # Up over the last picture, and clear what is below.
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
@@ -122,7 +132,7 @@ def watch(
 
 def devices_command(seconds: float | None, as_json: bool, config_folder: Path | None = None) -> dict[str, Any]:
     """What the command does: prints the table or the live test, and returns its summary."""
-    pads = open_pads()
+    pads = open_pads(config_folder)
     calibrations = CalibrationStore(config_folder or user_config_folder())
     devices = list_devices(pads, calibrations)
     if not as_json:
@@ -131,15 +141,6 @@ def devices_command(seconds: float | None, as_json: bool, config_folder: Path | 
         return {"devices": devices} if as_json else {}
     found = watch(pads, calibrations, seconds, sys.stderr if as_json else sys.stdout)
     return {"devices": devices, "test": found} if as_json else {}
-
-
-def _init_video() -> None:
-    """SDL delivers the events of joysticks through its video system; that opens no window by itself."""
-    if pygame.display.get_init():
-        return
-    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
-        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-    pygame.display.init()
 
 
 def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:
@@ -156,11 +157,20 @@ def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -
 
 
 def _picture(pad: Pad, sample: InputSample, calibration: StickCalibration) -> list[str]:
-    x, y = calibration.force(sample.axes)
-    lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}"]
+    x, y = pad.force(sample, calibration)
+    lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}", f"  {_about(pad, calibration)}"]
     lines += [f"  axis {index:<3} {_bar(value)} {value:+.2f}" for index, value in enumerate(sample.axes)]
+    for hat in range(pad.hats):
+        right, down = sample.directions[2 * hat : 2 * hat + 2]
+        lines.append(f"  hat {hat:<4} {right:+.0f} {down:+.0f}")
     pressed = " ".join(str(index) for index, down in enumerate(sample.buttons) if down)
     return [*lines, f"  buttons  {pressed or '-'}"]
+
+
+def _about(pad: Pad, calibration: StickCalibration) -> str:
+    known = "buttons known" if pad.mapping.known else "buttons not known: the lobby of play sets them up"
+    steers = f"steers with: {pad.steering(calibration).label}" if pad.steerings else "cannot steer: no stick, no d-pad"
+    return f"{steers}; {known}"
 
 
 def _bar(value: float) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from copolicy.dataset import episode_records
 from copolicy.dataset.episode import EpisodeMeta, TerminationReason
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
+from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
 from copolicy.dataset.routes import route_class
@@ -32,6 +33,10 @@ from .wall_clock import WallClockAnchor
 _FLUSH_NS = 9 * 10**8
 
 
+IDENTICAL_ACTIONS = "identical_actions"
+"""Quality flag of an episode in which two people at gamepads gave the same actions: one is listed twice."""
+
+
 class EpisodeRecorder:
     """Writes one episode to `NAME.mcap.part`, which becomes `NAME.mcap` once it is complete and on the disk.
 
@@ -48,7 +53,8 @@ class EpisodeRecorder:
     every event, so that a killed process loses at most a second, and its `.part` stays. A block that is left
     without `finish` completes its file all the same, up to the last state: as `operator_discard`, marked
     discarded, where it was left in order or by Ctrl-C; as `crash_recovered` with the quality flag `aborted` where
-    it was left by another exception. Should that file not read back, it stays a `.part`.
+    it was left by another exception. Should that file not read back, it stays a `.part`. An episode of two
+    people at gamepads whose actions are the same gets the flag `identical_actions`.
 
     Attributes:
         meta: the episode's columns, complete after `finish`.
@@ -94,6 +100,7 @@ class EpisodeRecorder:
         self._pose, self._velocity = checked_state(map_config.start if pose is None else pose, velocity)
         self._positions = array("d", self._pose[:2])
         self._total_reward = 0.0
+        self._forces = array("d")
         self._scene, self._frame = TableScene(), TableFrame()
         self._ended = False
 
@@ -179,6 +186,7 @@ class EpisodeRecorder:
         self._pose, self._velocity = after
         self._positions.extend(self._pose[:2])
         self._total_reward += float(reward)
+        self._forces.extend(forces)
         if monotonic_ns is None:
             self._time_ns = self._begin_ns + self.steps * 10**9 // RECORD_HZ
         else:
@@ -248,6 +256,10 @@ class EpisodeRecorder:
 
     def _end(self, success: bool, termination_reason: str, notes: str = "", **columns: Any) -> None:
         path = np.asarray(self._positions).reshape(-1, 2)
+        meta = self.meta
+        suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
+        if suspected and identical(np.asarray(self._forces).reshape(-1, 4)):
+            columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,
             success=success,

@@ -8,26 +8,29 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from copolicy.dataset import episode_records
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import TableState
+from copolicy.dataset.messages.copolicy_pb2 import PlayerAction, TableState
 from copolicy.dataset.recording_checks import RECOVERY, UNVERIFIED
 from copolicy.dataset.routes import route_class
 from copolicy.dataset.staging import about
 from copolicy.dataset.task import RECORD_HZ
-from copolicy.dataset.topics import EVENT, SCENE, TABLE_STATE, is_ours
+from copolicy.dataset.topics import ACTIONS, EVENT, SCENE, TABLE_STATE, is_ours
 
 from .episode_file import sync_folder
 from .episode_messages import Record, event_record
 from .intact_records import IntactPart, intact_records
+from .recorder import IDENTICAL_ACTIONS
 from .scene import TableScene
 from .scene_solids import TableFrame
-from .session.recorded import PRACTICE
+from .session.recorded import OFF_CENTRE, PRACTICE
 
 RECOVERED = "recovered"
 """Quality flag of a recovered episode, and what its name ends with."""
@@ -70,7 +73,7 @@ def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
     for record in itertools.islice(intact_records(part.path), part.records):
         copy.take(record)
     copy.end(part.stopped_by)
-    writer.add_metadata(episode_records.RESULT, _result(part))
+    writer.add_metadata(episode_records.RESULT, _result(part, copy.actions))
     recovery = {
         "source": part.path.name,
         "source_sha256": source_sha256,
@@ -95,8 +98,14 @@ class _Copy:
         self._channels: dict[int, int] = {}
         self._names: dict[int, str] = {}
         self._topics: dict[int, str] = {}
+        self._forces: tuple[list[tuple[float, float]], list[tuple[float, float]]] = ([], [])
         self._final = TableState()
         self._time_ns = 0  # of the final state
+
+    @property
+    def actions(self) -> np.ndarray:
+        """`(steps, 4)` robot xy, human xy of the complete steps."""
+        return np.hstack([np.reshape(forces, (-1, 2)) for forces in self._forces])
 
     def take(self, record: McapRecord) -> None:
         """Copies one record, or passes it by."""
@@ -133,6 +142,10 @@ class _Copy:
             return
         if topic == TABLE_STATE.name and message.sequence == self._steps:
             self._final, self._time_ns = TableState.FromString(message.data), message.log_time
+        for forces, action_topic in zip(self._forces, ACTIONS, strict=True):
+            if topic == action_topic.name:
+                action = PlayerAction.FromString(message.data)
+                forces.append((action.fx, action.fy))
         channel = self._channels[message.channel_id]
         self._writer.add_message(channel, message.log_time, message.data, message.publish_time, message.sequence)
 
@@ -143,7 +156,7 @@ class _Copy:
                 self._writer.add_message(self._channels[channel], self._time_ns, payload, self._time_ns, self._steps)
 
 
-def _result(part: IntactPart) -> dict[str, str]:
+def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
     recorded = part.metadata.get(episode_records.RESULT)
     if recorded is not None and not part.stopped_by:
         flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]
@@ -151,7 +164,16 @@ def _result(part: IntactPart) -> dict[str, str]:
     assert part.map_config is not None
     happened = {event.kind: event for event in part.events}
     practice = PRACTICE in happened
-    flags = {PRACTICE: practice, "paused": "pause" in happened, "slow_loop": part.loop.slow, RECOVERED: True}
+    columns = {name: text for record in ("episode", "players") for name, text in part.metadata[record].items()}
+    who = (columns["source"], columns["controller_0"], columns["controller_1"])
+    flags = {
+        PRACTICE: practice,
+        "paused": "pause" in happened,
+        "slow_loop": part.loop.slow,
+        OFF_CENTRE: OFF_CENTRE in happened,
+        IDENTICAL_ACTIONS: may_be_one_device(*who) and identical(actions),
+        RECOVERED: True,
+    }
     meta = EpisodeMeta(
         "",
         termination_reason="crash_recovered",

@@ -8,8 +8,6 @@ at theta = 0; theta turns counter-clockwise on screen.
 
 import math
 
-import pymunk
-
 IMAGE_SIZE = (191, 59)
 """Width and height of the table's image at theta = 0, px; the wall rule counts its transparent corners too."""
 
@@ -23,39 +21,15 @@ TRIANGLE = ((55.5, 17.5), (72.5, -16.5), (76.5, -16.5), (95.5, 17.5))
 REACH = math.hypot(95.5, 17.5)
 """Distance of the outermost solid point from the centre, px."""
 
-# The corners of square pixels stick out of the circle that they draw.
-_CIRCLE_FRINGE = 0.3
+CIRCLE_FRINGE = 0.3
+"""How far the corners of square pixels stick out of the circle that they draw, px."""
 
 PART_BOUNDS = (
-    (*CIRCLE_CENTRE, CIRCLE_RADIUS + _CIRCLE_FRINGE),
+    (*CIRCLE_CENTRE, CIRCLE_RADIUS + CIRCLE_FRINGE),
     (-2.5, 0.0, math.hypot(54.0, 29.5)),
     (75.5, 2.0, math.hypot(20.5, 18.5)),
 )
-"""A circle (u, v, radius) around each part, in the order of `table_shapes`, px."""
-
-
-def table_shapes(body: pymunk.Body) -> tuple[pymunk.Shape, ...]:
-    """Circle, board and triangle of the table on a body whose angle is minus theta (pymunk turns from x to y)."""
-    left, top, right, bottom = BOARD
-    r = BOARD_CORNER_RADIUS
-    inner = [(left + r, top + r), (right - r, top + r), (right - r, bottom - r), (left + r, bottom - r)]
-    return (
-        pymunk.Circle(body, CIRCLE_RADIUS + _CIRCLE_FRINGE, CIRCLE_CENTRE),
-        pymunk.Poly(body, inner, radius=r),
-        pymunk.Poly(body, list(TRIANGLE)),
-    )
-
-
-def square_shape(body: pymunk.Body, centre: tuple[float, float], size: int) -> pymunk.Poly:
-    """An obstacle or the goal as the hull of its pixels' centres.
-
-    The original puts the corner of the square at the whole pixel towards zero and compares pixels: a table that
-    reaches less than half a pixel into the square touches none of them.
-    """
-    left, top = (int(value - size / 2) for value in centre)
-    near, far = 0.5, size - 0.5
-    corners = [(left + u, top + v) for u, v in ((near, near), (far, near), (far, far), (near, far))]
-    return pymunk.Poly(body, corners)
+"""A circle (u, v, radius) around each part, in the order of `solids.table_shapes`, px."""
 
 
 def image_size(cos: float, sin: float) -> tuple[int, int]:

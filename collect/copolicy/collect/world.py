@@ -12,7 +12,8 @@ from copolicy.dataset.features import state_vector
 from copolicy.dataset.task import GOAL_SIZE, WINDOW, MapConfig, Physics
 
 from .reward import reward
-from .table import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size, square_shape, table_shapes
+from .solids import square_shape, table_shapes
+from .table import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 
 Triple = tuple[float, float, float]
 

@@ -1,6 +1,7 @@
 """Two pads as one LeRobot teleoperator."""
 
 import logging
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,15 @@ from lerobot.utils.decorators import check_if_already_connected, check_if_not_co
 from lerobot.utils.errors import DeviceNotConnectedError
 
 from copolicy.collect.devices import follow_pads, open_pads
-from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, user_config_folder
+from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, TwinWatch, user_config_folder
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import ACTION_NAMES, PLAYERS, RECORD_HZ
 
 from .config_copolicy_pair import CopolicyPairConfig
 
 logger = logging.getLogger(__name__)
+
+_ALONE_SAMPLES = 3  # of one pad pressed without the other one: two copies of a pad may be read one after the other
 
 
 class CopolicyPair(Teleoperator):
@@ -49,6 +52,7 @@ class CopolicyPair(Teleoperator):
         self._calibrations = CalibrationStore(config.calibration_dir or user_config_folder())
         self._pads: Pads | None = None
         self._seats: list[Pad] = []
+        self._twins = TwinWatch()
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -68,16 +72,16 @@ class CopolicyPair(Teleoperator):
     @property
     def is_calibrated(self) -> bool:
         """Both pads have been calibrated, here or in the lobby of `copolicy-collect play`."""
-        return bool(self._seats) and all(pad.guid in self._calibrations for pad in self._seats)
+        return bool(self._seats) and all(self._calibrations.of(pad).measured for pad in self._seats)
 
     @check_if_already_connected
     def connect(self, calibrate: bool = True) -> None:
         """Binds a pad to each seat, and calibrates those that have never been.
 
         Raises:
-            DeviceNotConnectedError: there are not two pads, or nobody pressed a button in time.
+            DeviceNotConnectedError: there are not two pads, nobody pressed a button in time, or a pad cannot steer.
         """
-        pads = open_pads()
+        pads = open_pads(self.config.calibration_dir)
         follow_pads(pads)
         if len(pads) < len(PLAYERS):
             raise DeviceNotConnectedError(f"{self.name}: expected two pads, found {len(pads)} plugged in")
@@ -85,11 +89,17 @@ class CopolicyPair(Teleoperator):
             seats = self._join(pads)
         else:
             seats = [_by_number(pads, number) for number in (self.config.robot_pad, self.config.human_pad)]
-        self._pads, self._seats = pads, seats
+        for pad in seats:
+            if not pad.steerings:
+                raise DeviceNotConnectedError(
+                    f"{self.name}: expected a stick or a d-pad to steer with, found none on {pad.name}"
+                )
+        self._pads, self._seats, self._twins = pads, seats, TwinWatch()
         for seat, pad in zip(PLAYERS, seats, strict=True):
             logger.info("%s seat: %s", seat, pad.name)
         if calibrate and not self.is_calibrated:
             self.calibrate()
+        self._warn_of_resting_push()
         self.configure()
 
     def calibrate(self) -> None:
@@ -99,14 +109,15 @@ class CopolicyPair(Teleoperator):
             DeviceNotConnectedError: a pad was unplugged meanwhile.
         """
         for seat, pad in zip(PLAYERS, self._seats, strict=True):
-            if pad.guid in self._calibrations:
+            present = self._calibrations.of(pad)
+            if present.measured:
                 continue
-            run = CalibrationRun(self._calibrations.get(pad.guid))
+            run = CalibrationRun(present)
             logger.info("%s seat: let go of the stick, then turn it round its edge", seat)
             end = time.monotonic() + self.config.timeout_s
             while run.stage != "done" and time.monotonic() < end:
                 self._read()
-                run.add(pad.sample(time.monotonic_ns()).axes)
+                run.add(pad.sample(time.monotonic_ns()).positions)
                 time.sleep(1 / RECORD_HZ)
             if run.stage == "done":
                 self._calibrations.put(pad.guid, run.result())
@@ -121,12 +132,18 @@ class CopolicyPair(Teleoperator):
         """The forces of this moment.
 
         Raises:
-            DeviceNotConnectedError: a pad was unplugged; `disconnect` and `connect` bind anew.
+            DeviceNotConnectedError: a pad was unplugged, or both seats turn out to have the same one, listed twice;
+                `disconnect` and `connect` bind anew.
         """
         self._read()
+        samples = [pad.sample(time.monotonic_ns()) for pad in self._seats]
+        self._twins.add(*samples)
+        if self._twins.twins:
+            names = " and ".join(pad.name for pad in self._seats)
+            raise DeviceNotConnectedError(f"{self.name}: expected two pads, found one that is listed twice ({names})")
         forces: list[float] = []
-        for pad in self._seats:
-            forces += self._calibrations.get(pad.guid).force(pad.sample(time.monotonic_ns()).axes)
+        for pad, sample in zip(self._seats, samples, strict=True):
+            forces += pad.force(sample, self._calibrations.of(pad))
         return dict(zip(ACTION_NAMES, forces, strict=True))
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
@@ -150,25 +167,46 @@ class CopolicyPair(Teleoperator):
                     # Its axes would read as zero from now on, as if the player had let go.
                     raise DeviceNotConnectedError(f"{self.name}: the pad of the {seat} seat ({pad.name}) was unplugged")
 
+    def _warn_of_resting_push(self) -> None:
+        for seat, pad in zip(PLAYERS, self._seats, strict=True):
+            calibration = self._calibrations.of(pad)
+            push = math.hypot(*pad.force(pad.sample(0), calibration))
+            if push and not calibration.measured:
+                logger.warning("%s seat: %s pushes with %.2f and was never calibrated", seat, pad.name, push)
+
     def _join(self, pads: Pads) -> list[Pad]:
+        """A seat gets the pad that is pressed while that of the other seat is not: some drivers list one pad twice."""
         seats: list[Pad] = []
         for seat in PLAYERS:
             logger.info("%s seat: press a button", seat)
             end = time.monotonic() + self.config.timeout_s
+            alone, together = 0, ""
             while True:
                 follow_pads(pads)
-                free = [pad for pad in pads if pad.instance_id not in {bound.instance_id for bound in seats}]
-                pressed = next((pad for pad in free if any(pad.sample(0).buttons)), None)
-                if pressed is not None:
-                    seats.append(pressed)
+                pressed = [pad for pad in pads if any(_pressed(pad))]
+                free = [pad for pad in pressed if pad not in seats]
+                if free and len(free) < len(pressed):
+                    alone, together = 0, f": {free[0].name} was pressed together with the other one"
+                elif free:
+                    alone += 1
+                else:
+                    alone = 0
+                if free and (not seats or alone >= _ALONE_SAMPLES):
+                    seats.append(free[0])
                     break
                 if time.monotonic() > end:
                     raise DeviceNotConnectedError(
                         f"{self.name}: expected a press of a button for the {seat} seat within "
-                        f"{self.config.timeout_s:g} s, found none"
+                        f"{self.config.timeout_s:g} s, found none{' on another pad' if together else ''}{together}"
                     )
                 time.sleep(1 / RECORD_HZ)
         return seats
+
+
+def _pressed(pad: Pad) -> tuple[bool, ...]:
+    """Buttons and directions, so that a pad without any button can be bound too."""
+    sample = pad.sample(0)
+    return (*sample.buttons, *(direction != 0 for direction in sample.directions))
 
 
 def _by_number(pads: Pads, number: int) -> Pad:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
@@ -24,6 +24,7 @@ class StickCalibration:
         high: their largest value.
         dead_zone: deflection below which there is no force, share of the full one.
         invert: turn x, y round.
+        measured: centre and range are those of a device; False for values that suit most.
     """
 
     axes: tuple[int, int] = (0, 1)
@@ -32,6 +33,7 @@ class StickCalibration:
     high: Pair = (1.0, 1.0)
     dead_zone: float = 0.12
     invert: tuple[bool, bool] = (False, False)
+    measured: bool = field(default=True, compare=False)
 
     def __post_init__(self):
         for name in ("axes", "centre", "low", "high", "invert"):
@@ -75,10 +77,17 @@ class StickCalibration:
         Raises:
             InvalidValueError: other entries, or values that make no calibration.
         """
-        names = set(cls.__dataclass_fields__)
-        if not isinstance(entries, dict) or set(entries) != names:
+        names = set(cls.__dataclass_fields__) - {"measured"}
+        if not isinstance(entries, dict) or set(entries) - {"measured"} != names:
             raise InvalidValueError("calibration", f"the entries {sorted(names)}", entries)
+        if not isinstance(entries.get("measured", True), bool):
+            raise InvalidValueError("calibration measured", "true or false", entries["measured"])
         try:
-            return cls(**entries)
+            read = cls(**entries)
         except (TypeError, ValueError, IndexError):
             raise InvalidValueError("calibration", "numbers", entries) from None
+        usual = cls()
+        if "measured" not in entries and (read.centre, read.low, read.high) == (usual.centre, usual.low, usual.high):
+            # Files did not say it before; nobody measures exactly these.
+            return replace(read, measured=False)
+        return read

@@ -77,6 +77,7 @@ class CalibrationRun:
             low=low,
             high=high,
             dead_zone=round(min(largest, max(smallest, 0.10, 2 * tremble / reach)), 3),
+            measured=True,
         )
 
     @property

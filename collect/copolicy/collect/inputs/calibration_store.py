@@ -10,6 +10,7 @@ from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.staging import replace_text
 
 from .calibration import StickCalibration
+from .joysticks import Pad
 
 _FILE = "calibrations.json"
 
@@ -49,11 +50,16 @@ class CalibrationStore:
 
     def __contains__(self, guid: str) -> bool:
         """The device has been calibrated."""
-        return guid in self._by_guid
+        return guid in self._by_guid and self._by_guid[guid].measured
 
     def get(self, guid: str) -> StickCalibration:
         """The calibration of a device, or the one that suits most."""
-        return self._by_guid.get(guid, StickCalibration())
+        return self._by_guid.get(guid, StickCalibration(measured=False))
+
+    def of(self, pad: Pad) -> StickCalibration:
+        """The calibration of a pad; without one, or with one of axes that it lacks, the one that suits its kind."""
+        kept = self._by_guid.get(pad.guid)
+        return kept if kept is not None and pad.has_axes(kept.axes) else pad.usual_calibration()
 
     def put(self, guid: str, calibration: StickCalibration) -> None:
         """Keeps a calibration, on the disk too.

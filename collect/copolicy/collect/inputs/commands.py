@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from ..sdl import pygame
+from .gamepads import UNKNOWN, GamepadMapping
+from .joysticks import Pads
 from .keyboard import HALVES
 
 
@@ -24,6 +26,8 @@ class Command(Enum):
     UNDO = auto()
     SWAP = auto()
     HELP = auto()
+    OTHER = auto()
+    """A button without a meaning; it joins, as any button does."""
 
 
 Device = int | str
@@ -43,21 +47,19 @@ class Press:
     moved: bool = False
 
 
-# The order of SDL's own mapping of game pads, which most drivers of plain joysticks share for the first four.
-_BUTTONS = {
-    0: Command.ACCEPT,
-    1: Command.BACK,
-    2: Command.REDO,
-    3: Command.DISCARD,
-    4: Command.NOTE,
-    5: Command.UNDO,
-    6: Command.PAUSE,
-    7: Command.PAUSE,
-    9: Command.PAUSE,
-    11: Command.UP,
-    12: Command.DOWN,
-    13: Command.LEFT,
-    14: Command.RIGHT,
+_CONTROLS = {
+    "a": Command.ACCEPT,
+    "b": Command.BACK,
+    "x": Command.REDO,
+    "y": Command.DISCARD,
+    "leftshoulder": Command.NOTE,
+    "rightshoulder": Command.UNDO,
+    "back": Command.PAUSE,
+    "start": Command.PAUSE,
+    "dpup": Command.UP,
+    "dpdown": Command.DOWN,
+    "dpleft": Command.LEFT,
+    "dpright": Command.RIGHT,
 }
 _KEYS = {
     pygame.K_UP: Command.UP,
@@ -93,31 +95,47 @@ _TIPPED, _LEVEL = 0.65, 0.35  # a stick gives one command when it passes the fir
 class CommandReader:
     """Turns events into presses; sees every event, for the edges of sticks."""
 
-    def __init__(self):
+    def __init__(self, pads: Pads | None = None):
+        """
+        Args:
+            pads: what the buttons of each one mean; without them all are taken as unknown.
+        """
+        self._pads = pads
         self._tipped: dict[tuple[int, int], bool] = {}
 
     def read(self, event: pygame.event.Event) -> Press | None:
         """The press behind an event, if there is one."""
         if event.type == pygame.KEYDOWN and event.key in _KEYS:
             return Press(_KEYS[event.key], _HALF_OF.get(event.key, "keyboard"))
-        if event.type == pygame.JOYBUTTONDOWN and event.button in _BUTTONS:
-            return Press(_BUTTONS[event.button], event.instance_id)
+        if event.type == pygame.JOYBUTTONDOWN:
+            control = self._mapping(event).of_button(event.button)
+            return Press(_CONTROLS.get(control or "", Command.OTHER), event.instance_id)
         if event.type == pygame.JOYHATMOTION:
             x, y = event.value
-            if y:
-                return Press(Command.UP if y > 0 else Command.DOWN, event.instance_id)
-            if x:
-                return Press(Command.RIGHT if x > 0 else Command.LEFT, event.instance_id)
-        if event.type == pygame.JOYAXISMOTION and event.axis < 2:
-            return self._stick(event.instance_id, event.axis, event.value)
+            if not x and not y:
+                return None
+            direction = (1 if y > 0 else 4) if y else (2 if x > 0 else 8)
+            control = self._mapping(event).of_hat(event.hat, direction)
+            return Press(_CONTROLS.get(control, Command.OTHER), event.instance_id)
+        if event.type == pygame.JOYAXISMOTION:
+            return self._stick(event.instance_id, event.axis, event.value, self._mapping(event))
         return None
 
-    def _stick(self, instance_id: int, axis: int, value: float) -> Press | None:
+    def _mapping(self, event: pygame.event.Event) -> GamepadMapping:
+        pad = self._pads.get(event.instance_id) if self._pads is not None else None
+        return UNKNOWN if pad is None else pad.mapping
+
+    def _stick(self, instance_id: int, axis: int, value: float, mapping: GamepadMapping) -> Press | None:
+        axes, invert = mapping.stick("left") or mapping.cross_axes or ((0, 1), (False, False))
+        if axis not in axes:
+            return None
+        place = axes.index(axis)
+        value = -value if invert[place] else value
         key = (instance_id, axis)
         if abs(value) < _LEVEL:
             self._tipped[key] = False
         elif abs(value) > _TIPPED and not self._tipped.get(key):
             self._tipped[key] = True
-            commands = ((Command.LEFT, Command.RIGHT), (Command.UP, Command.DOWN))[axis]
+            commands = ((Command.LEFT, Command.RIGHT), (Command.UP, Command.DOWN))[place]
             return Press(commands[value > 0], instance_id, moved=True)
         return None

@@ -50,8 +50,9 @@ class Application:
         self.phase: Phase = _PHASES[first](game)
         self.pictures = 0
         self._window = window
-        self._commands = CommandReader()
+        self._commands = CommandReader(game.roster.pads)
         self._help = False
+        self._refused = ""
         self._drawn_ns = 0
         self._drawing: deque[int] = deque([0], maxlen=20)
         self._halfway_ns = 0
@@ -107,6 +108,7 @@ class Application:
             self._handle(event)
         if self.game.stop:
             return False
+        self._follow_devices()
         following = self.phase.tick(tick)
         if following is To.END:
             return False
@@ -114,6 +116,20 @@ class Application:
             self.phase = _PHASES[following](self.game)
             self.phase.enter()
         return True
+
+    def _follow_devices(self) -> None:
+        """Lets devices join that had to wait, and looks for faulty ones between the episodes."""
+        game, roster = self.game, self.game.roster
+        for player in roster.tick():
+            self.phase.joined(player)
+        if not self.phase.realtime:
+            player = roster.watch()
+            if player:
+                self.phase.device_lost(player)
+        if roster.refused not in ("", self._refused):
+            game.sounds.play("alarm")
+            game.say(roster.refused)
+        self._refused = roster.refused
 
     def _handle(self, event: pygame.event.Event) -> None:
         game, phase = self.game, self.phase
@@ -143,6 +159,10 @@ class Application:
             return
         press = self._commands.read(event)
         if press:
+            game.roster.note(press)
+        if phase.takes(event):
+            return
+        if press:
             self._press(press)
 
     def _press(self, press: Press) -> None:
@@ -154,6 +174,8 @@ class Application:
             self._help = True
         if not isinstance(phase, Lobby) and not isinstance(phase, Running) and game.roster.join(press):
             return  # a press that gives a lost seat a device chooses nothing
+        if not isinstance(phase, Lobby) and game.roster.is_stray(press):
+            return
         phase.handle(press)
 
     def _fits(self, remaining_ns: int) -> bool:
@@ -176,7 +198,7 @@ class Application:
         if game.toast:
             draw_toast(canvas, game.toast)
         if self._help:
-            draw_help(canvas)
+            draw_help(canvas, game.roster.labels())
         window.show()
         self.pictures += 1
         self._drawn_ns = game.clock()

@@ -11,8 +11,6 @@ from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import MAP_SETS, Physics
 
-from ..controllers.checkpoint_folder import checkpoint_folder
-from ..controllers.training_conditions import training_conditions
 from .settings import PilotSpec, PlaySettings
 
 _ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
@@ -109,6 +107,10 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
 
 def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None) -> float:
     """The limit that the policies at the table learned with; a flag wins, and is said to contradict them."""
+    # What a session without a policy does without.
+    from ..controllers.checkpoint_folder import checkpoint_folder
+    from ..controllers.training_conditions import training_conditions
+
     given = None if flag is None else _ANGULAR_LIMITS[flag]
     learned: dict[str, float] = {}
     for pilot in pilots:
@@ -134,7 +136,7 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None) -> float:
 
 def _play(arguments: argparse.Namespace) -> dict:
     settings = settings_of(arguments)
-    # Loading pygame and the pilots takes a moment that `--help` should not.
+    # Loading pygame takes a moment that `--help` should not.
     from .session_run import play
 
     return play(settings)

@@ -245,11 +245,14 @@ class Game:
         kept = self.folder.counts.kept_here.total()
         return f"{self.settings.pair}   episode {min(kept + 1, self.settings.episodes)} of {self.settings.episodes}"
 
-    def hud(self, trial: Trial) -> Hud:
-        """What the bars show of an episode."""
+    def hud(self, trial: Trial, carrying: bool = True) -> Hud:
+        """What the bars show of an episode, or of one that is about to begin."""
         robot, human = self.seats(trial)
         forces = ((trial.forces[0], trial.forces[1]), (trial.forces[2], trial.forces[3]))
-        statuses = [SeatStatus(p.label, force, p.missing) for p, force in zip((robot, human), forces, strict=True)]
+        statuses = [
+            SeatStatus(player.label if carrying else f"{player.player_id}: {player.label}", force, player.missing)
+            for player, force in zip((robot, human), forces, strict=True)
+        ]
         return Hud(
             title=self.title(trial),
             done=self.folder.counts.kept_here.total() / self.settings.episodes,
@@ -261,4 +264,5 @@ class Game:
             late=trial.loop.late + trial.loop.skipped,
             hz=trial.loop.achieved_hz,
             practice=trial.practice,
+            carrying=carrying,
         )

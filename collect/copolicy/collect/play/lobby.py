@@ -1,23 +1,18 @@
 """The lobby: join with a press, try the stick, set it up, agree."""
 
-from dataclasses import replace
-
-from ..inputs import CalibrationRun, Command, Pad, Press, StickCalibration
-from ..inputs.calibration import DEAD_ZONES
+from ..inputs import Command, Pad, Press
 from ..screen import Canvas
 from ..screen.dialogs import draw_entry
 from ..screen.lobby_view import LobbyPanel, draw_lobby
+from ..sdl import pygame
 from ..ticker import Tick
 from .game import Game
 from .menu import Menu, TextEntry
 from .phase import Phase, To
 from .player import Player
+from .stick_setup import StickSetup
 
 _READY_TICKS = 15
-_PROMPTS = {
-    "rest": "calibrating: let go of the stick",
-    "turn": "now turn it all the way round, twice",
-}
 
 
 class Lobby(Phase):
@@ -26,7 +21,7 @@ class Lobby(Phase):
     def __init__(self, game: Game):
         super().__init__(game)
         self._menus: dict[int, Menu] = {}
-        self._runs: dict[int, CalibrationRun] = {}
+        self._setups = {player.index: StickSetup(game, player) for player in game.players}
         self._writer: Player | None = None
         self._ready_ticks = 0
         self._left = False
@@ -35,6 +30,10 @@ class Lobby(Phase):
         """Everybody has to agree anew; one who needs no lobby stays ready."""
         for player in self.game.players:
             player.ready = not player.spec.is_person
+
+    def takes(self, event: pygame.event.Event) -> bool:
+        """The gamepad's events while its buttons are set up."""
+        return any(setup.takes(event) for setup in self._setups.values())
 
     def handle(self, press: Press) -> None:
         """Joins, or moves in the own menu."""
@@ -46,17 +45,16 @@ class Lobby(Phase):
         if player is None:
             joined = game.roster.join(press)
             if joined:
-                game.sounds.play("go")
-                joined.ready = False
-                self._menus.pop(joined.index, None)
-            elif press.command == Command.PAUSE and not press.moved:
-                self._left = True
+                self.joined(joined)
+            elif press.command == Command.PAUSE and isinstance(press.device, str):
+                self._escape()
             return
-        if press.moved:
+        if press.moved or self._tries_cross(player, press):
             return  # trying the stick
-        if player.index in self._runs:
+        setup = self._setups[player.index]
+        if setup.busy:
             if press.command == Command.BACK:
-                del self._runs[player.index]
+                setup.cancel()
             return
         if player.ready:
             if press.command == Command.BACK:
@@ -68,7 +66,7 @@ class Lobby(Phase):
             return
         choice = menu.items[menu.cursor][1]
         if press.command in (Command.LEFT, Command.RIGHT):
-            self._change(player, choice, 1 if press.command == Command.RIGHT else -1)
+            setup.change(choice, 1 if press.command == Command.RIGHT else -1)
         elif menu.handle(press):
             self._choose(player, choice)
 
@@ -79,14 +77,12 @@ class Lobby(Phase):
             game.stop = game.stop or "quit"
             return To.END
         self._take_entry()
-        for player in game.players:
-            run = self._runs.get(player.index)
-            if run and player.person and player.device:
-                run.add(player.person.sample().axes)
-                if run.stage == "done":
-                    del self._runs[player.index]
-                    self._calibrate(player, run.result())
-                    game.sounds.play("goal")
+        for setup in self._setups.values():
+            if setup.tick():
+                game.sounds.play("goal")
+            if setup.message:
+                game.say(setup.message)
+                setup.message = ""
         if self.entry is None and all(player.ready and not player.missing for player in game.players):
             self._ready_ticks += 1
             if self._ready_ticks > _READY_TICKS:
@@ -95,10 +91,17 @@ class Lobby(Phase):
             self._ready_ticks = 0
         return To.STAY
 
+    def joined(self, player: Player) -> None:
+        """They have a device, and a menu for it."""
+        self.game.sounds.play("go")
+        player.ready = False
+        self._menus.pop(player.index, None)
+        self._setups[player.index].cancel()
+
     def device_lost(self, player: Player) -> None:
         """They have to join again."""
         player.ready = False
-        self._runs.pop(player.index, None)
+        self._setups[player.index].cancel()
 
     def draw(self, canvas: Canvas, share: float) -> None:
         """Draws both panels."""
@@ -118,48 +121,63 @@ class Lobby(Phase):
             draw_entry(canvas, self.entry.title, self.entry.text)
 
     def _panel(self, seat: int, player: Player) -> LobbyPanel:
-        waiting = "press any button of a joystick" if player.spec.kind == "joystick" else "press one of your keys"
-        raw, force, dead_zone = None, (0.0, 0.0), 0.0
-        if player.person and player.device:
-            sample = player.person.sample()
-            force = player.person.force(sample)
-            calibration = player.person.calibration if isinstance(player.device, Pad) else StickCalibration()
-            dead_zone = calibration.dead_zone if isinstance(player.device, Pad) else 0.0
-            x, y = (sample.axes[axis] if axis < len(sample.axes) else 0.0 for axis in calibration.axes)
-            raw = (x, y)
-        run = self._runs.get(player.index)
+        if player.missing:
+            joystick = player.spec.kind == "joystick"
+            waiting = "press any button of a joystick" if joystick else "press one of your keys"
+            refused = self.game.roster.refused if joystick else ""
+            return LobbyPanel(seat, player.player_id, waiting, notice=refused)
+        setup, device = self._setups[player.index], player.device
         menu = self._menu(player) if player.person else None
-        pad = isinstance(player.device, Pad)
-        prompt = (
-            _PROMPTS[run.stage] if run else "A: choose   B: next" if pad else "Enter or E: choose   arrows or W S: move"
-        )
-        return LobbyPanel(
+        panel = LobbyPanel(
             seat,
             player.player_id,
-            "" if player.missing else player.label,
-            waiting if player.missing else prompt,
-            raw,
-            force,
-            dead_zone,
-            menu.labels if menu and not player.missing else [],
-            menu.cursor if menu else -1,
-            player.ready and not player.missing,
-            run.progress if run else None,
+            self._prompt(player),
+            device=player.label,
+            items=menu.labels if menu else [],
+            cursor=menu.cursor if menu else -1,
+            ready=player.ready,
+            progress=setup.progress if setup.busy else None,
+            notice=setup.notice,
         )
+        if player.person is None or device is None:
+            return panel
+        sample = player.person.sample()
+        panel.force = player.person.force(sample)
+        if isinstance(device, Pad):
+            calibration = player.person.calibration
+            x, y = (sample.positions[axis] for axis in calibration.axes)
+            panel.stick, panel.dead_zone = (x, y), calibration.dead_zone
+            panel.steering = device.steering(calibration).label
+        else:
+            panel.stick, panel.steering = (sample.axes[0], sample.axes[1]), "keys"
+        return panel
+
+    def _tries_cross(self, player: Player, press: Press) -> bool:
+        """A direction of the d-pad that steers commands nothing here, as a stick's does not."""
+        pad, directions = player.device, (Command.UP, Command.DOWN, Command.LEFT, Command.RIGHT)
+        if press.command not in directions or not isinstance(pad, Pad) or player.person is None:
+            return False
+        return pad.steering(player.person.calibration).digital
+
+    def _prompt(self, player: Player) -> str:
+        setup = self._setups[player.index]
+        if setup.busy:
+            return setup.prompt
+        if isinstance(player.device, Pad):
+            labels = player.device.labels
+            return f"{labels['a']}: choose   {labels['b']}: next"
+        return "Enter or E: choose   arrows or W S: move"
 
     def _menu(self, player: Player) -> Menu:
         """The player's menu with its present values, its cursor kept."""
         consent = f"agree ({player.consent})" if player.consent else "ready, no consent record"
         items = [(consent, "ready"), ("write consent record id", "consent")]
         if isinstance(player.device, Pad) and player.person:
-            calibration = player.person.calibration
-            invert = ["yes" if one else "no" for one in calibration.invert]
-            items += [
-                ("calibrate the stick", "calibrate"),
-                (f"dead zone  {calibration.dead_zone:.2f}", "dead_zone"),
-                (f"left-right inverted: {invert[0]}", "invert_x"),
-                (f"up-down inverted: {invert[1]}", "invert_y"),
-            ]
+            setup = self._setups[player.index]
+            if setup.submenu is not None:
+                setup.refresh(player.device, player.person.calibration)
+                return setup.submenu
+            items += setup.items(player.device, player.person.calibration)
         items += [("swap seats", "swap"), ("leave", "leave"), ("quit", "quit")]
         menu = self._menus.setdefault(player.index, Menu("", items))
         menu.items = items
@@ -176,9 +194,6 @@ class Lobby(Phase):
             case "consent":
                 self.entry = TextEntry(f"Consent record id of {player.player_id}", 64)
                 self._writer = player
-            case "calibrate":
-                if player.person:
-                    self._runs[player.index] = CalibrationRun(player.person.calibration)
             case "swap":
                 self._swap()
             case "leave":
@@ -187,30 +202,14 @@ class Lobby(Phase):
             case "quit":
                 self._left = True
             case _:
-                self._change(player, choice, 1)
+                self._setups[player.index].choose(choice)
 
-    def _change(self, player: Player, choice: str, step: int) -> None:
-        if not player.person or choice not in ("dead_zone", "invert_x", "invert_y"):
-            return
-        calibration = player.person.calibration
-        x, y = calibration.invert
-        match choice:
-            case "dead_zone":
-                smallest, largest = DEAD_ZONES
-                steps = round((largest - smallest) / 0.01) + 1
-                at = (round((calibration.dead_zone - smallest) / 0.01) + step) % steps
-                changed = replace(calibration, dead_zone=round(smallest + 0.01 * at, 2))
-            case "invert_x":
-                changed = replace(calibration, invert=(not x, y))
-            case _:
-                changed = replace(calibration, invert=(x, not y))
-        self._calibrate(player, changed)
-
-    def _calibrate(self, player: Player, calibration: StickCalibration) -> None:
-        try:
-            self.game.roster.calibrate(player, calibration)
-        except OSError as error:
-            self.game.say(f"calibration not saved: {error.strerror}")
+    def _escape(self) -> None:
+        """Leaves the set-up of buttons, which takes those of the gamepad, or else the lobby."""
+        busy = [setup for setup in self._setups.values() if setup.busy]
+        for setup in busy:
+            setup.cancel()
+        self._left = not busy
 
     def _swap(self) -> None:
         self.game.reseat()

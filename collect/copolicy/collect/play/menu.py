@@ -15,12 +15,17 @@ REASONS = ("was not ready", "trouble with a stick", "misunderstood the task", "d
 
 
 class Menu:
-    """A list with a cursor."""
+    """A list with a cursor.
 
-    def __init__(self, title: str, items: Sequence[Item]):
+    Attributes:
+        rows: of each column, where it is drawn in several: left and right go to the column beside it.
+    """
+
+    def __init__(self, title: str, items: Sequence[Item], rows: int | None = None):
         self.title = title
         self.items = list(items)
         self.cursor = 0
+        self.rows = rows
 
     @property
     def labels(self) -> list[str]:
@@ -32,6 +37,9 @@ class Menu:
         if press.command in (Command.UP, Command.DOWN):
             step = 1 if press.command == Command.DOWN else -1
             self.cursor = (self.cursor + step) % len(self.items)
+        elif press.command in (Command.LEFT, Command.RIGHT) and self.rows:
+            beside = self.cursor + (self.rows if press.command == Command.RIGHT else -self.rows)
+            self.cursor = beside if 0 <= beside < len(self.items) else self.cursor
         elif press.command == Command.ACCEPT:
             return self.items[self.cursor][1]
         elif press.command == Command.BACK:

@@ -5,6 +5,7 @@ from enum import Enum, auto
 from ..inputs import Press
 from ..screen import WORLD, Canvas, between
 from ..screen.hud import draw_hud
+from ..sdl import pygame
 from ..ticker import Tick
 from .game import Game
 from .menu import TextEntry
@@ -44,6 +45,10 @@ class Phase:
     def enter(self) -> None:
         """It begins."""
 
+    def takes(self, event: pygame.event.Event) -> bool:
+        """The phase wants an event of a joystick for itself; it commands nothing then."""
+        return False
+
     def handle(self, press: Press) -> None:
         """A player asks for something."""
 
@@ -53,6 +58,9 @@ class Phase:
 
     def draw(self, canvas: Canvas, share: float) -> None:
         """Draws itself; `share` in [0, 1] of the time between two steps is over."""
+
+    def joined(self, player: Player) -> None:
+        """A player has a device now that had to wait."""
 
     def device_lost(self, player: Player) -> None:
         """The device of a player is gone."""
@@ -66,10 +74,10 @@ class Phase:
         assert self.game.trial is not None, "a phase of an episode without one"
         return self.game.trial
 
-    def draw_world(self, canvas: Canvas, trial: Trial, share: float = 1.0) -> None:
-        """Draws the table and the bars around it."""
+    def draw_world(self, canvas: Canvas, trial: Trial, share: float = 1.0, carrying: bool = True) -> None:
+        """Draws the table and the bars around it; before the episode the bars say who sits where."""
         view = self.game.view(trial.map_config)
         pose = between(trial.before, trial.world.pose, share)
         trail = [*trial.trail, pose]
         view.draw(canvas.surface, canvas.rect(*WORLD), pose, trial.forces, trail)
-        draw_hud(canvas, self.game.hud(trial))
+        draw_hud(canvas, self.game.hud(trial, carrying))

@@ -75,6 +75,7 @@ class Player:
             pad, settings = self.device, self.person.calibration
             about |= {"device": pad.name, "guid": pad.guid, "instance_id": str(pad.instance_id)}
             about |= {key: str(value) for key, value in settings.to_json().items()}
+            about |= {"steering": pad.steering(settings).label, "mapping": pad.mapping.source}
         elif self.device:
             about["device"] = f"keyboard, {self.device.name}"
         return about

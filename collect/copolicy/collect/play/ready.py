@@ -4,8 +4,8 @@ import math
 
 from ..inputs import Command, Press
 from ..screen import Canvas
-from ..screen.dialogs import Line, draw_countdown, draw_dialog
-from ..screen.palette import MUTED, ORANGE, SKY, YELLOW
+from ..screen.dialogs import STRIP_ROWS, draw_countdown, draw_strip_menu
+from ..screen.palette import MUTED, YELLOW
 from ..ticker import DT_NS, Tick
 from .game import Game
 from .menu import Menu
@@ -21,7 +21,9 @@ class Ready(Phase):
     def __init__(self, game: Game):
         super().__init__(game)
         self._menu = Menu(
-            "", [("start", "start"), ("swap seats", "swap"), ("sticks and consent", "lobby"), ("quit for now", "quit")]
+            "",
+            [("start", "start"), ("swap seats", "swap"), ("sticks and consent", "lobby"), ("quit for now", "quit")],
+            rows=STRIP_ROWS,
         )
         self._choice = ""
         self._ticks = 0
@@ -71,21 +73,16 @@ class Ready(Phase):
         self.game.say(f"{player.player_id} lost their device")
 
     def draw(self, canvas: Canvas, share: float) -> None:
-        """Draws the map under a box that says who sits where."""
+        """Draws the map, and below it who sits where and the menu: people study the map now."""
         game, trial = self.game, self.trial
-        self.draw_world(canvas, self.trial)
-        lines = [
-            Line(f"{mark}: {player.player_id}, {player.label}", 30, colour)
-            for mark, player, colour in zip(("Triangle", "Circle"), game.seats(trial), (SKY, ORANGE), strict=True)
-        ]
-        if trial.practice:
-            lines.append(Line("practice: it does not count", 26, YELLOW))
+        self.draw_world(canvas, trial, carrying=False)
         missing = game.roster.missing()
         if missing:
-            lines.append(Line(f"{missing[0].player_id}: press any button to join", 28, YELLOW))
+            hint, colour = f"{missing[0].player_id}: press any button to join", YELLOW
         else:
-            lines.append(Line("A or Enter starts", 24, MUTED))
-        draw_dialog(canvas, game.title(trial), lines, self._menu.labels, self._menu.cursor)
+            buttons = [labels["a"] for labels in game.roster.labels()]
+            hint, colour = f"{' or '.join([*buttons, 'Enter'])} starts", MUTED
+        draw_strip_menu(canvas, self._menu.labels, self._menu.cursor, hint, colour)
 
 
 class Countdown(Phase):
@@ -129,7 +126,7 @@ class Countdown(Phase):
         return To.STAY
 
     def draw(self, canvas: Canvas, share: float) -> None:
-        """Draws the number over the world."""
-        self.draw_world(canvas, self.trial)
+        """Draws the number below the world."""
+        self.draw_world(canvas, self.trial, carrying=False)
         left = max(0.0, self._left_s)
         draw_countdown(canvas, str(max(1, math.ceil(left))), 1 - left % 1)

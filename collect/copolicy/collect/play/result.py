@@ -119,7 +119,9 @@ class Result(Phase):
             lines.append(Line(f"the loop was too slow ({trial.loop.skipped} skipped ticks): flagged", 24, YELLOW))
         if trial.notes:
             lines.append(Line(f"notes: {'; '.join(trial.notes)}", 24, MUTED))
-        hint = "A keep   X redo   Y discard" if menu is self._top and not trial.practice else ""
+        hint = ""
+        if menu is self._top and not trial.practice:
+            hint = self.game.roster.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
         colour = OUTCOME_COLOURS[trial.outcome.reason]
         # Beside the table, so that everybody sees what happened.
         middle = _LEFT if trial.world.pose[0] > WINDOW[0] / 2 else WINDOW[0] - _LEFT

@@ -1,27 +1,24 @@
-"""`copolicy-collect play`: opens everything in order, runs the session, closes everything in order."""
+"""`copolicy-collect play`: opens the window, loads everything else, runs the session, closes everything in order."""
+
+from __future__ import annotations
 
 import gc
-import logging
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from copolicy.dataset.exceptions import RunError
-
-from ..inputs import HALVES, CalibrationStore, Pads, user_config_folder
-from ..recover import recover
-from ..sdl import pygame
-from ..session import CollectionLock, SessionFolder
-from .application import Application
-from .game import Game
-from .phase import To
-from .player import default_pilots, make_players, say_other_physics
-from .roster import Roster
+from ..sdl import init_events, pygame
+from .loading import Loading
 from .settings import PlaySettings
-from .sounds import Sounds
-from .window import Window, open_without_window
+from .window import Window
+
+if TYPE_CHECKING:
+    from .application import Application
+    from .game import Game
 
 
 def play(settings: PlaySettings) -> dict:
@@ -41,36 +38,31 @@ def play(settings: PlaySettings) -> dict:
 
 
 @contextmanager
-def prepared(settings: PlaySettings) -> Iterator[Application]:
-    """Opens folder, devices, window and players; closes them however the block is left."""
+def prepared(settings: PlaySettings, also: tuple[str, Callable[[], Any]] | None = None) -> Iterator[Application]:
+    """Opens the window, then folder, devices and players; closes them however the block is left.
+
+    Args:
+        also: a further job and what it loads, to be run while the window shows that.
+
+    Raises:
+        CopolicyError: there is no display, or see `play`.
+    """
     with ExitStack() as stack:
-        lock = _lock(settings)
-        stack.callback(lock.close)
-        recovered = [one for one in recover(settings.out) if one.status == "recovered"]
-        for one in recovered:
-            logging.info("recovered %s: %d steps", one.output.name if one.output else one.source.name, one.steps)
-        store = CalibrationStore(settings.config_folder or user_config_folder())
         window = None
         if settings.headless:
-            open_without_window()
+            init_events(window=True)
         else:
             window = Window(settings.window, settings.fullscreen)
         stack.callback(_close_pygame)
-        pads = Pads()
-        players = make_players(settings.pair, settings.pilots or default_pilots(len(pads)), settings.consents)
-        for player in players:
-            stack.callback(player.controller.close)
-        say_other_physics(players, settings.physics)
-        fixed = settings.fixed()
-        folder = SessionFolder(settings.out, settings.pair, fixed, settings.episodes, settings.new_session)
-        sounds = Sounds(settings.mute or settings.headless)
-        stack.callback(sounds.close)
-        game = Game(settings, Roster(players, pads, store, folder.journal), folder, sounds)
-        if recovered:
-            game.say(f"{len(recovered)} recording(s) of a broken-off run recovered")
-        if settings.headless:
-            _join_by_order(game)
-        first = To.READY if settings.headless else To.LOBBY
+        loading = Loading(window)
+        # By name and not at the top: people look at the window while world, recorder and routes are imported.
+        assembly = loading.run("the table and its recorder", lambda: import_module(".assembly", __package__))
+        if also is not None:
+            loading.run(*also)
+        application = assembly.assemble(settings, window, loading, stack)
+        if window is not None:
+            window.loaded()
+        game = application.game
         gc.collect()
         gc.freeze()
         stack.callback(gc.unfreeze)
@@ -78,27 +70,8 @@ def prepared(settings: PlaySettings) -> Iterator[Application]:
         # A thread that plans must not hold the loop for Python's usual 5 ms.
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(0.0005)
-        application = Application(game, window, first if not game.finished else To.FINISHED)
         yield application
-        folder.journal("end", reason=game.stop or "end")
-
-
-def _lock(settings: PlaySettings) -> CollectionLock:
-    try:
-        return CollectionLock(settings.out)
-    except OSError as error:
-        raise RunError(f"{settings.out}: expected a folder to write to, found: {error.strerror}") from None
-
-
-def _join_by_order(game: Game) -> None:
-    """Without a lobby, devices are given out in the order in which they are there."""
-    for device in (*game.roster.pads, *HALVES.values()):
-        game.roster.give(device)
-    missing = game.roster.missing()
-    if any(player.spec.kind == "keyboard" for player in game.players):
-        raise RunError("pilots: expected no keyboard with --headless, found one: keys need a window")
-    if missing:
-        raise RunError(f"{missing[0].player_id}: expected a joystick, found {len(game.roster.pads)} for both players")
+        game.folder.journal("end", reason=game.stop or "end")
 
 
 @contextmanager

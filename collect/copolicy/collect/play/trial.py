@@ -11,11 +11,11 @@ import numpy as np
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.messages.copolicy_pb2 import LoopTiming
-from copolicy.dataset.task import RECORD_HZ, MapConfig, Physics
+from copolicy.dataset.task import PLAYERS, RECORD_HZ, MapConfig, Physics
 
-from ..controllers import Controller, PolicyController
+from ..controllers import Controller, PersonController, PolicyController
 from ..recorder import EpisodeRecorder
-from ..session import PRACTICE
+from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
 from ..wall_clock import WallClockAnchor
 from ..world import RUNNING, Outcome, TableWorld
@@ -72,6 +72,7 @@ class Trial:
         self.notes: list[str] = []
         self.paused = 0
         self.step_ns = clock()
+        self._off_centre: set[int] = set()
         self._anchor = anchor
         self._clock = clock
         self._stack = ExitStack()
@@ -122,6 +123,7 @@ class Trial:
         world = self.world
         state = world.observation
         readings = [controller.read(state) for controller in self.controllers]
+        self._watch_sticks()
         action = np.clip(np.array([*readings[0].force, *readings[1].force]), -1.0, 1.0)
         self.before, self.step_ns = world.pose, tick.start_ns
         self.outcome = world.step(action)
@@ -152,6 +154,12 @@ class Trial:
             self.trail.append(world.pose)
         if self.outcome.done:
             self.event("outcome", self.outcome.reason)
+
+    def _watch_sticks(self) -> None:
+        for seat, controller in enumerate(self.controllers):
+            if isinstance(controller, PersonController) and controller.push_at_rest and seat not in self._off_centre:
+                self._off_centre.add(seat)
+                self.event(OFF_CENTRE, f"{PLAYERS[seat]}: pushes with {controller.push_at_rest:.2f} at rest")
 
     def event(self, kind: str, detail: str = "") -> None:
         """Records an event, if the recording has begun."""
@@ -205,6 +213,8 @@ class Trial:
             flags = (*flags, "paused")
         if self.loop.slow:
             flags = (*flags, "slow_loop")
+        if self._off_centre:
+            flags = (*flags, OFF_CENTRE)
         self.event("verdict", "discard" if discarded else "keep")
         self.event("loop", self.loop.summary())
         plans = _latencies(self.controllers)

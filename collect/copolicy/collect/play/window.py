@@ -1,11 +1,9 @@
 """The window, or what stands in for it where there is no display."""
 
-import os
-
 from copolicy.dataset.exceptions import RunError
 
 from ..screen import SIZE
-from ..sdl import pygame
+from ..sdl import NoDisplayError, open_display, pygame
 
 _OF_DESKTOP = 0.86  # of the desktop's smaller side that a window takes by itself
 
@@ -23,13 +21,13 @@ class Window:
             RunError: there is no display.
         """
         try:
-            pygame.display.init()
+            open_display()
             desktop = pygame.display.get_desktop_sizes()[0]
             scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
             self._size = size or (round(SIZE[0] * scale), round(SIZE[1] * scale))
-            pygame.display.set_caption("copolicy: carry the table together")
+            pygame.display.set_caption("loading: carry the table together")
             self._open(fullscreen)
-        except pygame.error as error:
+        except (pygame.error, NoDisplayError) as error:
             raise RunError(f"expected a display (or --headless), found none: {error}") from None
         pygame.mouse.set_visible(False)
 
@@ -41,6 +39,10 @@ class Window:
     def show(self) -> None:
         """Shows what was drawn."""
         pygame.display.flip()
+
+    def loaded(self) -> None:
+        """Says in the title that the session is there."""
+        pygame.display.set_caption("copolicy: carry the table together")
 
     def toggle_fullscreen(self) -> None:
         """Full screen and back."""
@@ -54,10 +56,3 @@ class Window:
             pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             pygame.display.set_mode(self._size, pygame.RESIZABLE)
-
-
-def open_without_window() -> None:
-    """What SDL needs to deliver the events of joysticks where there is no window."""
-    os.environ["SDL_VIDEODRIVER"] = "dummy"
-    pygame.display.init()
-    pygame.display.set_mode((64, 64))

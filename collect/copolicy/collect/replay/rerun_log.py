@@ -2,11 +2,13 @@
 
 import importlib
 import math
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.commandline import progress
-from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, OutputExistsError
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, OutputExistsError, RunError
 from copolicy.dataset.staging import about
 from copolicy.dataset.task import GOAL_SIZE, PLAYERS, RECORD_HZ, WINDOW
 
@@ -42,6 +44,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         CopolicyError: rerun-sdk is not installed.
         OutputExistsError: the file exists.
         InvalidValueError: another ending than `.rrd`.
+        RunError: there is no display for the viewer.
     """
     if path is not None:
         if path.suffix.lower() != ".rrd":
@@ -53,6 +56,15 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         blueprint: Any = importlib.import_module("rerun.blueprint")
     except ImportError:
         raise CopolicyError("--rerun: expected the package rerun-sdk, found none: pip install rerun-sdk") from None
+    if (
+        path is None
+        and sys.platform == "linux"
+        and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    ):
+        # The viewer is a program of its own, whose complaint nobody would see.
+        raise RunError(
+            "expected a display (or a file, --rerun OUT.rrd), found none: neither DISPLAY nor WAYLAND_DISPLAY is set"
+        )
     layout = blueprint.Blueprint(
         blueprint.Vertical(
             blueprint.Spatial2DView(origin="world", name="Table"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import RECORD_HZ
 
-from ..sdl import pygame
+from ..sdl import NoDisplayError, open_display, pygame
 from .pictures import write_png
 from .playback import Playback
 from .track import Track
@@ -44,13 +44,13 @@ class Viewer:
         self._message_until = 0.0
         self._full_screen = False
         try:
-            pygame.display.init()
+            open_display()
             desktop = pygame.display.get_desktop_sizes()[0]
             scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
             self._size = (round(SIZE[0] * scale), round(SIZE[1] * scale))
             pygame.display.set_caption(f"copolicy: {track.path.name}")
             pygame.display.set_mode(self._size, pygame.RESIZABLE)
-        except pygame.error as error:
+        except (pygame.error, NoDisplayError) as error:
             raise RunError(f"expected a display (or --video, --gif, --png), found none: {error}") from None
         pygame.key.set_repeat(350, 40)
 

@@ -1,7 +1,9 @@
 """Dialogues above the world: menus, banners, the count-down, the help, a line of text to write."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from .canvas import WORLD, Canvas
 from .palette import FLOOR, GREEN, INK, MUTED, PANEL, SKY, TEXT, VERMILION, YELLOW, Colour, mix
@@ -20,22 +22,34 @@ OUTCOME_TEXTS = {
 }
 _MIDDLE = WORLD[1] + WORLD[3] / 2
 _ROW = 46
+_CONTROL = re.compile(r"\{(\w+)\}")
+_STRIP = (370, 664, 460, 92)  # below the world, between the players' panels
+STRIP_ROWS = 2
+"""Rows of `draw_strip_menu`."""
+
+
+class _Labels(Protocol):
+    """What is printed on a gamepad, see `inputs.gamepads.Labels`."""
+
+    def either(self, *controls: str) -> str: ...
+
 
 HELP = (
-    ("", "joystick", "keyboard"),
-    ("move the table", "left stick", "W A S D   and   arrows"),
-    ("choose, start", "A", "Enter, E or Space"),
-    ("back", "B", "Backspace, Q or right Shift"),
-    ("pause and menu", "Start or Back", "Esc or P"),
-    ("keep", "A", "K"),
-    ("redo now", "X", "R"),
-    ("discard, with a reason", "Y", "X"),
-    ("add a note", "left shoulder", "N"),
-    ("undo the last keep", "right shoulder", "U"),
+    ("", "gamepad", "keyboard"),
+    ("move the table", "left stick or d-pad", "W A S D   and   arrows"),
+    ("choose, start", "{a}", "Enter, E or Space"),
+    ("back", "{b}", "Backspace, Q or right Shift"),
+    ("pause and menu", "{start} {back}", "Esc or P"),
+    ("keep", "{a}", "K"),
+    ("redo now", "{x}", "R"),
+    ("discard, with a reason", "{y}", "X"),
+    ("add a note", "{leftshoulder}", "N"),
+    ("undo the last keep", "{rightshoulder}", "U"),
     ("swap seats (lobby, before a start)", "in the menu", "Tab"),
     ("this help", "", "F1 or H"),
     ("full screen, sound", "", "F11, M"),
 )
+"""What to do, how on a gamepad (`{a}` stands for what is printed there), how on the keyboard."""
 
 
 @dataclass(frozen=True)
@@ -78,14 +92,30 @@ def draw_dialog(
         canvas.text(hint, (middle, y + 14), 22, MUTED, "center", width - 40)
 
 
+def draw_strip_menu(canvas: Canvas, items: Sequence[str], cursor: int, hint: str, colour: Colour = MUTED) -> None:
+    """A menu below the world, which hides nothing of it; its entries run down one column after the other."""
+    x, y, width, height = _STRIP
+    canvas.box(x, y, width, height)
+    canvas.text(hint, (x + width / 2, y + 15), 22, colour, "center", width - 24)
+    columns = -(-len(items) // STRIP_ROWS)
+    cell = (width - 16) / columns
+    for index, item in enumerate(items):
+        column, row = divmod(index, STRIP_ROWS)
+        left, top = x + 8 + column * cell, y + 28 + 30 * row
+        chosen = index == cursor
+        if chosen:
+            canvas.box(left + 2, top, cell - 4, 28, mix(PANEL, SKY, 0.30), SKY)
+        canvas.text(item, (left + cell / 2, top + 15), 23, TEXT if chosen else MUTED, "center", cell - 16)
+
+
 def draw_countdown(canvas: Canvas, number: str, share: float) -> None:
-    """A large number above the obstacles; `share` in [0, 1] of its second is over."""
-    y = WORLD[1] + 76
-    with canvas.patch(600, y, 76) as patch:
+    """A large number below the world; `share` in [0, 1] of its second is over."""
+    y = _STRIP[1] + _STRIP[3] / 2
+    with canvas.patch(600, y, 48) as patch:
         centre = canvas.point(600, y)
-        patch.circle(SKY, centre, 68 * canvas.scale)
-        patch.circle(PANEL, centre, (62 - 10 * share) * canvas.scale)
-    canvas.text(number, (600, y), 110 if len(number) == 1 else 76, TEXT, "center")
+        patch.circle(SKY, centre, 44 * canvas.scale)
+        patch.circle(PANEL, centre, (40 - 7 * share) * canvas.scale)
+    canvas.text(number, (600, y + 2), 76 if len(number) == 1 else 54, TEXT, "center")
 
 
 def draw_entry(canvas: Canvas, title: str, text: str) -> None:
@@ -95,8 +125,8 @@ def draw_entry(canvas: Canvas, title: str, text: str) -> None:
     canvas.text(f"{text}|", (236, _MIDDLE + 2), 32, INK, "midleft", 730)
 
 
-def draw_help(canvas: Canvas) -> None:
-    """All commands, from the pads and from the keyboard."""
+def draw_help(canvas: Canvas, pads: Sequence[_Labels] = ()) -> None:
+    """All commands, by what is printed on the gamepads in hand, and by keys."""
     canvas.dim()
     canvas.box(110, 80, 980, 600)
     canvas.text("Help", (600, 118), 46, TEXT, "center")
@@ -104,12 +134,15 @@ def draw_help(canvas: Canvas) -> None:
     for what, pad, keys in HELP:
         head = not what
         canvas.text(what, (150, y), 28, TEXT, max_width=430)
+        controls = _CONTROL.findall(pad)
+        if controls:
+            pad = " / ".join(filter(None, (labels.either(*controls) for labels in pads))) or "-"
         canvas.text(pad, (610, y), 28, SKY if head else TEXT, max_width=190)
         canvas.text(keys, (820, y), 28, SKY if head else TEXT, max_width=250)
         y += 39
 
 
 def draw_toast(canvas: Canvas, text: str) -> None:
-    """A short message above the world."""
-    canvas.box(260, 68, 680, 50, edge=YELLOW)
-    canvas.text(text, (600, 93), 28, TEXT, "center", 650)
+    """A short message in the bar above the world."""
+    canvas.box(410, 5, 600, 48, edge=YELLOW)
+    canvas.text(text, (710, 30), 27, TEXT, "center", 575)

@@ -41,6 +41,7 @@ class Hud:
         late: late and skipped ticks of this episode.
         hz: rate that the loop keeps, nan before it runs.
         practice: it does not count.
+        carrying: there is an interaction to show.
     """
 
     title: str
@@ -53,6 +54,7 @@ class Hud:
     late: int = 0
     hz: float = math.nan
     practice: bool = False
+    carrying: bool = True
 
 
 def draw_hud(canvas: Canvas, hud: Hud) -> None:
@@ -67,7 +69,8 @@ def draw_hud(canvas: Canvas, hud: Hud) -> None:
     canvas.text(f"{hud.score:+.0f}", (1180, 30), 46, TEXT, "midright")
     for seat, status in enumerate(hud.seats):
         _draw_seat(canvas, seat, 10 if seat == 0 else 1190 - _PANEL, status)
-    _draw_interaction(canvas, hud)
+    if hud.carrying:
+        _draw_interaction(canvas, hud)
 
 
 def _draw_seat(canvas: Canvas, seat: int, x: float, status: SeatStatus) -> None:

@@ -4,39 +4,43 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .canvas import Canvas
-from .palette import GREEN, MUTED, PANEL, PANEL_EDGE, SEATS, SKY, TEXT, YELLOW, mix
+from .palette import GREEN, MUTED, PANEL, PANEL_EDGE, SEATS, SKY, TEXT, VERMILION, YELLOW, mix
 from .patch import Point
 
 
-@dataclass(frozen=True)
+@dataclass
 class LobbyPanel:
     """One player's half of the lobby.
 
     Attributes:
         seat: where they will sit.
         player: pseudonym.
-        device: what they hold; empty until they have joined.
         prompt: what to do next.
+        device: what they hold; empty until they have joined.
         stick: raw deflection in [-1, 1]; None where there is none.
+        steering: what is deflected.
         force: what comes of it after dead zone and range.
         dead_zone: share of the full deflection.
         items: of their menu.
         cursor: the chosen one.
         ready: done here.
-        progress: of a calibration, share in [0, 1]; None where none runs.
+        progress: of a set-up, share in [0, 1]; None where none runs.
+        notice: what is wrong with the device, or why one did not join.
     """
 
     seat: int
     player: str
-    device: str
     prompt: str
-    stick: Point | None
-    force: Point
-    dead_zone: float
-    items: Sequence[str]
-    cursor: int
-    ready: bool
-    progress: float | None
+    device: str = ""
+    stick: Point | None = None
+    steering: str = "stick"
+    force: Point = (0.0, 0.0)
+    dead_zone: float = 0.0
+    items: Sequence[str] = ()
+    cursor: int = -1
+    ready: bool = False
+    progress: float | None = None
+    notice: str = ""
 
 
 def draw_lobby(canvas: Canvas, title: str, plan: Sequence[str], panels: Sequence[LobbyPanel]) -> None:
@@ -58,11 +62,14 @@ def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:
     canvas.text(seat, (x + 104, 246), 25, MUTED, max_width=440)
     if not panel.device:
         canvas.text(panel.prompt, (x + 285, 450), 38, YELLOW, "center", 530)
+        for row, line in enumerate(_two_lines(panel.notice)):
+            canvas.text(line, (x + 285, 510 + 30 * row), 25, VERMILION, "center", 540)
         return
-    canvas.text(panel.device, (x + 285, 300), 30, SKY, "center", 530)
+    canvas.text(panel.device, (x + 285, 286), 28, SKY, "center", 530)
+    canvas.text(panel.notice, (x + 285, 309), 24, YELLOW, "center", 540)
     if panel.stick is not None:
         canvas.stick(x + 150, 440, 98, panel.stick, panel.seat, panel.dead_zone)
-        canvas.text("stick", (x + 150, 552), 22, MUTED, "midtop")
+        canvas.text(panel.steering, (x + 150, 552), 22, MUTED, "midtop")
         canvas.text(f"force  {panel.force[0]:+.2f}  {panel.force[1]:+.2f}", (x + 150, 576), 24, TEXT, "midtop")
     if panel.progress is not None:
         canvas.text(panel.prompt, (x + 285, 640), 32, YELLOW, "center", 530)
@@ -80,3 +87,8 @@ def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:
         canvas.text("ready", (x + 285, 679), 36, TEXT, "center")
     else:
         canvas.text(panel.prompt, (x + 285, 686), 27, YELLOW, "center", 530)
+
+
+def _two_lines(text: str) -> list[str]:
+    """A sentence in two, where it has a colon."""
+    return [part.strip() for part in text.split(": ", 1)] if text else []

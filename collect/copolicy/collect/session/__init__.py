@@ -2,6 +2,6 @@
 
 from .balance import Balance, Counts
 from .folder import CollectionLock, SessionFolder
-from .recorded import PRACTICE, Recorded, recordings
+from .recorded import OFF_CENTRE, PRACTICE, Recorded, recordings
 
-__all__ = ["PRACTICE", "Balance", "CollectionLock", "Counts", "Recorded", "SessionFolder", "recordings"]
+__all__ = ["OFF_CENTRE", "PRACTICE", "Balance", "CollectionLock", "Counts", "Recorded", "SessionFolder", "recordings"]

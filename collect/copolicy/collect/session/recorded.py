@@ -14,6 +14,9 @@ from copolicy.dataset.recording_checks import require_version
 PRACTICE = "practice"
 """Quality flag of an episode to try things out; it is marked discarded too."""
 
+OFF_CENTRE = "stick_off_centre"
+"""Quality flag of an episode with a stick that pushed while nobody touched it; the event of it says whose."""
+
 _COMPLETE = ("goal", "collision_obstacle", "collision_wall", "timeout")
 
 

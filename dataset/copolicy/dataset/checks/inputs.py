@@ -5,11 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..features import ACTION, BOUNDS, STATE
+from ..interaction import alike, may_be_one_device, pushing
 from ..task import PLAYERS
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit
 from .rule import Rule, each
+
+_WHO = ("source", "controller_0", "controller_1")
 
 
 def _finite(table: EpisodeTable) -> Iterator[Finding]:
@@ -60,12 +63,33 @@ def _idle(table: EpisodeTable) -> Iterator[Finding]:
         )
 
 
+def _identical(table: EpisodeTable) -> Iterator[Finding]:
+    """A frame in which nobody gives a force says nothing: two idle players are no copy of each other."""
+    pushed = table.share(pushing(table.frames[ACTION]))
+    share = np.divide(table.share(alike(table.frames[ACTION])), pushed, out=np.zeros_like(pushed), where=pushed > 0)
+    bound = limit("identical")
+    found = share >= bound
+    # A scripted pair may be made to act as one, and two kinds of device, or halves of a keyboard, are two for sure.
+    people = table.of_framed("source") == "human"
+    columns = zip(*(table.of_framed(name).tolist() for name in _WHO), strict=True)
+    devices = np.array([may_be_one_device(*who) for who in columns], bool)
+    message = "both players gave the same actions: one device moved both"
+    yield from each(table, found & devices, "identical", share, bound, "error", message, table.framed)
+    message = "both players gave the same actions"
+    yield from each(table, found & people & ~devices, "identical", share, bound, "warning", message, table.framed)
+    yield from each(table, found & ~people, "identical", share, bound, "info", message, table.framed)
+
+
+def _with_keys(table: EpisodeTable, player: int) -> np.ndarray:
+    return np.char.find(np.char.lower(table.of_framed(f"controller_{player}")), "keyboard") >= 0
+
+
 def _saturated(table: EpisodeTable) -> Iterator[Finding]:
     bound = limit("saturated")
     for player, name in enumerate(PLAYERS):
         share = table.share(np.abs(_action(table, player)).max(axis=1) > limit("saturated_force"))
         # A key knows nothing but its stop, and a player at keys is no mistake.
-        keys = np.char.find(np.char.lower(table.of_framed(f"controller_{player}")), "keyboard") >= 0
+        keys = _with_keys(table, player)
         message = f"share of frames in which player {player} ({name}) was at the stop"
         yield from each(table, (share > bound) & ~keys, "saturated", share, bound, "warning", message, table.framed)
         yield from each(table, (share > bound) & keys, "saturated", share, bound, "info", message, table.framed)
@@ -80,5 +104,12 @@ RULES = (
     Rule("action_range", "actions within a player's full force", _action_range, (ACTION,)),
     Rule("state_range", "the table in the window, its angle an angle", _state_range, (STATE,)),
     Rule("idle", "both players take part", _idle, (ACTION,), ("source",)),
+    Rule(
+        "identical",
+        "the players do not act as one",
+        _identical,
+        (ACTION,),
+        _WHO,
+    ),
     Rule("saturated", "sticks are not always at their stop", _saturated, (ACTION,), ("controller_0", "controller_1")),
 )

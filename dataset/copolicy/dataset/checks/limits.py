@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-RULES_VERSION = "1.1.0"
+from ..interaction import IDENTICAL
+
+RULES_VERSION = "1.2.0"
 """Of the rules and their limits: major where a finding means something else, minor where a rule is added or goes,
 patch where a limit moves. Kept findings name it."""
 
@@ -43,6 +45,11 @@ LIMITS: dict[str, Limit] = {
     ),
     "idle.error": Limit(1.0, "share of frames", "no force in the whole episode: the device was not connected"),
     "idle_run": Limit(5.0, "s", "people pause to negotiate, but rarely this long with the table in hand"),
+    "identical": Limit(
+        IDENTICAL,
+        "share of frames with force",
+        "two people never push alike for an episode; one device listed twice does",
+    ),
     "saturated_force": Limit(0.98, "full force", "at the stop of the stick, with room for its calibration"),
     "saturated": Limit(0.9, "share of frames", "a stick always at its stop is a keyboard or is badly scaled"),
     "short": Limit(1.0, "s", "shorter than one prediction horizon of the policy"),

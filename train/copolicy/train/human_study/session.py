@@ -1,6 +1,7 @@
 """One session of the study: a person (or a simulated one) at the human seat, through collect's `play`."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -46,18 +47,18 @@ def run_session(
         plan=plan,
         **play,
     )
-    planner = BlindPlanner(load_robots(plan, device), plan.actions_per_plan)
-    controller = PolicyController(planner)
-    try:
-        with prepared(settings) as application:
-            game = application.game
-            game.players[0].controller = controller
-            game.balance = StudySchedule(plan, participant, planner, controller)
-            with stopped_by_signals(game):
-                application.run()
-            return {"participant": participant, "plan": plan.plan_id, **application.summary()}
-    finally:
-        controller.close()
+    robots: dict[str, Checkpoint] = {}
+    load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
+    with prepared(settings, load) as application, ExitStack() as stack:
+        planner = BlindPlanner(robots, plan.actions_per_plan)
+        controller = PolicyController(planner)
+        stack.callback(controller.close)
+        game = application.game
+        game.players[0].controller = controller
+        game.balance = StudySchedule(plan, participant, planner, controller)
+        with stopped_by_signals(game):
+            application.run()
+        return {"participant": participant, "plan": plan.plan_id, **application.summary()}
 
 
 def load_robots(plan: StudyPlan, device: str = "cpu") -> Mapping[str, Checkpoint]:

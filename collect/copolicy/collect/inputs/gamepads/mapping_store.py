@@ -1,0 +1,87 @@
+"""Mappings that the user made: a file of SDL's own format, next to the calibrations."""
+
+import re
+import sys
+from pathlib import Path
+
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.staging import replace_text
+from copolicy.dataset.text_files import read_text
+
+from .mapping import GamepadMapping
+
+_FILE = "gamecontrollerdb.txt"
+_GUID = re.compile(r"[0-9a-f]{32}")
+_PLATFORM = {"win32": "Windows", "darwin": "Mac OS X"}.get(sys.platform, "Linux")
+
+
+class MappingStore:
+    """Mappings by the GUID of the device, in `gamecontrollerdb.txt`; a line of the community's list may be put there.
+
+    Attributes:
+        path: of the file.
+    """
+
+    def __init__(self, folder: Path):
+        """Reads what is there; the folder may be missing.
+
+        Raises:
+            FileFormatError: a line is no mapping.
+        """
+        self.path = folder / _FILE
+        self._lines: list[str] = []
+        self._by_guid: dict[str, GamepadMapping] = {}
+        if not self.path.exists():
+            return
+        self._lines = read_text(self.path).splitlines()
+        for number, line in enumerate(self._lines, 1):
+            if not line.strip() or line.lstrip().startswith("#"):
+                continue
+            try:
+                guid, mapping, platform = parse_line(line)
+            except InvalidValueError as error:
+                expected = f"a mapping as SDL writes it in line {number}"
+                raise FileFormatError(self.path, expected, str(error)) from None
+            if platform in ("", _PLATFORM):
+                self._by_guid[guid] = mapping
+
+    def get(self, guid: str) -> GamepadMapping | None:
+        """The mapping of a device; a line without the sum of its name is for every device of its numbers."""
+        return self._by_guid.get(guid) or self._by_guid.get(_without_name(guid))
+
+    def put(self, guid: str, mapping: GamepadMapping) -> None:
+        """Keeps a mapping, on the disk too; other lines and remarks stay.
+
+        Raises:
+            OSError: the file cannot be written; the mapping holds for this session.
+        """
+        self._by_guid[guid] = mapping
+        self._lines = [line for line in self._lines if not line.strip().lower().startswith(guid)]
+        self._lines.append(mapping.line(guid))
+        replace_text(self.path, "\n".join(self._lines) + "\n")
+
+
+def parse_line(line: str) -> tuple[str, GamepadMapping, str]:
+    """GUID, mapping and platform of a line `GUID,name,a:b0,...,platform:Linux,`.
+
+    Raises:
+        InvalidValueError: something else.
+    """
+    guid, *rest = (part.strip() for part in line.strip().rstrip(",").split(","))
+    if not _GUID.fullmatch(guid.lower()) or not rest:
+        raise InvalidValueError("mapping", "GUID,name,a:b0,b:b1,...", line.strip()[:60])
+    entries = {}
+    for part in rest[1:]:
+        control, colon, binding = part.partition(":")
+        if not colon:
+            raise InvalidValueError("mapping", "entries such as a:b0", part)
+        entries[control] = binding
+    mapping = GamepadMapping.parse(rest[0], entries, "user")
+    if not mapping.bindings:
+        raise InvalidValueError("mapping", "at least one control", line.strip()[:60])
+    return guid.lower(), mapping, entries.get("platform", "")
+
+
+def _without_name(guid: str) -> str:
+    """SDL keeps a check sum of the device's name in the second pair of bytes."""
+    return f"{guid[:4]}0000{guid[8:]}"
