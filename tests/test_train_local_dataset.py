@@ -132,3 +132,13 @@ def test_episodes_whose_frames_are_others_are_named(copied_table, column, change
     with pytest.raises(FileFormatError, match="expected episodes that follow each other") as caught:
         check_local_dataset(copied_table)
     assert found in str(caught.value)
+
+
+def test_statistics_of_episodes_that_are_no_lists_are_named(copied_table):
+    for path in (copied_table / "meta" / "episodes").glob("*/*.parquet"):
+        table = pq.ParquetFile(path).read()
+        name = "stats/episode_index/mean"
+        values = pa.array([0.5] * table.num_rows)
+        pq.write_table(table.set_column(table.column_names.index(name), name, values), path)
+    with pytest.raises(FileFormatError, match="stats/episode_index/mean of meta/episodes: expected a list of numbers"):
+        check_local_dataset(copied_table)

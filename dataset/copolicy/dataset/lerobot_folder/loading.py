@@ -19,7 +19,18 @@ from .references import (
     video_features,
     video_span,
 )
-from .tables import ColumnError, column_types, episode_values, misfit, pa, read_parquet, row_count, scalars, vectors
+from .tables import (
+    ColumnError,
+    column_types,
+    episode_values,
+    is_list,
+    misfit,
+    pa,
+    read_parquet,
+    row_count,
+    scalars,
+    vectors,
+)
 
 STATISTICS = ("min", "max", "mean", "std")
 """The statistics of a feature that normalisation may use."""
@@ -202,6 +213,10 @@ def episode_statistics_problems(root: Path) -> Iterator[Problem]:
         names = [name for name, kind in column_types(path).items() if name.startswith("stats/") and _flat(kind)]
         table = read_parquet(path, names)
         for name in names:
+            kind = table.column(name).type
+            if not is_list(kind):
+                yield Problem(None, f"{name} of meta/episodes: expected a list of numbers in every row, found {kind}")
+                continue
             try:
                 vectors(table.column(name))
             except ColumnError as error:

@@ -92,6 +92,11 @@ def damaged(path: Path, error: Exception) -> FileFormatError:
     return FileFormatError(path, "a complete Parquet file", found)
 
 
+def is_list(kind: pa.DataType) -> bool:
+    """Whether a column holds lists, of one length or of several."""
+    return any(test(kind) for test in _LISTS)
+
+
 def scalars(column: pa.ChunkedArray, kind: str, unknown: Any = None) -> np.ndarray:
     """`(N,)` a column of single values.
 
@@ -139,12 +144,12 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
     rows = len(values)
     expected = "numbers" if width is None else f"{width} numbers" if width > 1 else "a number"
     expected += " in every row"
-    is_list = any(test(values.type) for test in _LISTS)
+    listed = is_list(values.type)
     empty = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
     if len(empty):
         raise ColumnError(expected, "nothing", empty.tolist())
     found_width = 1
-    if is_list:
+    if listed:
         lengths = _lengths(values)
         found_width = int(lengths[0]) if rows else (width or 1)
         wrong = np.flatnonzero(lengths != (found_width if width is None else width))
@@ -152,7 +157,7 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
             widths = sorted(set(lengths.tolist()))
             raise ColumnError(expected, f"{', '.join(map(str, widths[:3]))} a row", wrong.tolist())
         values = values.flatten()
-        if any(test(values.type) for test in _LISTS):
+        if is_list(values.type):
             raise ColumnError(expected, "lists of lists")
         holes = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
         if len(holes):
@@ -162,7 +167,7 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
     if not (pa.types.is_integer(values.type) or pa.types.is_floating(values.type) or pa.types.is_boolean(values.type)):
         raise ColumnError(expected, str(column.type))
     array = values.to_numpy(zero_copy_only=False)
-    return array.reshape(rows, found_width) if is_list else array
+    return array.reshape(rows, found_width) if listed else array
 
 
 def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path) -> np.ndarray:
@@ -195,11 +200,11 @@ def misfit(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> str:
         shape: of the feature, such as `(4,)`; numbers of a feature of one may stand alone.
     """
     values, width = column.combine_chunks(), math.prod(shape)
-    is_list = any(test(values.type) for test in _LISTS)
-    kind = values.type.value_type if is_list else values.type
+    listed = is_list(values.type)
+    kind = values.type.value_type if listed else values.type
     if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
         return str(values.type)
-    if is_list:
+    if listed:
         lengths = _lengths(values)
         wrong = lengths[values.is_valid().to_numpy(zero_copy_only=False) & (lengths != width)]
         if len(wrong):
