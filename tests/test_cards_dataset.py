@@ -100,6 +100,15 @@ def test_figures_can_be_left_out(dataset):
     assert not (dataset / "figures").exists()
 
 
+def test_names_of_numbers_may_be_anything(dataset):
+    path = dataset / "meta" / "info.json"
+    info = json.loads(path.read_text(encoding="utf-8"))
+    info["features"]["action"]["names"] = ["robot_x", None, 3, "human_y"]
+    path.write_text(json.dumps(info), encoding="utf-8")
+    assert main(["dataset", str(dataset), "--repo-id", "lab/table", "--no-figures", "--croissant"]) == 0
+    assert "robot_x, None, 3, human_y" in (dataset / "README.md").read_text(encoding="utf-8")
+
+
 def test_statistics_come_with_their_interval_and_their_null(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "Not computed: `copolicy-dataset stats` was not run on this data set." in text

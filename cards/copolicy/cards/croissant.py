@@ -146,7 +146,7 @@ def _frames(facts: DatasetFacts) -> dict[str, Any]:
         if feature["dtype"] in _PICTURES:
             continue
         names = feature.get("names")
-        field = _field("frames", key, feature["dtype"], ", ".join(names) if isinstance(names, list) else key)
+        field = _field("frames", key, feature["dtype"], ", ".join(map(str, names)) if isinstance(names, list) else key)
         if tuple(feature["shape"]) not in ((), (1,)):
             field["repeated"] = True
         fields.append(field)

@@ -200,4 +200,4 @@ copolicy-train --policy.type=copolicy --dataset.repo_id={repo_id}
 
 def _names(feature: dict) -> Iterable[str]:
     names = feature.get("names")
-    return names if isinstance(names, list) else ()
+    return map(str, names) if isinstance(names, list) else ()
