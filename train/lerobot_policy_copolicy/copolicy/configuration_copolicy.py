@@ -10,6 +10,7 @@ from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNa
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
 
 from .backend import BACKENDS
+from .bounds import require_bounds
 from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 
@@ -113,8 +114,7 @@ class CopolicyConfig(PreTrainedConfig):
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 raise UnknownNameError(name, getattr(self, name), choices)
-        if self.n_obs_steps < 1:
-            raise InvalidValueError("n_obs_steps", "at least 1", self.n_obs_steps)
+        require_bounds(filled)
         usable = self.horizon - self.n_obs_steps + 1
         if usable < 1:
             raise InvalidValueError("horizon", f"at least n_obs_steps = {self.n_obs_steps}", self.horizon)
@@ -131,8 +131,6 @@ class CopolicyConfig(PreTrainedConfig):
             raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
         if self.backend != "torch" and self.planner == "plain":
             raise InvalidValueError("backend, for planner=plain", "torch", self.backend)
-        if filled.initial_noise_scale < 0:
-            raise InvalidValueError("initial_noise_scale", "zero or more", self.initial_noise_scale)
         if any(mode is not NormalizationMode.IDENTITY for mode in self.normalization_mapping.values()):
             raise InvalidValueError(
                 "normalization_mapping",
