@@ -30,8 +30,9 @@ def test_a_line_a_step_and_everything_else_in_the_log(tmp_path, capfd):
     log = (out / LOG_FILE).read_text(encoding="utf-8")
     assert "$ copolicy-dataset check --rules\ntimestamp" in log
     assert f"$ copolicy-collect recover {tmp_path / 'recordings'}\n" in log
+    (out / "summary.json").touch()
+    forget_chain(out)
     with pytest.raises(OutputExistsError):
-        forget_chain(out)
         run_chain(out, [_rules(out)])
 
 
@@ -45,15 +46,17 @@ def test_a_failure_shows_the_end_of_the_log_and_the_next_try_goes_on(tmp_path, c
         f"{out / LOG_FILE}; the same call again goes on from there"
     )
     shown = [line for line in capfd.readouterr().err.splitlines() if line.startswith("    ")]
-    assert shown == [f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found nothing"]
+    assert shown == [
+        f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found nothing there"
+    ]
 
     (out / "rules").write_text("of the step that was done", encoding="utf-8")
-    (out / "recovered").mkdir()
+    (tmp_path / "recovered").mkdir()
     (tmp_path / "missing").mkdir()
     run_chain(out, steps)
     assert "[1/2] Print the rules: done before" in capfd.readouterr().err
     assert (out / "rules").exists()
-    assert not (out / "recovered").exists()  # what the failed step had left
+    assert not (tmp_path / "recovered").exists()  # what the failed step had left
     assert (out / LOG_FILE).read_text(encoding="utf-8").count("$ copolicy-dataset check --rules") == 1
 
 

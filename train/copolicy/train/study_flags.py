@@ -54,7 +54,9 @@ def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) 
         "--sampler", choices=("ddpm", "ddim", "dpmsolver++"), help="denoising (default: the checkpoint's)"
     )
     command.add_argument(
-        "--backend", choices=("torch", "onnx", "numba"), help="what runs the network (default: the checkpoint's)"
+        "--backend",
+        choices=("auto", "torch", "onnx", "numba"),
+        help="what runs the network (default: the checkpoint's)",
     )
     command.add_argument(
         "--num-inference-steps",

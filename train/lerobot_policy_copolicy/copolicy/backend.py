@@ -2,7 +2,8 @@
 
 from copolicy.dataset.extras import BACKEND_PACKAGES, require_packages
 
-BACKENDS = {"torch": (), **BACKEND_PACKAGES}
+AUTO = "auto"
+BACKENDS = {AUTO: (), "torch": (), **BACKEND_PACKAGES}
 
 
 def require_backend(backend: str) -> None:

@@ -9,7 +9,7 @@ from lerobot.optim import AdamWConfig
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
 
-from .backend import BACKENDS
+from .backend import AUTO, BACKENDS
 from .bounds import require_bounds
 from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
@@ -75,7 +75,7 @@ class CopolicyConfig(PreTrainedConfig):
     initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
     planner: str = "fast"  # "fast", or "plain": the same plans without its savings, to compare with
     compile_model: bool = False  # train the network's layers through torch.compile, for long runs on a GPU
-    backend: str = "torch"  # what runs the network of a plan: "torch", or on a CPU "onnx" (ONNX Runtime) or "numba"
+    backend: str = "auto"  # what runs the network of a plan: "torch", on a CPU "onnx" or "numba"; "auto": the fastest
 
     ema: bool = True  # plan with an exponential moving average of the weights
     ema_power: float = 0.75  # its decay after n updates is 1 - (1 + n / inv_gamma) ** -power
@@ -129,7 +129,7 @@ class CopolicyConfig(PreTrainedConfig):
             )
         if self.network == "transformer" and filled.width % filled.n_heads:
             raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
-        if self.backend != "torch" and self.planner == "plain":
+        if self.backend not in (AUTO, "torch") and self.planner == "plain":
             raise InvalidValueError("backend, for planner=plain", "torch", self.backend)
         if any(mode is not NormalizationMode.IDENTITY for mode in self.normalization_mapping.values()):
             raise InvalidValueError(
