@@ -139,10 +139,11 @@ def convert_in_shards(
         RunError: damaged recordings, or a killed process; the finished shards are kept.
         MissingExtraError: datatrove or lerobot is not installed.
     """
-    from .executors import SlurmOptions, run_local, run_ray, submit_slurm
+    from .executors import SlurmOptions, require_executor, run_local, run_ray, submit_slurm
 
     stride(conversion.fps)
     require_new(root)
+    require_executor(scale.executor, scale.slurm.get("partition"))
     files, unfinished = find_recordings(folders)
     root = root.absolute()
     folder = (scale.folder or root.parent / f".{root.name}.shards").absolute()
@@ -165,7 +166,7 @@ def convert_in_shards(
         from .merge import merge_shards
 
         summary = {**merge_shards(plan), "finished_before": finished}
-    if scale.folder is not None or scale.executor != "local":
+    if scale.folder is not None:
         return {**summary, "kept": str(folder)}
     shutil.rmtree(folder)
     return summary
