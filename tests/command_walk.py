@@ -25,7 +25,7 @@ SCRIPTS = {
 def parser_of(script: str) -> argparse.ArgumentParser:
     """The parser that a script hands to `commandline.run`; of `copolicy-train` that of its own commands."""
     module, _, function = SCRIPTS[script].partition(":")
-    loaded = importlib.import_module(module)
+    loaded: Any = importlib.import_module(module)
     if script == "copolicy-train":
         return importlib.import_module("copolicy.train.policy_commands").policy_parser()[0]
     caught: list[argparse.ArgumentParser] = []

@@ -189,7 +189,7 @@ def test_packed_weights_hold_each_weight_where_it_is_read():
 @pytest.mark.parametrize("network", NETWORKS)
 def test_auto_plans_what_torch_plans_with_the_fastest_for_the_batch(fresh_choice, caplog, network):
     caplog.set_level(logging.INFO)
-    plain, quick = (lively_policy(**NETWORKS[network], **choice) for choice in (PLAIN, {"backend": "auto"}))
+    plain, quick = (lively_policy(**{**NETWORKS[network], **choice}) for choice in (PLAIN, {"backend": "auto"}))
     used = []
     for batch in (1, 5):
         torch.testing.assert_close(plan(quick, batch), plan(plain, batch), atol=1e-4, rtol=0)

@@ -19,6 +19,7 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -159,9 +160,8 @@ def batches(rounds: int, clock: Callable[[], float]) -> None:
                 made = {name: policy(preset, 5, **FEW, backend=name) for name in ("torch", "onnx", "numba", "auto")}
                 made["auto"].plan(batch, actions=actions)
                 (chosen,) = made.pop("auto").planned_with
-                plans = {
-                    name: lambda made=made[name], batch=batch, actions=actions: made.plan(batch, actions=actions)
-                    for name in made
+                plans: dict[str, Callable[[], object]] = {
+                    name: partial(planner.plan, batch, actions=actions) for name, planner in made.items()
                 }
                 took = measure(plans, rounds, clock)
                 medians = " ".join(f"{statistics.median(values):>8.1f}" for values in took.values())

@@ -81,7 +81,7 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
 
 def _handled(prog: str, arguments: argparse.Namespace) -> int:
     try:
-        needs = getattr(arguments, "needs", ())
+        needs: Needs = getattr(arguments, "needs", ())
         require_packages(*(needs(arguments) if callable(needs) else needs))
         try:
             summary = dict(arguments.handler(arguments))
