@@ -89,7 +89,7 @@ def main() -> None:
         failed = [
             said for words in calls if words[-1] == "--help" or len(words) == 2 if (said := call(words))["status"]
         ]
-        sys.exit("\n".join(map(str, failed)))
+        sys.exit("\n".join(map(str, failed)) or 0)
     said = []
     for words in json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")):
         before = _files()
