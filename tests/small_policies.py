@@ -15,7 +15,7 @@ MLP = {"network": "mlp", "n_layers": 2, "width": 32}
 
 
 def policy(seed: int = 0, **settings) -> Any:
-    """An untrained policy: one layer of a transformer unless said otherwise."""
+    """An untrained policy: one layer of a transformer, planning with torch, unless said otherwise."""
     kinds = {ENVIRONMENT_STATE: FeatureType.ENV}
     config = CopolicyConfig(
         device="cpu",
@@ -23,7 +23,7 @@ def policy(seed: int = 0, **settings) -> Any:
             key: PolicyFeature(kinds.get(key, FeatureType.STATE), FEATURES[key]["shape"]) for key in OBSERVATIONS
         },
         output_features={ACTION: PolicyFeature(FeatureType.ACTION, (4,))},
-        **{**TRANSFORMER, **settings},
+        **{"backend": "torch", **TRANSFORMER, **settings},
     )
     torch.manual_seed(seed)
     return CopolicyPolicy(config, dataset_stats={}, dataset_meta=None)

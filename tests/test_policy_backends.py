@@ -1,6 +1,8 @@
-"""Plans through ONNX Runtime and numba, against those through torch; and what happens where they are not installed."""
+"""Plans through ONNX Runtime and numba, against those through torch; which is chosen; and where they are missing."""
 
 import copy
+import json
+import logging
 import sys
 from typing import Any
 
@@ -13,6 +15,8 @@ from small_policies import MLP, TRANSFORMER, columns, lively_policy
 
 from copolicy.collect.controllers.checkpoint import Checkpoint
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from lerobot_policy_copolicy import CopolicyConfig
+from lerobot_policy_copolicy.copolicy import fastest_backend
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
 from lerobot_policy_copolicy.copolicy.fast_mlp import FastMlp
@@ -28,6 +32,17 @@ NETWORKS = {"transformer": {**TRANSFORMER, "n_layers": 3}, "mlp": MLP}
 
 PLAIN: dict[str, Any] = {"planner": "plain"}
 BACKENDS = ("onnx", "numba")
+ALL = {"onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}
+
+
+@pytest.fixture
+def fresh_choice():
+    """What is installed is looked at again, and said again."""
+    for remembered in (fastest_backend._loads, fastest_backend._say):
+        remembered.cache_clear()
+    yield
+    for remembered in (fastest_backend._loads, fastest_backend._say):
+        remembered.cache_clear()
 
 
 def plan(planner, batch: int = 3, actions: int | None = None) -> torch.Tensor:
@@ -169,3 +184,85 @@ def test_packed_weights_hold_each_weight_where_it_is_read():
         block, chunk = output // OUTPUTS, value // LANES
         assert packed[block, chunk, output % OUTPUTS, value % LANES] == weight[output, value]
     assert (packed != 0).sum() == weight.size
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_auto_plans_what_torch_plans_with_the_fastest_for_the_batch(fresh_choice, caplog, network):
+    caplog.set_level(logging.INFO)
+    plain, quick = (lively_policy(**{**NETWORKS[network], **choice}) for choice in (PLAIN, {"backend": "auto"}))
+    used = []
+    for batch in (1, 5):
+        torch.testing.assert_close(plan(quick, batch), plan(plain, batch), atol=1e-4, rtol=0)
+        used.append(quick.planned_with)
+    assert used == [("numba",), ("numba", "onnx")]
+    said = [record.message for record in caplog.records if record.message.startswith("planning on the CPU")]
+    assert said == [
+        "planning on the CPU with numba (up to 4 plans at once), onnx (more): the fastest that is installed "
+        "(--policy.backend sets one)"
+    ]
+
+
+def test_auto_stays_with_the_backend_of_a_study_whose_tables_end():
+    planner = lively_policy(backend="auto")
+    for batch in (5, 2, 1):
+        plan(planner, batch)
+    assert planner.planned_with == ("onnx",)
+
+
+@pytest.mark.parametrize(
+    ("missing", "one", "several"),
+    [((), "numba", "onnx"), (("numba",), "onnx", "onnx"), (("onnx",), "numba", "torch"), (BACKENDS, "torch", "torch")],
+)
+def test_auto_takes_what_is_installed(fresh_choice, monkeypatch, missing, one, several):
+    for backend in missing:
+        for package in ALL[backend]:
+            monkeypatch.setitem(sys.modules, package, None)
+    history = torch.zeros(1, 3, 20)
+    assert [fastest_backend.fastest_backend(history, plans) for plans in (1, 84)] == [one, several]
+    planner = lively_policy(backend="auto")
+    torch.testing.assert_close(plan(planner, 1), plan(lively_policy(), 1), atol=1e-4, rtol=0)
+    assert planner.planned_with == (one,)
+
+
+def test_auto_passes_over_a_package_that_does_not_load(fresh_choice, monkeypatch, tmp_path, caplog):
+    (tmp_path / "numba").mkdir()
+    (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('needs another numpy')", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "numba")
+    assert fastest_backend.fastest_backend(torch.zeros(1, 3, 20), 1) == "onnx"
+    assert "planning without numba: ImportError: needs another numpy" in caplog.text
+
+
+def test_auto_leaves_other_devices_and_precisions_to_torch():
+    history = torch.zeros(1, 3, 20)
+    assert fastest_backend.fastest_backend(history.to("meta"), 1) == "torch"
+    assert fastest_backend.fastest_backend(history.bfloat16(), 1) == "torch"
+    with torch.autocast("cpu", torch.bfloat16):
+        assert fastest_backend.fastest_backend(history, 1) == "torch"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_under_mixed_precision_other_backends_keep_theirs(backend):
+    planner = lively_policy(backend=backend)
+    expected = plan(planner)
+    with torch.autocast("cpu", torch.bfloat16):
+        torch.testing.assert_close(plan(planner).float(), expected, atol=0.05, rtol=0)
+
+
+@pytest.mark.parametrize("stated", ["torch", "onnx", None])
+def test_older_checkpoints_load_with_the_backend_that_they_state(tmp_path, stated):
+    saved = lively_policy(backend="torch")
+    saved.save_pretrained(tmp_path)
+    path = tmp_path / "config.json"
+    config = json.loads(path.read_text(encoding="utf-8"))
+    config.pop("backend")
+    path.write_text(json.dumps(config | ({} if stated is None else {"backend": stated})), encoding="utf-8")
+    loaded = CopolicyPolicy.from_pretrained(tmp_path, strict=True).eval()
+    assert loaded.config.backend == (stated or "auto")
+    torch.testing.assert_close(plan(loaded), plan(saved), atol=1e-4, rtol=0)
+    assert loaded.planned_with == (stated or "numba",)
+
+
+def test_auto_is_the_default_also_beside_the_plain_planner():
+    assert CopolicyConfig().backend == "auto"
+    assert CopolicyConfig(planner="plain").backend == "auto"

@@ -1,6 +1,7 @@
 """Settings of the co-policy: presets, what they refuse, and that a saved configuration comes back as it was."""
 
 import json
+import math
 from typing import Any
 
 import pytest
@@ -118,6 +119,24 @@ def test_loaded_configuration_takes_overrides(tmp_path):
             "backend, for planner=plain: expected torch, found 'onnx'",
         ),
         ({"width": 30}, InvalidValueError, "width: expected a multiple of n_heads = 4, found 30"),
+        ({"n_layers": 0}, InvalidValueError, "n_layers: expected at least 1, found 0"),
+        ({"num_train_timesteps": 0}, InvalidValueError, "num_train_timesteps: expected 1 to 10000, found 0"),
+        (
+            {"embedding_dropout": 1.0},
+            InvalidValueError,
+            "embedding_dropout: expected 0 or more and less than 1, found 1.0",
+        ),
+        ({"optimizer_lr": math.nan}, InvalidValueError, "optimizer_lr: expected at least 0, found nan"),
+        ({"optimizer_lr": math.inf}, InvalidValueError, "optimizer_lr: expected at least 0, found inf"),
+        (
+            {"optimizer_betas": (0.9, 1.5)},
+            InvalidValueError,
+            "optimizer_betas: expected 0 or more and less than 1, found (0.9, 1.5)",
+        ),
+        ({"ema_max_decay": 2.0}, InvalidValueError, "ema_max_decay: expected 0 to 1, found 2.0"),
+        ({"fps": 0.0}, InvalidValueError, "fps: expected a number above 0, found 0.0"),
+        ({"clip_sample_range": 0.0}, InvalidValueError, "clip_sample_range: expected a number above 0, found 0.0"),
+        ({"initial_noise_scale": math.nan}, InvalidValueError, "initial_noise_scale: expected zero or more, found nan"),
         ({"initial_noise_scale": -1.0}, InvalidValueError, "initial_noise_scale: expected zero or more, found -1.0"),
     ],
 )

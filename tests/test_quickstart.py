@@ -35,6 +35,14 @@ def _check(out: Path, summary: dict) -> None:
     assert not [path for path in out.rglob("*") if path.name.endswith(".part")]
 
 
+def _check_lines(out: Path, said: str, steps: int) -> None:
+    """A line a step; LeRobot's settings and what else the commands print are in the log."""
+    lines = said.splitlines()
+    assert len(lines) == 1 + steps, said
+    assert [line.split("]")[0] for line in lines[1:]] == [f"[{place}/{steps}" for place in range(1, 1 + steps)]
+    assert "'batch_size': 512" in (out / "quickstart.log").read_text(encoding="utf-8")
+
+
 def test_the_chain_from_simulated_pairs(tmp_path):
     out = tmp_path / "out"
     summary, said = _quickstart(out, "--episodes", "4")
@@ -45,8 +53,8 @@ def test_the_chain_from_simulated_pairs(tmp_path):
     assert "simulated pairs" in summary["what was reached"]["label"]
     assert "no person took part" in summary["what was reached"]["label"]
     assert "**No person took part.**" in (out / "dataset" / "README.md").read_text(encoding="utf-8")
-    assert "[1/6]" in said
-    assert "$ copolicy-collect simulate --episodes 4" in said
+    _check_lines(out, said, 6)
+    assert "$ copolicy-collect simulate --episodes 4" in (out / "quickstart.log").read_text(encoding="utf-8")
     for command in summary["what to type next"].values():
         assert command.removeprefix("uv run ").split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
 
@@ -61,7 +69,8 @@ def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream
     assert facts.successes == 10
     assert "files of the original program" in summary["what was reached"]["label"]
     assert any("map_mismatch" in flags for flags in facts.counts("quality_flags"))
-    assert "$ copolicy-convert upstream" in said
+    _check_lines(out, said, 5)
+    assert "$ copolicy-convert upstream" in (out / "quickstart.log").read_text(encoding="utf-8")
 
 
 def test_an_output_folder_in_use_is_left_alone(tmp_path, capsys):
@@ -75,3 +84,5 @@ def test_a_command_that_fails_ends_the_chain_with_its_name(tmp_path, capfd):
     assert main(["--out", str(tmp_path / "out"), "--upstream", str(tmp_path / "nowhere"), *SMALL]) == 1
     error = capfd.readouterr().err
     assert "copolicy-quickstart: this command ended with status 2: copolicy-convert upstream" in error
+    assert f"    copolicy-convert: {tmp_path / 'nowhere'}: expected " in error
+    assert str(tmp_path / "out" / "quickstart.log") in error

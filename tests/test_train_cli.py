@@ -125,6 +125,24 @@ def test_defaults_do_not_override_what_is_given():
         (["--dataset.root={data}", "--policy.path={tmp}/a"], "{tmp}/a: expected a file or folder for --policy.path"),
         (["--config_path={tmp}/c.json", "--resume=true"], "{tmp}/c.json: expected a file or folder for --config_path"),
         ([], "Missing required field(s) `dataset`"),
+        (["--dataset.root={data}", "--steps=0"], "--steps: expected at least 1, found 0"),
+        (["--dataset.root={data}", "--batch_size=-1"], "--batch_size: expected at least 1, found -1"),
+        (["--dataset.root={data}", "--num_workers=-1"], "--num_workers: expected at least 0, found -1"),
+        (["--dataset.root={data}", "--log_freq=-5"], "--log_freq: expected at least 0, found -5"),
+        (["--dataset.root={data}", "--eval.n_episodes=0"], "--eval.n_episodes: expected at least 1, found 0"),
+        (["--dataset.root={data}", "--seed=-1"], "--seed: expected 0 to 4294967295, found -1"),
+        (["--dataset.root={data}", "--seed=4294967296"], "--seed: expected 0 to 4294967295, found 4294967296"),
+        (["--dataset.root={data}", "--tolerance_s=nan"], "--tolerance_s: expected a number of at least 0, found nan"),
+        (
+            ["--dataset.root={data}", "--dataset.episodes=[]"],
+            "--dataset.episodes: expected at least one episode, or no",
+        ),
+        (["--dataset.root={data}", "--policy.initial_noise_scale=-1"], "initial_noise_scale: expected zero or more"),
+        (["--dataset.root={data}", "--policy.initial_noise_scale=nan"], "initial_noise_scale: expected zero or more"),
+        (["--dataset.root={data}", "--policy.num_inference_steps=0"], "num_inference_steps: expected 1 to "),
+        (["--dataset.root={data}", "--policy.width=0"], "width: expected at least 1, found 0"),
+        (["--dataset.root={data}", "--policy.optimizer_lr=nan"], "optimizer_lr: expected at least 0, found nan"),
+        (["--dataset.root={data}", "--policy.attention_dropout=1"], "attention_dropout: expected 0 or more and less"),
     ],
 )
 def test_wrong_calls_end_with_one_line_and_status_2(random_table, tmp_path, capsys, arguments, message):
@@ -133,7 +151,7 @@ def test_wrong_calls_end_with_one_line_and_status_2(random_table, tmp_path, caps
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith("copolicy-train: ")
     assert message.format(**places) in line
-    assert not (tmp_path / "nothing").exists()
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_failing_run_ends_with_status_1(copied_table, tmp_path, capsys):

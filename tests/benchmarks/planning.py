@@ -2,6 +2,7 @@
 
     uv run python tests/benchmarks/planning.py            one plan at a time, as beside a person
     uv run python tests/benchmarks/planning.py --study    84 tables at once, as `copolicy-eval coplan`
+    uv run python tests/benchmarks/planning.py --batches  1 to 84 tables at once, as `auto` decides by
 
 The plain implementation is the paper's network (8 layers of width 256) as torch modules, all twelve tokens, memory
 and mask anew at each step, with diffusers' DDPM scheduler. Weights are random: time is what is measured. Rounds are
@@ -18,6 +19,7 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -91,7 +93,7 @@ def one_plan(rounds: int, clock: Callable[[], float]) -> None:
         "plain, DDPM 100 steps": (policy("paper", 100, **PLAIN), None),
         "plain, DDPM 34 steps": (policy("paper", 34, **PLAIN), None),
     }
-    for backend in ("torch", "onnx", "numba"):
+    for backend in ("torch", "onnx", "numba", "auto"):
         for label, preset, steps, sampler, actions in (
             ("DDPM 100 steps, 8 actions", "paper", 100, DDPM, 8),
             ("DDPM 34 steps, 1 action", "paper", 34, DDPM, 1),
@@ -148,10 +150,29 @@ def study(rounds: int, tables: int, share: int, clock: Callable[[], float]) -> N
     print(", ".join(f"{ratio:.1f}x with {steps}" for ratio, steps in zip(few, (10, 8, 5), strict=True)))
 
 
+def batches(rounds: int, clock: Callable[[], float]) -> None:
+    """Plans of 1 to 84 tables at once with each backend, five DDIM steps, and which one `auto` takes."""
+    print(f"{'one plan for each table, ms':<34} {'torch':>8} {'onnx':>8} {'numba':>8}   auto")
+    for preset in ("small", "paper"):
+        for actions in (1, 8):
+            for tables in (1, 2, 4, 8, 16, 32, 84):
+                batch = histories(tables)
+                made = {name: policy(preset, 5, **FEW, backend=name) for name in ("torch", "onnx", "numba", "auto")}
+                made["auto"].plan(batch, actions=actions)
+                (chosen,) = made.pop("auto").planned_with
+                plans: dict[str, Callable[[], object]] = {
+                    name: partial(planner.plan, batch, actions=actions) for name, planner in made.items()
+                }
+                took = measure(plans, rounds, clock)
+                medians = " ".join(f"{statistics.median(values):>8.1f}" for values in took.values())
+                print(f"{f'{preset}, {actions} actions, {tables} tables':<34} {medians}   {chosen}")
+
+
 def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--study", action="store_true", help="84 tables at once")
+    parser.add_argument("--batches", action="store_true", help="1 to 84 tables at once")
     parser.add_argument("--rounds", type=int, help="interleaved rounds (default: 31, with --study 5)")
     parser.add_argument("--tables", type=int, default=84, help="of the study (default: 84)")
     parser.add_argument(
@@ -164,7 +185,9 @@ def main() -> None:
     clock = time.thread_time if arguments.cpu_time else time.perf_counter
     torch.set_num_threads(1)
     with torch.inference_mode():
-        if arguments.study:
+        if arguments.batches:
+            batches(arguments.rounds or 5, clock)
+        elif arguments.study:
             study(arguments.rounds or 5, arguments.tables, arguments.share, clock)
         else:
             one_plan(arguments.rounds or 31, clock)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import FIGURES, HUB, TABLES
 from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.minimal_card import is_minimal_card
 from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
@@ -19,6 +20,7 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
         _dataset,
         "write README.md with Hub metadata, a datasheet and figures into a data set folder",
         "copolicy-cards dataset outputs/dataset --repo-id my-lab/table",
+        lambda arguments: (*TABLES, *HUB, *(() if arguments.no_figures else FIGURES)),
     )
     dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
@@ -40,6 +42,7 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
         _model,
         "write README.md with Hub metadata and results into a checkpoint folder",
         "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
+        (*TABLES, *HUB, *FIGURES),
     )
     model.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run (its last checkpoint)")
     model.add_argument(

@@ -11,6 +11,7 @@ from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import visible_files
+from copolicy.dataset.flag_numbers import number, seed, whole_number, workers
 from copolicy.dataset.task import MAP_SETS
 
 from .demonstration.command import add_demo_command
@@ -32,24 +33,26 @@ def parser() -> argparse.ArgumentParser:
         "copolicy-collect simulate --episodes 200 --seed 0 --maps training --out recordings/simulated",
     )
     amount = command.add_mutually_exclusive_group(required=True)
-    amount.add_argument("--episodes", type=int, help="how many episodes")
+    amount.add_argument("--episodes", type=whole_number("--episodes"), help="how many episodes")
     amount.add_argument(
         "--recipe", choices=sorted(RECIPES), help="a named set of episodes; decides all but --out and --workers"
     )
     command.add_argument("--out", type=Path, required=True, help="folder for the recordings, without any yet")
-    command.add_argument("--workers", type=int, help="processes (default: one for each processor)")
+    command.add_argument("--workers", type=workers(), help="processes (default: one for each processor)")
     # None where a flag is not given, so that a recipe can refuse it instead of passing over it.
-    command.add_argument("--seed", type=int, help="of the schedule and of the pilots (default 0)")
+    command.add_argument("--seed", type=seed(), help="of the schedule and of the pilots (default 0)")
     command.add_argument("--maps", choices=sorted(MAP_SETS), dest="map_set", help="set of maps (default training)")
     command.add_argument(
         "--orientations", action="store_true", default=None, help="each map with four start orientations"
     )
     command.add_argument(
-        "--start-noise", type=float, metavar="SCALE",
+        "--start-noise", type=number("--start-noise", 0, 1), metavar="SCALE",
         help="begin beside the start: up to SCALE times 90 px, 60 px and 0.6 rad away (default 0)",
     )  # fmt: skip
     command.add_argument(
-        "--clearance", type=float, help="how wide they keep from obstacles (default: each pair's own, 1.7, as people)"
+        "--clearance",
+        type=number("--clearance", 0, 10, above=True),
+        help="how wide they keep from obstacles (default: each pair's own, 1.7, as people)",
     )
     command = add_command(
         commands,
@@ -72,7 +75,12 @@ def parser() -> argparse.ArgumentParser:
         example="copolicy-collect devices --test 10",
     )
     command.add_argument(
-        "--test", type=float, nargs="?", const=10.0, metavar="SECONDS", help="show live what they say (default 10 s)"
+        "--test",
+        type=number("--test", 0, 3600, above=True),
+        nargs="?",
+        const=10.0,
+        metavar="SECONDS",
+        help="show live what they say (default 10 s)",
     )
     command.add_argument(
         "--config-dir", type=Path, help="folder of the sticks' calibrations (default: the user's settings)"

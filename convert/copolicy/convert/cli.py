@@ -8,7 +8,9 @@ from typing import get_args
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.commandline import add_command, command_parser, run
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import DATASETS
 from copolicy.dataset.features import SCENE_SIZE
+from copolicy.dataset.flag_numbers import whole_number
 from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.repo_id import checked_repo_id
 
@@ -16,7 +18,7 @@ from .export.command import add_export_command
 from .merge.command import add_merge_command
 from .prepare import Conversion
 from .recordings import convert_recordings
-from .scale.command import add_scale_flags, convert_in_shards, scale_of
+from .scale.command import add_scale_flags, asks_for_shards, convert_in_shards, scale_of
 from .upstream import convert_upstream
 from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
 
@@ -33,6 +35,9 @@ def _parser() -> argparse.ArgumentParser:
     mcap = add_command(
         commands, "mcap", _mcap, "convert recordings, one MCAP file an episode, to a LeRobot v3 data set",
         "copolicy-convert mcap recordings --root datasets/table --repo-id me/table",
+        lambda arguments: (
+            *DATASETS, *(("av",) if arguments.video else ()), *(("datatrove",) if asks_for_shards(arguments) else ())
+        ),
     )  # fmt: skip
     mcap.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="folders of recordings, or single files")
     _add_output_flags(mcap)
@@ -53,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         commands, "upstream", _upstream,
         "convert files of the original program (raw pickles, processed npz, or its 10 Hz zarr store)",
         "copolicy-convert upstream data/table/table_10Hz.zarr --root datasets/demonstrations --repo-id me/table",
+        DATASETS,
     )  # fmt: skip
     upstream.add_argument("path", type=Path, metavar="PATH", help="folder of the files, or the store")
     _add_output_flags(upstream)
@@ -61,7 +67,7 @@ def _parser() -> argparse.ArgumentParser:
         help="bound on the angular acceleration when they were recorded, rad/s^2; auto finds it for each episode",
     )  # fmt: skip
     upstream.add_argument(
-        "--obstacle-size", type=int, default=50, metavar="PX",
+        "--obstacle-size", type=whole_number("--obstacle-size", 1, 600), default=50, metavar="PX",
         help="side of the obstacles, which the files do not tell (default: %(default)s, as in the training maps)",
     )  # fmt: skip
     add_merge_command(commands)
@@ -72,7 +78,9 @@ def _parser() -> argparse.ArgumentParser:
 def _add_output_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must be new")
     parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
-    parser.add_argument("--fps", type=int, help=f"frames a second, a divisor of 30 (default: {_DEFAULT_FPS})")
+    parser.add_argument(
+        "--fps", type=whole_number("--fps", None), help=f"frames a second, a divisor of 30 (default: {_DEFAULT_FPS})"
+    )
     parser.add_argument(
         "--hold", choices=get_args(Hold), default=None,
         help="a frame's action: the mean of its steps or the first (default: mean; first for a zarr store)",

@@ -5,6 +5,7 @@ same whatever stands before or after it in a file, so that the content hash does
 """
 
 import io
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -65,6 +66,8 @@ def parse_size(text: str) -> VideoSize:
 
 def scene_encoder(fps: int) -> RGBEncoderConfig:
     """How scenes are encoded: H.264, which browsers play, with a key picture a second."""
+    # LeRobot tells of the codec each time, which would be a line an episode.
+    logging.getLogger(RGBEncoderConfig.__module__).setLevel(logging.WARNING)
     # What stands still costs next to nothing between key pictures; LeRobot's every second one triples the size.
     return RGBEncoderConfig(vcodec="h264", g=fps, crf=23, preset="veryfast", extra_options={"bf": 0})
 

@@ -1,30 +1,50 @@
 """What every command of every room shares: flags, exit status, progress, and errors of one line."""
 
 import argparse
-import io
 import json
 import logging
 import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import version
 
 from tqdm import tqdm
 
+from .closed_pipe import quiet_when_closed
 from .exceptions import CopolicyError
+from .extras import extra_behind, require_packages
 from .staging import causes, refusal
+
+DISTRIBUTION = "lerobot_policy_copolicy"
+"""The package as it is installed."""
 
 Handler = Callable[[argparse.Namespace], dict]
 """A command: takes its parsed flags, returns its summary as a JSON-able dict."""
+
+Needs = Sequence[str] | Callable[[argparse.Namespace], Sequence[str]]
+"""Packages of extras that a command imports (see `extras`), or what says so of its parsed flags."""
 
 
 def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
     """Parser of one room's script, and where its commands are added."""
     parser = argparse.ArgumentParser(prog=prog, description=description)
+    add_version_flag(parser)
     return parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
 
-def add_command(commands: argparse._SubParsersAction, name: str, handler: Handler, help: str, example: str):
-    """Adds a command with `--json`, `--debug` and an example at the end of its `--help`."""
+def add_version_flag(parser: argparse.ArgumentParser) -> None:
+    """The flag of every script that says which release it is of."""
+    parser.add_argument("--version", action="version", version=f"%(prog)s {version(DISTRIBUTION)}")
+
+
+def add_command(
+    commands: argparse._SubParsersAction, name: str, handler: Handler, help: str, example: str, needs: Needs = ()
+):
+    """Adds a command with `--json`, `--debug` and an example at the end of its `--help`.
+
+    Args:
+        needs: checked before the handler is called, so that nothing is begun where a package is missing.
+    """
     parser = commands.add_parser(
         name,
         help=help,
@@ -33,7 +53,7 @@ def add_command(commands: argparse._SubParsersAction, name: str, handler: Handle
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_common_flags(parser)
-    parser.set_defaults(handler=handler)
+    parser.set_defaults(handler=handler, needs=needs)
     return parser
 
 
@@ -46,38 +66,46 @@ def add_common_flags(parser: argparse.ArgumentParser) -> None:
 def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> int:
     """Parses, runs the handler, prints its summary; returns the exit status (0, 1 or 2).
 
-    A summary may hold `exit_status` when the work was done but its result is a finding (1).
+    A summary may hold `exit_status` when the work was done but its result is a finding (1). Whoever reads the output,
+    such as `head`, may stop before its end: the work is done all the same, in silence.
     """
-    for stream in (sys.stdout, sys.stderr):
-        # A letter that the terminal's encoding lacks, or a file name of another one, is no reason to stop.
-        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
-            stream.reconfigure(errors="backslashreplace")
-    arguments = parser.parse_args(argv)
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
+    with quiet_when_closed():
+        logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
+        try:
+            arguments = parser.parse_args(argv)
+        except CopolicyError as error:  # of a value that a flag does not take
+            print(f"{parser.prog}: {error}", file=sys.stderr)
+            return error.exit_status
+        return _handled(parser.prog, arguments)
+
+
+def _handled(prog: str, arguments: argparse.Namespace) -> int:
     try:
-        summary = dict(arguments.handler(arguments))
+        needs: Needs = getattr(arguments, "needs", ())
+        require_packages(*(needs(arguments) if callable(needs) else needs))
+        try:
+            summary = dict(arguments.handler(arguments))
+        except ImportError as error:
+            if missing := extra_behind(error):
+                raise missing from error
+            raise
     except CopolicyError as error:
         if arguments.debug:
             raise
-        print(f"{parser.prog}: {error}", file=sys.stderr)
+        print(f"{prog}: {error}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print(f"{parser.prog}: stopped", file=sys.stderr)
+        print(f"{prog}: stopped", file=sys.stderr)
         return 130
     except Exception as error:
         line = system_line(error)
         if arguments.debug or line is None:
             raise
-        print(f"{parser.prog}: {line}", file=sys.stderr)
+        print(f"{prog}: {line}", file=sys.stderr)
         return 1
     status = int(summary.pop("exit_status", 0))
-    try:
-        for line in [json.dumps(summary, indent=2)] if arguments.json else _lines(summary):
-            print(line)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read it, such as `head`, has enough; nor may Python fail when it flushes at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    for line in [json.dumps(summary, indent=2)] if arguments.json else _lines(summary):
+        print(line)
     return status
 
 

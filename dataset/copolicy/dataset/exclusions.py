@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from .commandline import add_command
 from .episode_rows import chosen_episodes, episode_tables, with_column, write_tables
 from .exceptions import InvalidValueError
+from .extras import TABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -115,6 +116,7 @@ def add_exclude_command(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands, "exclude", _exclude, "flag episodes that training must leave out; nothing is removed",
         'copolicy-dataset exclude datasets/table --episodes 12 30-33 --reason "joystick of player 1 unplugged"',
+        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
     parser.add_argument("--episodes", nargs="+", metavar="N", help="numbers, ranges such as 3-5, or episode_uuids")

@@ -18,12 +18,14 @@ from copolicy.dataset.exceptions import (
     OutputExistsError,
     RunError,
 )
+from copolicy.dataset.extras import TRAINING, require_packages
 from copolicy.dataset.local_path import require_hub_name, similar_path
 from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
 from copolicy.dataset.staging import about, refusal
 from copolicy.dataset.training_run import POLICY_FILES, find_policy_folder
 
 from .policy_commands import policy_parser
+from .settings_check import require_usable_numbers
 
 _PROG = "copolicy-train"
 # What draccus puts before the reason, where a section of the configuration may also be absent.
@@ -70,14 +72,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser, names = policy_parser()
         if flags[0] in names:
             return commandline.run(parser, flags)
-    own = [flag for flag in flags if flag in ("--json", "--debug")]
+    own = [flag for flag in flags if flag in ("--json", "--debug", "--version")]
     flags = [flag for flag in flags if flag not in own]
-    if "--help" in flags or "-h" in flags:
-        return _print_help(flags)
     parser = argparse.ArgumentParser(prog=_PROG, add_help=False)
+    commandline.add_version_flag(parser)
     commandline.add_common_flags(parser)
     parser.add_argument("flags", nargs="*")
-    parser.set_defaults(handler=_train)
+    parser.set_defaults(handler=_train, needs=TRAINING)
+    if "--help" in flags or "-h" in flags:
+        parser.set_defaults(handler=_print_help, needs=())
+        own = []
     first = os.environ.get("RANK", "0") == "0"
     # Of several processes, one says what was done.
     with contextlib.nullcontext() if first else contextlib.redirect_stdout(io.StringIO()):
@@ -109,14 +113,19 @@ def _value(name: str, flags: Sequence[str]) -> str | None:
     return None
 
 
-def _print_help(flags: Sequence[str]) -> int:
+def _print_help(arguments: argparse.Namespace) -> dict:
     print(_HELP)
-    with _lerobot(with_defaults(flags)):
+    try:
+        require_packages(*TRAINING)
+    except MissingExtraError as error:
+        print(f"The flags of lerobot-train are listed once it is installed: {error}")
+        return {}
+    with _lerobot(with_defaults(arguments.flags)):
         from lerobot.configs import parser
         from lerobot.configs.train import TrainPipelineConfig
 
         parser.print_scoped_help(TrainPipelineConfig, sys.argv[1:])
-    return 0
+    return {}
 
 
 def _train(arguments: argparse.Namespace) -> dict:
@@ -176,10 +185,8 @@ def _lerobot(flags: Sequence[str]) -> Iterator[None]:
     quiet.addFilter(_no_video)
     before, sys.argv = sys.argv, [_PROG, *flags]
     try:
-        try:
-            from lerobot.utils.import_utils import register_third_party_plugins
-        except ImportError as error:
-            raise MissingExtraError("lerobot") from error
+        from lerobot.utils.import_utils import register_third_party_plugins
+
         register_third_party_plugins()
         yield
     finally:
@@ -220,6 +227,7 @@ def _validate(config) -> None:
     output = config.output_dir
     if output is not None and Path(output).is_dir() and not config.resume:
         raise OutputExistsError(output)
+    require_usable_numbers(config)
     try:
         config.validate()
     except CopolicyError:

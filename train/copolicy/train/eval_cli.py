@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from copolicy.dataset.commandline import add_command, command_parser, progress_bar, run
+from copolicy.dataset.flag_numbers import whole_number
 from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS, map_set
 
@@ -13,7 +14,7 @@ from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans_command import add_plans_command
 from .result_file import write_json
-from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
+from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -25,12 +26,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         _coplan,
         "both players act on one sampled plan, on all maps of a set",
         "copolicy-eval coplan --policy outputs/run/checkpoints/last/pretrained_model --maps holdout --out eval.json",
+        study_needs,
     )
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
     coplan.add_argument("--maps", default="holdout", choices=sorted(MAP_SETS), help="map set (default: holdout)")
     coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
-    coplan.add_argument("--repeats", type=int, default=1, help="episodes a map (default: 1)")
-    coplan.add_argument("--limit", type=int, help="only the first N maps, for a quick look; stated in the result")
+    coplan.add_argument(
+        "--repeats", type=whole_number("--repeats", 1, 10_000), default=1, help="episodes a map (default: 1)"
+    )
+    coplan.add_argument(
+        "--limit", type=whole_number("--limit"), help="only the first N maps, for a quick look; stated in the result"
+    )
     coplan.add_argument("--out", required=True, type=Path, help="where eval.json goes; the picture stands beside it")
     add_study_flags(coplan, actions_per_plan=8)
     add_partner_command(commands)

@@ -71,4 +71,5 @@ class Planner:
             "learned": self.checkpoint.conditions.to_json(),
             "parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
             **{name: getattr(policy.config, name) for name in _SETTINGS if hasattr(policy.config, name)},
+            **({"planned_with": list(policy.planned_with)} if hasattr(policy, "planned_with") else {}),
         }

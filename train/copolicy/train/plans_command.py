@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.flag_numbers import number, whole_number
 from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS, RECORD_HZ, identify
 
-from .study_flags import add_study_flags, planner_of, protocol_of, require_positive
+from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs
 
 if TYPE_CHECKING:
     from .plans import Decision
@@ -25,13 +26,23 @@ def add_plans_command(commands: argparse._SubParsersAction) -> None:
         _plans,
         "many plans from one state: the ways that the policy sees there, as a picture and as counts",
         "copolicy-eval plans --policy pretrained --maps unseen --map 29 --samples 64 --out plans.png",
+        study_needs,
     )
     command.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
     command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
-    command.add_argument("--map", required=True, type=int, metavar="INDEX", help="which map of the set, from 0 on")
-    command.add_argument("--samples", type=int, default=64, help="plans (default: 64)")
     command.add_argument(
-        "--seconds", type=float, default=0.0, help="sample this long into an episode of the policy (default: 0)"
+        "--map",
+        required=True,
+        type=whole_number("--map", None),
+        metavar="INDEX",
+        help="which map of the set, from 0 on",
+    )
+    command.add_argument("--samples", type=whole_number("--samples", 1, 10_000), default=64, help="plans (default: 64)")
+    command.add_argument(
+        "--seconds",
+        type=number("--seconds", 0, 3600),
+        default=0.0,
+        help="sample this long into an episode of the policy (default: 0)",
     )
     command.add_argument("--out", required=True, type=Path, help="where the picture goes, a PNG")
     add_study_flags(command, actions_per_plan=8)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from copolicy.collect.controllers.checkpoint_folder import pretrained_folder
 from copolicy.dataset.commandline import add_command, command_parser
-from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.extras import POLICIES
 
 
 def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
@@ -17,6 +18,7 @@ def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
         _export,
         "write a checkpoint's averaged weights as a small folder to give away, checked to make the same plans",
         "copolicy-train export outputs/training --out outputs/model --eval outputs/eval/holdout.json",
+        POLICIES,
     )
     export.add_argument("checkpoint", help="checkpoint folder, or that of a run (its last checkpoint)")
     export.add_argument("--out", type=Path, required=True, help="folder to write")
@@ -39,10 +41,7 @@ def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
 
 
 def _export(arguments: argparse.Namespace) -> dict:
-    try:
-        from .export import export_checkpoint
-    except ImportError as error:
-        raise MissingExtraError((error.name or "lerobot").partition(".")[0]) from error
+    from .export import export_checkpoint
 
     commands = []
     if arguments.commands is not None:

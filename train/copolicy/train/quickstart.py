@@ -1,41 +1,23 @@
 """`copolicy-quickstart`: the whole chain, small, on CPU: record, convert, train, evaluate, describe.
 
-It types the rooms' own commands, prints each, and imports none of them.
+It types the rooms' own commands into a log, and imports none of them.
 """
 
 import argparse
 import json
 import os
-import shlex
-import shutil
-import subprocess
-import sys
-import sysconfig
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from copolicy.dataset.commandline import add_common_flags, run
-from copolicy.dataset.exceptions import MissingExtraError, OutputExistsError, RunError
-from copolicy.dataset.files import is_hidden
+from copolicy.dataset.commandline import add_common_flags, add_version_flag, run
+from copolicy.dataset.extras import FIGURES, HUB, TRAINING
+from copolicy.dataset.flag_numbers import seed, whole_number, workers
 from copolicy.dataset.staging import replace_text
 
+from .quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
+
 REPO_ID = "local/quickstart"
-
-
-@dataclass(frozen=True)
-class Step:
-    """One command of the chain, and what it is for."""
-
-    purpose: str
-    command: tuple[str, ...]
-    environment: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def typed(self) -> str:
-        """The command as one would type it."""
-        return " ".join([f"{name}={value}" for name, value in self.environment] + [shlex.join(self.command)])
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,35 +30,38 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
-    parser.add_argument("--episodes", type=int, default=376, help="simulated episodes (default: 376)")
-    parser.add_argument("--steps", type=int, default=6000, help="training steps of 512 samples (default: 6000)")
-    parser.add_argument("--limit", type=int, help="evaluate on the first N maps of each set only")
-    parser.add_argument("--seed", type=int, default=0, help="default: 0")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="default: one a core")
+    parser.add_argument(
+        "--episodes", type=whole_number("--episodes"), default=376, help="simulated episodes (default: 376)"
+    )
+    parser.add_argument(
+        "--steps", type=whole_number("--steps"), default=6000, help="training steps of 512 samples (default: 6000)"
+    )
+    parser.add_argument("--limit", type=whole_number("--limit"), help="evaluate on the first N maps of each set only")
+    parser.add_argument("--seed", type=seed(), default=0, help="default: 0")
+    parser.add_argument("--workers", type=workers(), default=os.cpu_count() or 1, help="default: one a core")
     parser.add_argument(
         "--upstream",
         type=Path,
         metavar="PATH",
         help="start from files of the original program (raw, processed or zarr) instead of simulated pairs",
     )
+    add_version_flag(parser)
     add_common_flags(parser)
-    parser.set_defaults(handler=_quickstart)
+    parser.set_defaults(handler=_quickstart, needs=_needs)
     return run(parser, argv)
+
+
+def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
+    return (*TRAINING, *FIGURES, *HUB, *(("zarr",) if arguments.upstream else ()))
 
 
 def _quickstart(arguments: argparse.Namespace) -> dict:
     out: Path = arguments.out
-    if out.exists() and (not out.is_dir() or not all(is_hidden(entry.name) for entry in out.iterdir())):
-        raise OutputExistsError(out)
-    out.mkdir(parents=True, exist_ok=True)
     started = perf_counter()
-    steps = _chain(arguments)
-    for number, step in enumerate(steps, 1):
-        _say(f"\n[{number}/{len(steps)}] {step.purpose}\n$ {step.typed}")
-        _execute(step, quiet=arguments.json)
+    run_chain(out, _chain(arguments))
     summary = _summary(arguments, perf_counter() - started)
     replace_text(out / "summary.json", json.dumps(summary, indent=1) + "\n")
-    _say("\nDone.")
+    forget_chain(out)
     return summary
 
 
@@ -88,6 +73,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
             Step(
                 "Convert episodes of the original program into a LeRobot v3 data set",
                 ("copolicy-convert", "upstream", str(arguments.upstream), "--root", str(dataset), "--repo-id", REPO_ID),
+                (dataset,),
             )
         ]
     else:
@@ -101,6 +87,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
                     *("--seed", str(arguments.seed), "--maps", "paper36", "--out", recordings),
                     *("--workers", str(arguments.workers)),
                 ),
+                (out / "recordings",),
             ),
             Step(
                 "Convert the recordings into a LeRobot v3 data set at 10 Hz",
@@ -108,6 +95,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
                     *("copolicy-convert", "mcap", recordings, "--root", str(dataset), "--repo-id", REPO_ID),
                     *("--license", "cc0-1.0"),
                 ),
+                (dataset,),
             ),
         ]
     train = Step(
@@ -119,6 +107,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
             *(f"--save_freq={arguments.steps}", f"--log_freq={max(1, arguments.steps // 10)}"),
             "--env_eval_freq=0",
         ),
+        (training,),
         _mixed_precision(),
     )
     limit = () if arguments.limit is None else ("--limit", str(arguments.limit))
@@ -129,24 +118,17 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
                 *("copolicy-eval", "coplan", "--policy", str(training), "--maps", name),
                 *("--out", str(out / "eval" / f"{name}.json"), *limit),
             ),
+            (out / "eval" / f"{name}.json", out / "eval" / f"{name}.png"),
         )
         for name in ("holdout", "unseen")
     ]
-    describe = Step("Describe the data set", ("copolicy-cards", "dataset", str(dataset), "--repo-id", REPO_ID))
+    describe = Step(
+        "Describe the data set",
+        # A try that broke off may have left half of it; the minimal card of the conversion is replaced in any case.
+        ("copolicy-cards", "dataset", str(dataset), "--repo-id", REPO_ID, "--overwrite"),
+        (),
+    )
     return [*record, train, *evaluate, describe]
-
-
-def _execute(step: Step, quiet: bool) -> None:
-    name, *flags = step.command
-    program = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
-    if program is None:
-        raise MissingExtraError(name)
-    # Nothing of the chain needs the network; saying so keeps LeRobot from asking the Hub about a local folder.
-    environment = {**os.environ, "HF_HUB_OFFLINE": "1", **dict(step.environment)}
-    # With --json, stdout belongs to the one object at the end.
-    status = subprocess.run([program, *flags], env=environment, stdout=sys.stderr if quiet else None).returncode
-    if status:
-        raise RunError(f"this command ended with status {status}: {shlex.join(step.command)}")
 
 
 def _mixed_precision() -> tuple[tuple[str, str], ...]:
@@ -173,6 +155,7 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
         "card": str(out / "dataset" / "README.md"),
         "checkpoint": str(training),
         "results": f"{out / 'eval' / 'holdout.json'}, {out / 'eval' / 'unseen.json'}",
+        "log": str(out / LOG_FILE),
         "pictures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
     }
     # As the user typed this command: through uv, or from an environment that is on the path.
@@ -195,7 +178,3 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
             f"--env.type=table_carrying --eval.n_episodes=4 --eval.batch_size=2 --output_dir={out / 'lerobot-eval'}",
         },
     }
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from copolicy.collect.controllers.training_conditions import TrainingConditions
 from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import BACKEND_PACKAGES, FIGURES, POLICIES
+from copolicy.dataset.flag_numbers import number, seed, whole_number
 from copolicy.dataset.task import Physics
 
 if TYPE_CHECKING:
@@ -22,7 +24,9 @@ _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "ba
 
 def add_study_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
     """Everything that a simulated study has beside its maps and its output."""
-    command.add_argument("--fps", type=int, help="frames a second that plans are for (default: as the policy learned)")
+    command.add_argument(
+        "--fps", type=whole_number("--fps"), help="frames a second that plans are for (default: as the policy learned)"
+    )
     command.add_argument("--device", default="cpu", help="default: cpu")
     add_protocol_flags(command, actions_per_plan)
 
@@ -31,11 +35,16 @@ def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) 
     """How a robot plans, the world's settings, seed and `--overwrite`."""
     command.add_argument(
         "--actions-per-plan",
-        type=int,
+        type=whole_number("--actions-per-plan"),
         default=actions_per_plan,
         help=f"executed before replanning (default: {actions_per_plan})",
     )
-    command.add_argument("--step-limit", type=int, default=2000, help="30 Hz steps until a time-out (default: 2000)")
+    command.add_argument(
+        "--step-limit",
+        type=whole_number("--step-limit"),
+        default=2000,
+        help="30 Hz steps until a time-out (default: 2000)",
+    )
     command.add_argument(
         "--angular-limit",
         choices=ANGULAR_LIMITS,
@@ -45,14 +54,27 @@ def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) 
         "--sampler", choices=("ddpm", "ddim", "dpmsolver++"), help="denoising (default: the checkpoint's)"
     )
     command.add_argument(
-        "--backend", choices=("torch", "onnx", "numba"), help="what runs the network (default: the checkpoint's)"
+        "--backend",
+        choices=("auto", "torch", "onnx", "numba"),
+        help="what runs the network (default: the checkpoint's)",
     )
-    command.add_argument("--num-inference-steps", type=int, help="denoising steps (default: the checkpoint's)")
     command.add_argument(
-        "--initial-noise-scale", type=float, help="scale of the first noise (default: the checkpoint's)"
+        "--num-inference-steps",
+        type=whole_number("--num-inference-steps", 1, 1000),
+        help="denoising steps (default: the checkpoint's)",
     )
-    command.add_argument("--seed", type=int, default=0, help="seed of what is drawn at random (default: 0)")
+    command.add_argument(
+        "--initial-noise-scale",
+        type=number("--initial-noise-scale", 0, 10),
+        help="scale of the first noise (default: the checkpoint's)",
+    )
+    command.add_argument("--seed", type=seed(), default=0, help="seed of what is drawn at random (default: 0)")
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
+
+
+def study_needs(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Packages of a simulated study: those of its policy, of the backend asked for, and of its figure."""
+    return (*POLICIES, *FIGURES, *BACKEND_PACKAGES.get(arguments.backend, ()))
 
 
 def policy_settings(arguments: argparse.Namespace) -> dict[str, Any]:

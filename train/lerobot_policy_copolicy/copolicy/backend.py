@@ -1,11 +1,9 @@
 """What can run the network of a plan, and what it needs."""
 
-from importlib.util import find_spec
+from copolicy.dataset.extras import BACKEND_PACKAGES, require_packages
 
-from copolicy.dataset.exceptions import MissingExtraError
-
-# Packages of the extra of the same name.
-BACKENDS = {"torch": (), "onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}
+AUTO = "auto"
+BACKENDS = {AUTO: (), "torch": (), **BACKEND_PACKAGES}
 
 
 def require_backend(backend: str) -> None:
@@ -14,6 +12,4 @@ def require_backend(backend: str) -> None:
     Raises:
         MissingExtraError: one is not.
     """
-    for package in BACKENDS[backend]:
-        if find_spec(package) is None:
-            raise MissingExtraError(package, backend)
+    require_packages(*BACKENDS[backend])

@@ -9,7 +9,8 @@ from lerobot.optim import AdamWConfig
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
 
-from .backend import BACKENDS
+from .backend import AUTO, BACKENDS
+from .bounds import require_bounds
 from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 
@@ -74,7 +75,7 @@ class CopolicyConfig(PreTrainedConfig):
     initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
     planner: str = "fast"  # "fast", or "plain": the same plans without its savings, to compare with
     compile_model: bool = False  # train the network's layers through torch.compile, for long runs on a GPU
-    backend: str = "torch"  # what runs the network of a plan: "torch", or on a CPU "onnx" (ONNX Runtime) or "numba"
+    backend: str = "auto"  # what runs the network of a plan: "torch", on a CPU "onnx" or "numba"; "auto": the fastest
 
     ema: bool = True  # plan with an exponential moving average of the weights
     ema_power: float = 0.75  # its decay after n updates is 1 - (1 + n / inv_gamma) ** -power
@@ -113,8 +114,7 @@ class CopolicyConfig(PreTrainedConfig):
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 raise UnknownNameError(name, getattr(self, name), choices)
-        if self.n_obs_steps < 1:
-            raise InvalidValueError("n_obs_steps", "at least 1", self.n_obs_steps)
+        require_bounds(filled)
         usable = self.horizon - self.n_obs_steps + 1
         if usable < 1:
             raise InvalidValueError("horizon", f"at least n_obs_steps = {self.n_obs_steps}", self.horizon)
@@ -129,10 +129,8 @@ class CopolicyConfig(PreTrainedConfig):
             )
         if self.network == "transformer" and filled.width % filled.n_heads:
             raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
-        if self.backend != "torch" and self.planner == "plain":
+        if self.backend not in (AUTO, "torch") and self.planner == "plain":
             raise InvalidValueError("backend, for planner=plain", "torch", self.backend)
-        if filled.initial_noise_scale < 0:
-            raise InvalidValueError("initial_noise_scale", "zero or more", self.initial_noise_scale)
         if any(mode is not NormalizationMode.IDENTITY for mode in self.normalization_mapping.values()):
             raise InvalidValueError(
                 "normalization_mapping",

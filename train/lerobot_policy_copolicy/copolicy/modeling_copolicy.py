@@ -235,6 +235,11 @@ class CopolicyPolicy(PreTrainedPolicy):
             :, :tokens
         ]
 
+    @property
+    def planned_with(self) -> tuple[str, ...]:
+        """Backends that have run the network of a plan so far."""
+        return () if self._fast is None else tuple(sorted(self._fast.used))
+
     @torch.no_grad()
     def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
         """The actions of a plan that are to be executed, from the current frame on.

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.extras import TABLES
 from copolicy.dataset.staging import replace_text
 
 from ..artefacts import CHECK_FILE, KeptFindings, kept_findings, stored_statistics
@@ -20,6 +21,7 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
         _report,
         "write one HTML page that shows a data set: paths, heat maps, pairs, findings, and every episode in a player",
         "copolicy-cards report outputs/dataset",
+        TABLES,
     )
     report.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     report.add_argument("--out", type=Path, help=f"the page (default: {REPORT_NAME} in the data set's folder)")

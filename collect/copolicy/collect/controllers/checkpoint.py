@@ -66,6 +66,8 @@ class Checkpoint:
                 if not hasattr(config, setting):
                     raise FileFormatError(folder, f"a policy with the setting {setting!r}", f"{config.type} without it")
                 setattr(config, setting, value)
+            if settings:
+                config.__post_init__()  # which checks what it is given
             policy_class = factory.get_policy_class(config.type)
             if not hasattr(policy_class, "plan"):
                 raise FileFormatError(folder, "a policy that plans for both players (method `plan`)", config.type)

@@ -7,6 +7,8 @@ from typing import Any
 
 from copolicy.dataset.commandline import add_command, progress
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
+from copolicy.dataset.extras import POLICIES
+from copolicy.dataset.flag_numbers import number, seed, whole_number
 from copolicy.dataset.task import MAP_SETS, RECORD_HZ
 
 from ..controllers.checkpoint_folder import PRETRAINED
@@ -21,6 +23,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
         _demo,
         help="film a policy that carries the table with a simulated partner, as a GIF",
         example="copolicy-collect demo --gif outputs/demo.gif --map 40 52",
+        needs=(*POLICIES, "PIL"),
     )
     command.add_argument("--gif", type=Path, required=True, metavar="OUT.gif", help="the film to write")
     command.add_argument(
@@ -28,13 +31,18 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--maps", choices=sorted(MAP_SETS), default="unseen", help="set of maps (default unseen)")
     command.add_argument(
-        "--map", type=int, nargs="+", default=[0], metavar="N", help="numbers of maps, one episode each (default 0)"
+        "--map",
+        type=whole_number("--map", None),
+        nargs="+",
+        default=[0],
+        metavar="N",
+        help="numbers of maps, one episode each (default 0)",
     )
     command.add_argument("--partner", choices=sorted(PAIRS), default="S01", help="simulated pair (default S01)")
-    command.add_argument("--seed", type=int, default=0, help="of plans and partner (default 0)")
-    command.add_argument("--speed", type=float, default=2.0, help="times real time (default 2)")
-    command.add_argument("--fps", type=int, default=12, help="pictures a second (default 12)")
-    command.add_argument("--width", type=int, default=600, help="px (default 600)")
+    command.add_argument("--seed", type=seed(), default=0, help="of plans and partner (default 0)")
+    command.add_argument("--speed", type=number("--speed", 0), default=2.0, help="times real time (default 2)")
+    command.add_argument("--fps", type=whole_number("--fps", None), default=12, help="pictures a second (default 12)")
+    command.add_argument("--width", type=whole_number("--width", None), default=600, help="px (default 600)")
     command.add_argument("--overwrite", action="store_true", help="replace the film")
 
 
@@ -45,7 +53,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         ("fps", arguments.fps, 1, 50),
         ("width", arguments.width, 200, 2000),
         ("speed", arguments.speed, 0.1, 20),
-        *(("map", number, 0, len(maps) - 1) for number in arguments.map),
+        *(("map", place, 0, len(maps) - 1) for place in arguments.map),
     ):
         if not least <= value <= most:
             raise InvalidValueError(f"--{name}", f"{least} to {most}", value)
@@ -61,9 +69,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
 
     planner = Checkpoint(arguments.policy)
     physics = planner.conditions.physics
-    tracks = [
-        demonstrate(planner, maps[number], arguments.partner, arguments.seed, physics) for number in arguments.map
-    ]
+    tracks = [demonstrate(planner, maps[place], arguments.partner, arguments.seed, physics) for place in arguments.map]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)
     frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
@@ -79,7 +85,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         "learned": planner.conditions.to_json(),
         "partner": f"simulated, human of {arguments.partner}",
         "episodes": [
-            f"{arguments.maps} {number}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
-            for number, track in zip(arguments.map, tracks, strict=True)
+            f"{arguments.maps} {place}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
+            for place, track in zip(arguments.map, tracks, strict=True)
         ],
     }

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import POLICIES
+from copolicy.dataset.flag_numbers import number, seed, whole_number
 from copolicy.dataset.task import MAP_SETS, Physics
 
 from .settings import PilotSpec, PlaySettings
@@ -25,6 +27,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         help="two players carry the table together: a lobby, a session of episodes, one recording each",
         example="copolicy-collect play --pilots keyboard policy:pretrained\n"
         "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
+        needs=lambda arguments: POLICIES if any(who.startswith("policy") for who in arguments.pilots or ()) else (),
     )
     command.add_argument(
         "--pair", default="guest", help="pseudonym of the pair; its players are PAIR-a and PAIR-b (default: guest)"
@@ -45,9 +48,16 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
-    command.add_argument("--episodes", type=int, default=36, help="episodes to keep in a session (default 36)")
-    command.add_argument("--practice", type=int, default=0, help="practice episodes before them, marked and discarded")
-    command.add_argument("--seed", type=int, default=0, help="of the schedule and of simulated players (default 0)")
+    command.add_argument(
+        "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"
+    )
+    command.add_argument(
+        "--practice",
+        type=whole_number("--practice", 0),
+        default=0,
+        help="practice episodes before them, marked and discarded",
+    )
+    command.add_argument("--seed", type=seed(), default=0, help="of the schedule and of simulated players (default 0)")
     command.add_argument(
         "--seats",
         choices=("swap", "fixed"),
@@ -61,7 +71,9 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         choices=_ANGULAR_LIMITS,
         help="angular acceleration, rad/s^2 (default: what a policy at the table learned with, else pi/2)",
     )
-    command.add_argument("--countdown", type=float, default=3.0, help="seconds before each episode (default 3)")
+    command.add_argument(
+        "--countdown", type=number("--countdown", 0, 60), default=3.0, help="seconds before each episode (default 3)"
+    )
     command.add_argument("--new-session", action="store_true", help="do not continue the pair's unfinished session")
     command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")
     command.add_argument("--fullscreen", action="store_true", help="begin in full screen (F11 changes it)")

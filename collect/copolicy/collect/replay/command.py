@@ -6,6 +6,7 @@ from typing import Any
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.flag_numbers import number, whole_number
 
 _VIEWER = Path()  # `--rerun` without a file
 
@@ -20,6 +21,7 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         example="copolicy-collect replay recordings/P01-01/episode_000.mcap\n"
         "  copolicy-collect replay episode_000.mcap --video episode.mp4 --speed 2\n"
         "  copolicy-collect replay episode_000.mcap --verify",
+        needs=lambda arguments: ("PIL",) if arguments.gif else (),
     )
     command.add_argument("file", type=Path, help="a recording, NAME.mcap")
     command.add_argument("--video", type=Path, metavar="OUT.mp4", help="write an H.264 video; needs no display")
@@ -36,27 +38,49 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--verify", action="store_true", help="simulate the actions again; exit status 1 where they lead elsewhere"
     )
-    command.add_argument("--speed", type=float, default=1.0, help="of video and GIF, times real time (default 1)")
-    command.add_argument("--fps", type=int, help="pictures a second (default: video 30, GIF 12)")
-    command.add_argument("--width", type=int, help="px (default: video 1200, GIF 600, sheet 1800)")
-    command.add_argument("--frames", type=int, default=12, help="pictures on the sheet (default 12)")
+    command.add_argument(
+        "--speed", type=number("--speed", 0.05, 100), default=1.0, help="of video and GIF, times real time (default 1)"
+    )
+    command.add_argument(
+        "--fps", type=whole_number("--fps", 1, 120), help="pictures a second (default: video 30, GIF 12)"
+    )
+    command.add_argument(
+        "--width", type=whole_number("--width", 200, 10_000), help="px (default: video 1200, GIF 600, sheet 1800)"
+    )
+    command.add_argument(
+        "--frames", type=whole_number("--frames", 1, 200), default=12, help="pictures on the sheet (default 12)"
+    )
     command.add_argument(
         "--angular-limit",
         choices=("pi/2", "pi/8"),
         help="of --verify: another bound on the angular acceleration than the recording states",
     )
-    command.add_argument("--limit-px", type=float, default=0.01, help="of --verify: largest drift, px (default 0.01)")
-    command.add_argument("--limit-rad", type=float, default=1e-4, help="of --verify: the same, rad (default 0.0001)")
+    command.add_argument(
+        "--limit-px",
+        type=number("--limit-px", above=True),
+        default=0.01,
+        help="of --verify: largest drift, px (default 0.01)",
+    )
+    command.add_argument(
+        "--limit-rad",
+        type=number("--limit-rad", above=True),
+        default=1e-4,
+        help="of --verify: the same, rad (default 0.0001)",
+    )
 
 
 def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
     # Loading pygame takes a moment that `--help` should not.
-    from .film import write_gif, write_video
-    from .rerun_log import log_to_rerun
+    from .film import video_encoder, write_gif, write_video
+    from .rerun_log import log_to_rerun, require_rerun
     from .sheet import write_sheet
     from .track import read_track
     from .verify import verify
 
+    if arguments.video:
+        video_encoder()
+    if arguments.rerun is not None:
+        require_rerun()
     track = read_track(arguments.file)
     if not track.steps:
         raise InvalidValueError(str(arguments.file), "a recording of at least one step", 0)

@@ -50,7 +50,7 @@ def write_video(
     _check(path, tuple(_CONTAINERS), speed, fps)
     size = picture_size(width)
     frames = _shown_progress(track, size, fps, speed)
-    encode = _encoder()
+    encode = video_encoder()
     with new_file(path) as unfinished:
         try:
             encode(unfinished, _CONTAINERS[path.suffix.lower()], frames, size, fps)
@@ -134,7 +134,12 @@ def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: f
     }
 
 
-def _encoder():
+def video_encoder():
+    """What encodes a film here.
+
+    Raises:
+        CopolicyError: neither PyAV nor ffmpeg is there.
+    """
     try:
         import av
 

@@ -30,6 +30,18 @@ _CIRCLE = [
 ]
 
 
+def require_rerun() -> tuple[Any, Any]:
+    """Rerun and its blueprints.
+
+    Raises:
+        CopolicyError: rerun-sdk is not installed.
+    """
+    try:
+        return importlib.import_module("rerun"), importlib.import_module("rerun.blueprint")
+    except ImportError:
+        raise CopolicyError("--rerun: expected the package rerun-sdk, found none: pip install rerun-sdk") from None
+
+
 def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
     """Opens a track in Rerun's viewer, or writes a file for it.
 
@@ -51,11 +63,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
             raise InvalidValueError(str(path), "a name that ends with .rrd", path.suffix)
         if path.exists():
             raise OutputExistsError(path)
-    try:
-        rr: Any = importlib.import_module("rerun")
-        blueprint: Any = importlib.import_module("rerun.blueprint")
-    except ImportError:
-        raise CopolicyError("--rerun: expected the package rerun-sdk, found none: pip install rerun-sdk") from None
+    rr, blueprint = require_rerun()
     if (
         path is None
         and sys.platform == "linux"

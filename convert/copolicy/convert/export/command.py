@@ -5,6 +5,8 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import TABLES
+from copolicy.dataset.flag_numbers import number, seed
 from copolicy.dataset.staging import require_new
 
 FORMATS = {
@@ -13,12 +15,15 @@ FORMATS = {
     "minari": "a folder NAME-vN",
 }
 
+_WRITERS = {"zarr": "numcodecs", "robomimic": "h5py", "minari": "h5py"}
+
 
 def add_export_command(commands: argparse._SubParsersAction) -> None:
     """Adds `export`."""
     parser = add_command(
         commands, "export", _export, "write a LeRobot data set of this project in another project's format",
         "copolicy-convert export datasets/table --format zarr --out exports/table.zarr",
+        lambda arguments: (*TABLES, _WRITERS[arguments.format]),
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
     formats = "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
@@ -30,7 +35,7 @@ def add_export_command(commands: argparse._SubParsersAction) -> None:
         "the original's store)",
     )  # fmt: skip
     parser.add_argument(
-        "--valid", type=float, metavar="PROPORTION",
+        "--valid", type=number("--valid", 0), metavar="PROPORTION",
         help="robomimic only: episodes for its filter key `valid`, the others are `train` (default: the splits of the "
         "data set, which copolicy-dataset split --as-splits writes)",
     )  # fmt: skip
@@ -38,7 +43,7 @@ def add_export_command(commands: argparse._SubParsersAction) -> None:
         "--valid-by", choices=("pairs", "maps", "episodes"),
         help="with --valid: what is never in both, as in copolicy-dataset split (default: pairs)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, help="with --valid: of the choice (default: 0)")
+    parser.add_argument("--seed", type=seed(), help="with --valid: of the choice (default: 0)")
     parser.add_argument(
         "--keep-discarded", action="store_true", help="export discarded and excluded episodes, too; they stay flagged"
     )

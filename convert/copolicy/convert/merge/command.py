@@ -5,6 +5,7 @@ from pathlib import Path
 
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.extras import DATASETS
 from copolicy.dataset.repo_id import checked_repo_id
 
 
@@ -13,6 +14,7 @@ def add_merge_command(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands, "merge", _merge, "join LeRobot data sets of this project, such as those of two labs, to one",
         "copolicy-convert merge lab_a/table lab_b/table --prefix-people kth tudelft --root both --repo-id me/both",
+        DATASETS,
     )  # fmt: skip
     parser.add_argument("roots", nargs="+", type=Path, metavar="PATH", help="folders of data sets, in this order")
     parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the new folder; must not exist")

@@ -11,6 +11,7 @@ from typing import Any
 from copolicy.collect.file_lock import hold
 from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.flag_numbers import whole_number
 from copolicy.dataset.staging import require_new
 
 from ..prepare import Conversion
@@ -52,9 +53,19 @@ def add_scale_flags(parser: argparse.ArgumentParser) -> None:
         "at the end: after an interruption the same call goes on. --workers alone makes shards of more than "
         f"{SHARD_EPISODES} recordings only; fewer are read by that many processes and written in one go.",
     )
-    group.add_argument("--workers", type=int, metavar="N", help="shards at a time (default: 1; on a cluster: all)")
+    group.add_argument(
+        "--workers",
+        type=whole_number("--workers", None, 1024),
+        metavar="N",
+        help="shards at a time (default: 1; on a cluster: all)",
+    )
     group.add_argument("--executor", choices=_EXECUTORS, help="where shards are made (default: local)")
-    group.add_argument("--shard-episodes", type=int, metavar="N", help=f"in each (default: {SHARD_EPISODES})")
+    group.add_argument(
+        "--shard-episodes",
+        type=whole_number("--shard-episodes", None),
+        metavar="N",
+        help=f"in each (default: {SHARD_EPISODES})",
+    )
     group.add_argument(
         "--shards", type=Path, metavar="FOLDER",
         help="keep shards and findings there (default: beside OUT, until it is complete)",
@@ -62,13 +73,19 @@ def add_scale_flags(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--stats", action="store_true", help="compute meta/copolicy_stats.json, too")
     group.add_argument("--partition", help="of SLURM")
     group.add_argument("--time", metavar="HH:MM:SS", help="limit of a shard's SLURM job (default: 01:00:00)")
-    group.add_argument("--memory-gb", type=int, metavar="N", help="of a SLURM job (default: 4)")
+    group.add_argument("--memory-gb", type=whole_number("--memory-gb"), metavar="N", help="of a SLURM job (default: 4)")
     group.add_argument(
         "--setup", metavar="COMMAND", help="makes this environment active in a SLURM job (default: this virtual one)"
     )
     group.add_argument(
         "--sbatch", action="append", metavar="KEY=VALUE", help="further option of sbatch, such as account=lab"
     )
+
+
+def asks_for_shards(arguments: argparse.Namespace) -> bool:
+    """Whether a flag asks for shards, however many recordings there are."""
+    asked = (arguments.executor, arguments.shard_episodes, arguments.shards, arguments.stats or None)
+    return any(value is not None for value in asked)
 
 
 def scale_of(arguments: argparse.Namespace) -> Scale | None:
@@ -89,8 +106,7 @@ def scale_of(arguments: argparse.Namespace) -> Scale | None:
         if value is not None and value < 1:
             raise InvalidValueError(name.removeprefix("--"), "at least 1", value)
     scale = Scale(executor, arguments.workers, size, arguments.shards, arguments.stats, slurm)
-    asked = (arguments.executor, arguments.shard_episodes, arguments.shards, arguments.stats or None)
-    if any(value is not None for value in asked):
+    if asks_for_shards(arguments):
         if arguments.append:
             raise InvalidValueError("--append", "without shards, whose flags stand beside it", True)
         return scale
@@ -123,10 +139,11 @@ def convert_in_shards(
         RunError: damaged recordings, or a killed process; the finished shards are kept.
         MissingExtraError: datatrove or lerobot is not installed.
     """
-    from .executors import SlurmOptions, run_local, run_ray, submit_slurm
+    from .executors import SlurmOptions, require_executor, run_local, run_ray, submit_slurm
 
     stride(conversion.fps)
     require_new(root)
+    require_executor(scale.executor, scale.slurm.get("partition"))
     files, unfinished = find_recordings(folders)
     root = root.absolute()
     folder = (scale.folder or root.parent / f".{root.name}.shards").absolute()
@@ -149,7 +166,7 @@ def convert_in_shards(
         from .merge import merge_shards
 
         summary = {**merge_shards(plan), "finished_before": finished}
-    if scale.folder is not None or scale.executor != "local":
+    if scale.folder is not None:
         return {**summary, "kept": str(folder)}
     shutil.rmtree(folder)
     return summary

@@ -43,6 +43,21 @@ class SlurmOptions:
     arguments: tuple[tuple[str, str], ...] = ()
 
 
+def require_executor(name: str, partition: str | None = None) -> None:
+    """Checks that an executor can be used from here.
+
+    Raises:
+        InvalidValueError: Ray is not installed; no sbatch here, or no partition given.
+    """
+    if name == "ray" and importlib.util.find_spec("ray") is None:
+        raise InvalidValueError("--executor", "local or slurm, as ray is not installed (pip install ray)", name)
+    if name == "slurm":
+        if shutil.which("sbatch") is None:
+            raise InvalidValueError("--executor", "sbatch on the PATH, for slurm", "none")
+        if not partition:
+            raise InvalidValueError("--partition", "a partition of the cluster, for --executor slurm", partition)
+
+
 def run_local(plan: ShardPlan, workers: int) -> None:
     """Makes all shards in processes of this machine.
 
@@ -68,13 +83,10 @@ def run_ray(plan: ShardPlan, workers: int | None) -> None:
     """Makes all shards on the Ray cluster that this process belongs to.
 
     Raises:
-        InvalidValueError: Ray is not installed.
         RunError: not all shards were finished.
     """
-    if importlib.util.find_spec("ray") is None:
-        raise InvalidValueError("--executor", "local or slurm, as ray is not installed (pip install ray)", "ray")
-    executor = RayPipelineExecutor([ConvertShard(plan)], len(plan), workers or -1, logging_dir=str(plan.logs))
     with quiet():
+        executor = RayPipelineExecutor([ConvertShard(plan)], len(plan), workers or -1, logging_dir=str(plan.logs))
         executor.run()
     if executor.get_incomplete_ranks():
         raise _damage(plan)
@@ -87,13 +99,8 @@ def submit_slurm(plan: ShardPlan, workers: int | None, options: SlurmOptions) ->
         Ids of the jobs; `shards` is None where every shard is finished.
 
     Raises:
-        InvalidValueError: no sbatch here, or no partition given.
         RunError: SLURM refused.
     """
-    if shutil.which("sbatch") is None:
-        raise InvalidValueError("--executor", "sbatch on the PATH, for slurm", "none")
-    if not options.partition:
-        raise InvalidValueError("--partition", "a partition of the cluster, for --executor slurm", options.partition)
     shards = _slurm(plan, [ConvertShard(plan)], len(plan), "copolicy-shards", plan.logs, options, workers or -1)
     # Without the last option a merge whose shards failed would wait in the queue for ever.
     merge = _slurm(

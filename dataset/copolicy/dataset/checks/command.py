@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..commandline import add_command
 from ..exceptions import InvalidValueError
+from ..extras import TABLES
 from .limits import LIMITS
 from .location import locate
 from .stored_check import CHECK_FILE, check_document, content_hash
@@ -24,8 +25,9 @@ _SHOWN = ("kind", "episodes", "frames", "rules", "not_applied", "counts")
 def add_check_command(commands: argparse._SubParsersAction) -> None:
     """Adds `check`."""
     parser = add_command(
-        commands, "check", _check, "look for what is wrong with recordings or a data set; repairs nothing", _EXAMPLE
-    )
+        commands, "check", _check, "look for what is wrong with recordings or a data set; repairs nothing", _EXAMPLE,
+        _needs,
+    )  # fmt: skip
     parser.add_argument(
         "path", nargs="?", metavar="PATH", help="folder of recordings, data set, or USER/NAME on the Hub"
     )
@@ -39,6 +41,11 @@ def add_check_command(commands: argparse._SubParsersAction) -> None:
         help=f"keep the findings in a data set folder, as {CHECK_FILE} (default: yes)",
     )
     parser.add_argument("--rules", action="store_true", help="print every limit with its reason, and check nothing")
+
+
+def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
+    paths = [] if arguments.rules else [arguments.path, arguments.against]
+    return TABLES if any(path is not None and Path(path, "meta").is_dir() for path in paths) else ()
 
 
 def _check(arguments: argparse.Namespace) -> dict:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from ..commandline import add_command
 from ..exceptions import InvalidValueError
+from ..extras import TABLES
+from ..flag_numbers import seed
 
 _ROOT = "folder of a LeRobot data set"
 
@@ -15,6 +17,7 @@ def add_select_command(commands: argparse._SubParsersAction) -> None:
         commands, "select", _select, "write some episodes as a data set of their own; the old one stays as it is",
         "copolicy-dataset select datasets/table --out datasets/short --pairs P03 P07 "
         "--where 'duration_s < 20 and source == \"human\"'",
+        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="the new folder; must not exist")
@@ -28,6 +31,7 @@ def add_split_command(commands: argparse._SubParsersAction) -> None:
         commands, "split", _split, "write a data set in parts that share no person or no map",
         "copolicy-dataset split datasets/table --out datasets/parts --parts train=0.8 valid=0.1 test=0.1\n"
         "  copolicy-dataset split datasets/table --out datasets/parts --by pairs --parts test=P03,P07 train=rest",
+        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="a folder for the parts; must not exist")
@@ -40,7 +44,7 @@ def add_split_command(commands: argparse._SubParsersAction) -> None:
         help="what is never in two parts: a pair, with everybody who carried with one of them (default); a map, with "
         "its start orientations; or an episode alone",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="of the order in which equal groups are dealt out")
+    parser.add_argument("--seed", type=seed(), default=0, help="of the order in which equal groups are dealt out")
     parser.add_argument(
         "--same-consent", action="store_true", help="a consent id in two pairs is the same person (--by pairs)"
     )
@@ -57,6 +61,7 @@ def add_withdraw_command(commands: argparse._SubParsersAction) -> None:
         commands, "withdraw", _withdraw, "delete every episode of a consent id from recordings and data sets",
         "copolicy-dataset withdraw C-17 recordings datasets/table        (prints what would be deleted)\n"
         "  copolicy-dataset withdraw C-17 recordings datasets/table --yes",
+        lambda arguments: TABLES if any((path / "meta").is_dir() for path in arguments.paths) else (),
     )  # fmt: skip
     parser.add_argument("consent", metavar="CONSENT_ID", help="one consent id")
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="folders of recordings and data sets")
@@ -70,6 +75,7 @@ def add_amend_command(commands: argparse._SubParsersAction) -> None:
         "copolicy-dataset amend datasets/table --set license=cc-by-4.0\n"
         "  copolicy-dataset amend datasets/table --set consent_id=C-12 --episodes 3-5\n"
         "  copolicy-dataset amend datasets/table --restore-from recordings",
+        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     what = parser.add_mutually_exclusive_group(required=True)

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..commandline import add_command
+from ..extras import HUB, TABLES
 
 
 def add_publish_command(commands: argparse._SubParsersAction) -> None:
@@ -16,6 +17,7 @@ def add_publish_command(commands: argparse._SubParsersAction) -> None:
         "upload a checked and released data set in one commit and tag it; the token is that of `hf auth login` or "
         "HF_TOKEN",
         "copolicy-dataset publish outputs/dataset --repo-id my-lab/table --private",
+        (*TABLES, *HUB),
     )
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a released LeRobot v3 data set with a card")
     parser.add_argument("--repo-id", required=True, metavar="U/N", help="user/name on the Hub")
@@ -34,6 +36,7 @@ def add_pull_command(commands: argparse._SubParsersAction) -> None:
         _pull,
         "download a data version and verify every file and the content hash",
         "copolicy-dataset pull my-lab/table@data-1.0.0 --root outputs/table",
+        (*TABLES, *HUB),
     )
     parser.add_argument("name", metavar="U/N[@REVISION]", help="data set on the Hub (default: its newest data version)")
     parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="folder to make")

@@ -9,6 +9,8 @@ from ..commandline import add_command
 from ..documents import STATISTICS_FILE
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
+from ..extras import TABLES
+from ..flag_numbers import seed
 from ..staging import replace_text
 
 
@@ -20,10 +22,11 @@ def add_stats_command(commands: argparse._SubParsersAction) -> None:
         _stats,
         "compute the statistics of a data set, with intervals and nulls, into meta/copolicy_stats.json",
         "copolicy-dataset stats datasets/table",
+        (*TABLES, "sklearn", "diptest"),
     )
     parser.add_argument("path", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write here instead of into the data set")
-    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument("--seed", type=seed(), default=0, help="of everything that is drawn (default: %(default)s)")
     parser.add_argument(
         "--source", choices=Source.__args__, default=None, help="describe only episodes of this source (needs --out)"
     )

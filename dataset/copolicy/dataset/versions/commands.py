@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..commandline import add_command
 from ..exceptions import CopolicyError, RunError
+from ..extras import TABLES
 
 _SHOWN = 20
 
@@ -17,6 +18,7 @@ def add_release_command(commands: argparse._SubParsersAction) -> None:
         _release,
         "give a data set its next version: content hash, manifest and change log",
         'copolicy-dataset release outputs/dataset --bump minor --notes "Session of pair 3"',
+        TABLES,
     )
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument(
@@ -37,6 +39,7 @@ def add_diff_command(commands: argparse._SubParsersAction) -> None:
         _diff,
         "say what differs between two data sets; exit status 0 same, 1 different, 2 trouble",
         "copolicy-dataset diff outputs/dataset@1.0.0 outputs/dataset",
+        TABLES,
     )
     what = "folder, FOLDER@x.y.z (a release), or U/N[@REVISION] on the Hub, such as my-lab/table@data-1.0.0"
     parser.add_argument("a", metavar="A", help=what)

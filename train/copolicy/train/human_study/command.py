@@ -7,8 +7,10 @@ from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder
 from copolicy.collect.controllers.training_conditions import training_conditions
 from copolicy.dataset.commandline import add_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.extras import POLICIES
 from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import visible_files
+from copolicy.dataset.flag_numbers import number, whole_number
 from copolicy.dataset.licences import checked_licence
 from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
@@ -43,14 +45,22 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
         "copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --participants 5 --out study/plan.json",
     )
     command.add_argument("policies", nargs="+", metavar="NAME=CKPT", help="robots to compare, at least two")
-    command.add_argument("--participants", type=int, default=5, help="how many people (default: 5, the paper's)")
+    command.add_argument(
+        "--participants",
+        type=whole_number("--participants", 1, 10_000),
+        default=5,
+        help="how many people (default: 5, the paper's)",
+    )
     command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
     command.add_argument(
-        "--configurations", type=int, default=60, help="starts shared out among people, as in `partner` (default: 60)"
+        "--configurations",
+        type=whole_number("--configurations", None),
+        default=60,
+        help="starts shared out among people, as in `partner` (default: 60)",
     )
     command.add_argument(
         "--episodes-per-robot",
-        type=int,
+        type=whole_number("--episodes-per-robot", 1, 10_000),
         default=12,
         help="starts of each person, the same with every robot (default: 12)",
     )
@@ -65,6 +75,7 @@ def _add_run(steps: argparse._SubParsersAction) -> None:
         _run,
         "one person's session in the window of `copolicy-collect play`; it goes on where it was left",
         "copolicy-eval human run study/plan.json --participant P01 --out study/recordings --consent C-17",
+        POLICIES,
     )
     command.add_argument("plan", type=Path, help="of `copolicy-eval human plan`")
     command.add_argument("--participant", required=True, help="as the plan names them: P01, P02, ...")
@@ -72,10 +83,17 @@ def _add_run(steps: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--human", default="joystick", help="joystick, keyboard, or scripted[:PAIR] to try the procedure without people"
     )
-    command.add_argument("--practice", type=int, default=2, help="episodes to get used to it, not counted (default: 2)")
+    command.add_argument(
+        "--practice",
+        type=whole_number("--practice", 0, 1000),
+        default=2,
+        help="episodes to get used to it, not counted (default: 2)",
+    )
     command.add_argument("--consent", default="", metavar="ID", help="record id of the person's consent, no name")
     command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
-    command.add_argument("--countdown", type=float, default=3.0, help="seconds before each episode (default: 3)")
+    command.add_argument(
+        "--countdown", type=number("--countdown", 0, 60), default=3.0, help="seconds before each episode (default: 3)"
+    )
     command.add_argument("--device", default="cpu", help="where the robots plan (default: cpu)")
     command.add_argument("--new-session", action="store_true", help="do not continue the unfinished session")
     command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")

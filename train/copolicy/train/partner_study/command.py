@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from copolicy.collect.pilots.partners import PARTNERS
 from copolicy.dataset.commandline import add_command, progress_bar
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.flag_numbers import LARGEST_SEED, whole_number
 from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import write_json
-from ..study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_settings
+from ..study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs, study_settings
 
 if TYPE_CHECKING:
     from .robots import Robot
@@ -31,6 +32,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         _partner,
         "the robot's half of a checkpoint with simulated partners of several kinds at the human seat",
         "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
+        study_needs,
     )
     command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, with a name for the result")
     command.add_argument(
@@ -45,15 +47,25 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
     command.add_argument(
         "--configurations",
-        type=int,
+        type=whole_number("--configurations", None),
         default=60,
         help="starts: a quarter as many maps, spread over the set, each in four orientations (default: 60)",
     )
     command.add_argument(
         "--partners", nargs="+", default=list(PARTNERS), metavar="KIND", help=f"of {', '.join(PARTNERS)} (default: all)"
     )
-    command.add_argument("--repeats", type=int, default=1, help="partners of each kind on each start (default: 1)")
-    command.add_argument("--partner-seed", type=int, default=0, help="seed of the partners (default: 0)")
+    command.add_argument(
+        "--repeats",
+        type=whole_number("--repeats", 1, 10_000),
+        default=1,
+        help="partners of each kind on each start (default: 1)",
+    )
+    command.add_argument(
+        "--partner-seed",
+        type=whole_number("--partner-seed", None, LARGEST_SEED),
+        default=0,
+        help="seed of the partners (default: 0)",
+    )
     command.add_argument("--out", required=True, type=Path, help="where the result goes; the picture stands beside it")
     add_study_flags(command, actions_per_plan=1)
 

@@ -1,0 +1,60 @@
+"""Shards on Ray: with Ray itself where it is installed, and with datatrove's local executor in its place elsewhere."""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from datatrove.executor import LocalPipelineExecutor
+from sharded_calls import EPISODES, call, content
+
+from copolicy.convert.cli import main
+from copolicy.convert.scale import executors
+
+
+class _InThisProcess(LocalPipelineExecutor):
+    """Takes what `RayPipelineExecutor` takes, and runs one rank after the other here."""
+
+    def __init__(self, pipeline: list, tasks: int, workers: int, logging_dir: str):
+        super().__init__(pipeline, tasks=tasks, workers=1, logging_dir=logging_dir)
+
+
+@pytest.fixture(params=["stand-in", "ray"])
+def ray(request, monkeypatch, tmp_path_factory):
+    if request.param == "ray":
+        pytest.importorskip("ray")
+        return
+    if find_spec("ray") is None:
+        folder = tmp_path_factory.mktemp("packages")
+        (folder / "ray").mkdir()
+        (folder / "ray" / "__init__.py").touch()
+        monkeypatch.syspath_prepend(folder)
+    monkeypatch.setattr(executors, "RayPipelineExecutor", _InThisProcess)
+
+
+def _ray(unsharded: Path, root: Path, *flags: str) -> list[str]:
+    return call(unsharded / "recordings", root, "--executor", "ray", "--workers", "1", "--shard-episodes", "3", *flags)
+
+
+def test_the_set_is_that_of_one_conversion_and_no_shards_are_left(ray, unsharded, tmp_path, capsys):
+    assert main(_ray(unsharded, tmp_path / "set", "--json")) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["episodes"], summary["shards"]) == (EPISODES, 2)
+    assert "kept" not in summary
+    assert content(tmp_path / "set") == content(unsharded / "whole")
+    assert list(tmp_path.iterdir()) == [tmp_path / "set"]
+
+
+def test_shards_that_were_asked_for_are_kept(ray, unsharded, tmp_path, capsys):
+    assert main(_ray(unsharded, tmp_path / "set", "--shards", str(tmp_path / "shards"), "--json")) == 0
+    assert json.loads(capsys.readouterr().out)["kept"] == str(tmp_path / "shards")
+    assert (tmp_path / "shards" / "findings.json").is_file()
+
+
+@pytest.mark.parametrize("executor", ["ray", "slurm"])
+def test_an_executor_that_is_not_here_leaves_nothing(unsharded, tmp_path, monkeypatch, executor):
+    monkeypatch.setenv("PATH", "")
+    if executor == "ray" and find_spec("ray") is not None:
+        pytest.skip("Ray is here")
+    assert main(call(unsharded / "recordings", tmp_path / "set", "--executor", executor)) == 2
+    assert list(tmp_path.iterdir()) == []
