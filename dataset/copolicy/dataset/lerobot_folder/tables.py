@@ -212,8 +212,10 @@ def misfit(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> str:
         values = values.flatten()
     elif width > 1:
         return str(values.type)
-    if "int" in dtype and pa.types.is_floating(kind) and not pc.all(pc.equal(values, pc.round(values))).as_py():
-        return "fractions"
+    if "int" in dtype and pa.types.is_floating(kind):
+        numbers = values.drop_null().to_numpy(zero_copy_only=False)
+        if not np.array_equal(numbers, np.rint(numbers)):
+            return "fractions"
     return ""
 
 
