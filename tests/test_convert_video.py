@@ -13,6 +13,7 @@ from checked_data import contents, make_data_set, make_recordings
 from lerobot.datasets import LeRobotDataset, dataset_reader
 from lerobot.datasets.compute_stats import compute_episode_stats
 from PIL import Image
+from video_difference import video_difference
 
 from copolicy.convert.cli import main
 from copolicy.convert.lerobot_writer import write_dataset
@@ -174,7 +175,8 @@ def test_appending_adds_a_file_with_the_same_size(made, root, capsys):
     assert_pictures(dataset, drawn(made / "raw"))
     found, expected = read_content(root), read_content(made / "both")
     for episode, other in zip(found.episodes, expected.episodes, strict=True):
-        assert (episode.features, episode.columns) == (other.features, other.columns)
+        same = (episode.features, episode.columns) == (other.features, other.columns)
+        assert same, video_difference(root, made / "both")
     assert found.features == expected.features
     assert found.hash == expected.hash
     first = f"videos/{SCENE}/chunk-000/file-000.mp4"
@@ -251,3 +253,10 @@ def test_training_opens_no_video(made, tmp_path, monkeypatch, capsys):
             "input_features"
         ]
     )
+
+
+def test_a_difference_of_videos_is_told(made):
+    assert video_difference(made / "both", made / "both") == ""
+    told = video_difference(made / "a", made / "b").splitlines()
+    assert [line.split(":")[0] for line in told] == [f"episode {number}, {SCENE}" for number in range(2)]
+    assert "images by up to" in told[0]

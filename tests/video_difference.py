@@ -1,0 +1,51 @@
+"""What is different where two data sets should hold the same encoded video."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+
+from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.lerobot_folder.references import video_features, video_span
+
+
+def video_difference(found: Path, expected: Path) -> str:
+    """A line for each episode whose video has other bytes: which packets, and by how much the images differ.
+
+    Packets that differ from some packet on, with images that hardly differ, are the encoder's; images that differ where
+    nothing moves are the drawing's.
+    """
+    first, second = LeRobotFolder.open(found), LeRobotFolder.open(expected)
+    lines = []
+    for row, other in zip(first.episodes.to_pylist(), second.episodes.to_pylist(), strict=True):
+        for key in video_features(first.info):
+            packets, images = _clip(first, row, key)
+            others, expected_images = _clip(second, other, key)
+            differ = [place for place, pair in enumerate(zip(packets, others, strict=False)) if pair[0] != pair[1]]
+            if not differ and len(packets) == len(others):
+                continue
+            distances = [np.abs(a - b).max() for a, b in zip(images, expected_images, strict=False)]
+            sizes = [(len(packets[place]), len(others[place])) for place in differ[:3]]
+            lines.append(
+                f"episode {row['episode_index']}, {key}: {len(differ)} of {len(packets)} packets differ ({len(others)} "
+                f"expected), the first {differ[:3]} of {sizes} bytes; images by up to {max(distances)} of 255 levels, "
+                f"the first at {int(np.argmax(np.array(distances) > 0))}"
+            )
+    return "\n".join(lines)
+
+
+def _clip(folder: LeRobotFolder, row: dict, key: str) -> tuple[list[bytes], list[np.ndarray]]:
+    """The packets of an episode, and its images as `(height, width, 3)` int."""
+    path, start, end = video_span(folder.root, folder.info, row, key)
+    half = 0.5 / folder.info["fps"]
+
+    def inside(time: float | None) -> bool:
+        return time is not None and start - half <= time < end - half
+
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        packets = [p for p in container.demux(stream) if p.size and p.pts is not None and p.time_base is not None]
+        chosen = [bytes(p) for p in packets if inside(float(p.pts * p.time_base))]  # pyright: ignore
+    with av.open(str(path)) as container:
+        frames = [frame for frame in container.decode(video=0) if inside(frame.time)]
+        return chosen, [frame.to_ndarray(format="rgb24").astype(int) for frame in frames]
