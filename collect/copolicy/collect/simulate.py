@@ -1,17 +1,16 @@
 """Records episodes of scripted pairs, as fast as the machine goes."""
 
 import contextlib
+import ctypes
 import multiprocessing
 import os
-import signal
 import time
 import uuid
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import replace
 from importlib.metadata import version
-from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, Un
 from copolicy.dataset.files import is_hidden
 from copolicy.dataset.task import MapConfig, Physics, identify
 from copolicy.dataset.task import map_set as maps_of
+from copolicy.dataset.worker_pool import WorkerPool
 
 from .episode_file import PART_SUFFIX
 from .episode_job import EpisodeJob, EpisodeResult
@@ -135,17 +135,15 @@ def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]
             for job in group:
                 yield job.record()
         return
-    # Spawned, not forked: a fork would copy the locks of whatever threads the caller runs.
-    context = multiprocessing.get_context("spawn")
-    stop = context.Event()
-    with ProcessPoolExecutor(min(workers, len(groups)), context, _start_worker, (stop,)) as pool:
+    # Without a lock, which a worker that is killed would never give back.
+    stop = multiprocessing.get_context("spawn").RawValue(ctypes.c_bool, False)
+    with WorkerPool(min(workers, len(groups)), _keep_stop, (stop,)) as pool:
         futures = [pool.submit(_record_group, group) for group in groups]
         try:
             for future in as_completed(futures):
                 yield from future.result()
         except BaseException:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
+            stop.value = True
             raise
 
 
@@ -159,18 +157,16 @@ def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[Episo
     return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
 
 
-_stop: Event | None = None  # of a worker process, set when the command is stopped
+_stop: ctypes.c_bool | None = None  # of a worker process, true once the command is stopped
 
 
-def _start_worker(stop: Event) -> None:
-    # Ctrl-C reaches every process of a terminal: the workers leave it to the first one and finish their episode.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _keep_stop(stop: ctypes.c_bool) -> None:
     global _stop
     _stop = stop
 
 
 def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
-    return [job.record() for job in jobs if _stop is None or not _stop.is_set()]
+    return [job.record() for job in jobs if _stop is None or not _stop.value]
 
 
 def _remove(jobs: list[EpisodeJob], folder: Path | None) -> None:

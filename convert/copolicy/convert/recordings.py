@@ -2,9 +2,7 @@
 
 import functools
 import logging
-import multiprocessing
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -16,6 +14,7 @@ from copolicy.dataset.file_kinds import kind_of
 from copolicy.dataset.files import broken_links, distinct, distinct_files
 from copolicy.dataset.log import read_episode
 from copolicy.dataset.staging import require_new
+from copolicy.dataset.worker_pool import WorkerPool
 
 from .prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
 
@@ -120,12 +119,8 @@ def _prepared(
     if workers == 1:
         yield map(read, files)
         return
-    # A forked process would inherit the locks of libraries that have threads.
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
-    try:
+    with WorkerPool(workers) as pool:
         yield pool.map(read, files, chunksize=_BATCH)
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _read_recording(conversion: Conversion, path: Path) -> PreparedEpisode | NotPrepared:

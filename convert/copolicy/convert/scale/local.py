@@ -1,15 +1,12 @@
 """datatrove's local executor, for processes that may be killed."""
 
-import multiprocessing
-import os
-import signal
-import threading
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
 from copolicy.dataset.commandline import progress
 from copolicy.dataset.exceptions import CopolicyError, MissingExtraError
+from copolicy.dataset.worker_pool import WorkerPool
 
 try:
     from datatrove.executor.local import LocalPipelineExecutor
@@ -40,16 +37,10 @@ class LocalExecutor(LocalPipelineExecutor):
         self.save_executor_as_json()
         if self.workers == 1:
             return [error for rank in progress(ranks, len(ranks), "shards") if (error := self._outcome(rank))]
-        # Spawned, not forked: a fork would copy the locks of whatever threads this process runs.
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(self.workers, len(ranks)), context, _start_worker) as pool:
+        with WorkerPool(min(self.workers, len(ranks))) as pool:
             futures: list[Future[CopolicyError | None]] = [pool.submit(self._outcome, rank) for rank in ranks]
-            try:
-                done = progress(as_completed(futures), len(futures), "shards")
-                return [error for future in done if (error := future.result())]
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+            done = progress(as_completed(futures), len(futures), "shards")
+            return [error for future in done if (error := future.result())]
 
     def _outcome(self, rank: int) -> CopolicyError | None:
         try:
@@ -69,20 +60,6 @@ def quiet():
         yield
     finally:
         logger.enable("datatrove")
-
-
-def _start_worker() -> None:
-    # Ctrl-C reaches every process of a terminal: the workers leave it to the first one and finish their shard.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """A process of a pool whose parent was killed would wait for its next task for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 __all__ = ["BrokenProcessPool", "LocalExecutor", "quiet"]
