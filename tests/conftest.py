@@ -6,6 +6,7 @@ Fixtures import their builders when they are asked for: torch, LeRobot and Playw
 import logging
 import os
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,10 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 # Nothing in the tests may reach for the network; the Hub client reads these at import.
 os.environ["HF_HUB_OFFLINE"] = "1"
 os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
+
+# A shell without job control has background jobs ignore SIGINT, and every program under test would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 # Minutes in a few tests: first, so that no core waits for another at the end.
