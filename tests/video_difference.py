@@ -42,10 +42,16 @@ def _clip(folder: LeRobotFolder, row: dict, key: str) -> tuple[list[bytes], list
     def inside(time: float | None) -> bool:
         return time is not None and start - half <= time < end - half
 
+    packets: list[bytes] = []
+    images: list[np.ndarray] = []
     with av.open(str(path)) as container:
-        stream = container.streams.video[0]
-        packets = [p for p in container.demux(stream) if p.size and p.pts is not None and p.time_base is not None]
-        chosen = [bytes(p) for p in packets if inside(float(p.pts * p.time_base))]  # pyright: ignore
+        for packet in container.demux(container.streams.video[0]):
+            if packet.pts is None or packet.time_base is None:
+                continue
+            if packet.size and inside(float(packet.pts * packet.time_base)):
+                packets.append(bytes(packet))
     with av.open(str(path)) as container:
-        frames = [frame for frame in container.decode(video=0) if inside(frame.time)]
-        return chosen, [frame.to_ndarray(format="rgb24").astype(int) for frame in frames]
+        images += [
+            frame.to_ndarray(format="rgb24").astype(int) for frame in container.decode(video=0) if inside(frame.time)
+        ]
+    return packets, images
