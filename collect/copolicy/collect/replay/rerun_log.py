@@ -56,7 +56,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         CopolicyError: rerun-sdk is not installed.
         OutputExistsError: the file exists.
         InvalidValueError: another ending than `.rrd`.
-        RunError: there is no display for the viewer.
+        RunError: there is no display for the viewer, or Rerun could not write the file; nothing is left of it.
     """
     if path is not None:
         if path.suffix.lower() != ".rrd":
@@ -92,12 +92,18 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         with about(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             recording.save(str(path), default_blueprint=layout)
-    _log_map(rr, recording, track)
-    for step in progress(range(track.steps + 1), track.steps + 1, "steps"):
-        recording.set_time(_TIMELINE, duration=step / RECORD_HZ)
-        recording.set_time("step", sequence=step)
-        _log_step(rr, recording, track, step)
-    recording.flush()
+    try:
+        _log_map(rr, recording, track)
+        for step in progress(range(track.steps + 1), track.steps + 1, "steps"):
+            recording.set_time(_TIMELINE, duration=step / RECORD_HZ)
+            recording.set_time("step", sequence=step)
+            _log_step(rr, recording, track, step)
+        recording.flush()
+    except RuntimeError as error:  # Rerun's, which does not say what the system said, such as that the disk is full
+        if path is None:
+            raise
+        path.unlink(missing_ok=True)
+        raise RunError(f"{path}: expected Rerun to write the file, found {' '.join(str(error).split())}") from None
     if path is None:
         return {"viewer": "opened", "steps": track.steps}
     recording.disconnect()
