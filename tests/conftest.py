@@ -64,6 +64,22 @@ def _logging_as_found():
         root.removeHandler(handler)
 
 
+@pytest.fixture
+def own_joysticks():
+    """SDL's joysticks and display from nothing, and nothing left of them."""
+    from copolicy.collect.sdl import pygame
+
+    def quit_both() -> None:
+        pygame.joystick.quit()
+        pygame.display.quit()
+
+    quit_both()
+    pygame.display.init()
+    pygame.joystick.init()
+    yield
+    quit_both()
+
+
 @pytest.fixture(scope="session")
 def sound_recordings(tmp_path_factory) -> Path:
     """Six recordings of scripted pairs."""

@@ -14,17 +14,7 @@ from copolicy.collect.inputs import CalibrationStore, StickCalibration
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
-
-@pytest.fixture(autouse=True)
-def _own_joysticks():
-    """SDL's joysticks from nothing, and nothing left of them."""
-    pygame.joystick.quit()
-    pygame.display.quit()
-    pygame.display.init()
-    pygame.joystick.init()
-    yield
-    pygame.joystick.quit()
-    pygame.display.quit()
+pytestmark = pytest.mark.usefixtures("own_joysticks")
 
 
 @pytest.fixture

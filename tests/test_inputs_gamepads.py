@@ -25,15 +25,9 @@ SONY, NINTENDO, OTHER = "050000004c050000cc09000000000000", "030000007e050000092
 
 
 @pytest.fixture
-def events():
+def events(own_joysticks):
     """SDL's queue, with joysticks of its own."""
-    pygame.joystick.quit()
-    pygame.display.quit()
-    pygame.display.init()
-    pygame.joystick.init()
-    yield pygame.event
-    pygame.joystick.quit()
-    pygame.display.quit()
+    return pygame.event
 
 
 def mapping(text: str, name: str = "Pad", source: Literal["sdl", "user"] = "sdl") -> GamepadMapping:

@@ -6,15 +6,14 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import av
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
+from straight_carry import record
 
 from copolicy.collect.cli import main
-from copolicy.collect.recorder import EpisodeRecorder
 from copolicy.collect.replay.film import write_gif, write_video
 from copolicy.collect.replay.playback import Playback
 from copolicy.collect.replay.sheet import draw_sheet, write_sheet
@@ -23,30 +22,9 @@ from copolicy.collect.replay.verify import verify
 from copolicy.collect.replay.view import SIZE, ReplayView, Shown
 from copolicy.collect.replay.viewer import Viewer
 from copolicy.collect.sdl import pygame
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import RUNNING, TableWorld
-from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, OutputExistsError
 from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import MapConfig, Physics
-
-MAP = MapConfig((240.0, 300.0, 3.0), (700.0, 300.0), ((480.0, 480.0),))
-META = EpisodeMeta("u", "s", "P07", "P07-a", "P07-b", map_id="custom", source="human")
-
-
-def record(path, steps=None, physics=None, config=MAP, push=(1.0, 0.1, 0.8, -0.1)):
-    """Carries straight on until the episode ends, or for some steps."""
-    world = TableWorld(config, physics)
-    with EpisodeRecorder(path, config, META, WallClockAnchor.simulated(10**18), physics=physics) as recording:
-        outcome = RUNNING
-        while recording.steps < steps if steps else not outcome.done:
-            action = [push[0], push[1] * math.sin(recording.steps / 9), push[2], push[3]]
-            outcome = world.step(action)
-            recording.step(action, world.pose, world.velocity, world.reward())
-            if recording.steps == 40:
-                recording.event("pause", "focus lost")
-        recording.finish(outcome.success, outcome.reason if outcome.done else "operator_discard")
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -493,64 +471,3 @@ def test_the_command_checks_and_its_exit_status_tells(recording, tmp_path, capsy
     assert "expected a readable MCAP file, found No such file or directory" in capsys.readouterr().err
     record(tmp_path / "empty.mcap", 1)
     assert main(["replay", str(tmp_path / "empty.mcap"), "--verify"]) == 0
-
-
-# Rerun
-
-RERUN = """
-import sys, types
-
-LOGGED = []
-
-class Stream:
-    def __init__(self, application, recording_id=None):
-        LOGGED.append(("stream", application))
-    def save(self, path, default_blueprint=None):
-        self.path = path
-    def set_time(self, timeline, **value):
-        LOGGED.append(("time", timeline, value))
-    def log(self, entity, archetype, static=False):
-        LOGGED.append(("log", entity, archetype, static))
-    def flush(self):
-        open(self.path, "w").write(repr(len(LOGGED)))
-    def disconnect(self):
-        pass
-
-class Named(types.ModuleType):
-    def __getattr__(self, name):
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return lambda *values, **named: (name, values, named)
-
-rerun, blueprint = Named("rerun"), Named("rerun.blueprint")
-rerun.RecordingStream = Stream
-sys.modules["rerun"], sys.modules["rerun.blueprint"] = rerun, blueprint
-from copolicy.collect.cli import main
-status = main(["replay", sys.argv[1], "--rerun", sys.argv[2], "--json"])
-from collections import Counter
-import json
-counts = Counter(entry[1] for entry in LOGGED if entry[0] == "log")
-times = [entry[2]["duration"] for entry in LOGGED if entry[:2] == ("time", "sim_time")]
-vectors = next(entry[2][2]["vectors"] for entry in LOGGED if entry[1] == "world/forces")
-print(json.dumps([status, counts, times[:2] + times[-1:], vectors]))
-"""
-
-
-def test_rerun_gets_table_forces_and_interaction_on_the_timeline(recording, track, tmp_path):
-    """What is handed over, without the package: it is not among our dependencies (tried by hand with 0.41)."""
-    run = subprocess.run(
-        [sys.executable, "-c", RERUN, str(recording), str(tmp_path / "a.rrd")],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    status, counts, times, vectors = json.loads(run.stdout.splitlines()[-1])
-    assert status == 0
-    assert counts == {
-        "world/window": 1, "world/goal": 1, "world/obstacles": 1, "world/trail/robot": 1, "world/trail/human": 1,
-        "about": 1, "interaction_force": track.steps + 1, "world/table": track.steps + 1,
-        "world/forces": track.steps + 1, "events": 1,
-    }  # fmt: skip
-    assert times == pytest.approx([0.0, 1 / 30, track.steps / 30])
-    assert np.array(vectors).ravel() == pytest.approx(95 * track.episode.actions[0])
-    assert Path(tmp_path / "a.rrd").exists()

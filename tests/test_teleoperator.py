@@ -18,16 +18,7 @@ from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import ACTION_NAMES
 
-
-@pytest.fixture(autouse=True)
-def _own_joysticks():
-    pygame.joystick.quit()
-    pygame.display.quit()
-    pygame.display.init()
-    pygame.joystick.init()
-    yield
-    pygame.joystick.quit()
-    pygame.display.quit()
+pytestmark = pytest.mark.usefixtures("own_joysticks")
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans_command import add_plans_command
 from .result_file import write_json
-from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs, study_settings
+from .study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -49,7 +49,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _coplan(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
-    require_positive(arguments, "repeats", "actions_per_plan", "limit")
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .coplan import coplan
     from .study import summarise

@@ -12,7 +12,7 @@ from copolicy.dataset.flag_numbers import number, whole_number
 from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS, RECORD_HZ, identify
 
-from .study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs
+from .study_flags import add_study_flags, planner_of, protocol_of, study_needs
 
 if TYPE_CHECKING:
     from .plans import Decision
@@ -52,7 +52,6 @@ def _plans(arguments: argparse.Namespace) -> dict:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
-    require_positive(arguments, "samples", "actions_per_plan")
     maps = MAP_SETS[arguments.maps]
     if not 0 <= arguments.map < len(maps):
         raise InvalidValueError("--map", f"0 to {len(maps) - 1}", arguments.map)

@@ -175,13 +175,3 @@ def planner_of(path: Path | str, arguments: argparse.Namespace) -> "Planner":
         raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
     planner.actions = arguments.actions_per_plan
     return planner
-
-
-def require_positive(arguments: argparse.Namespace, *names: str) -> None:
-    """
-    Raises:
-        InvalidValueError: a given flag below 1.
-    """
-    for name in names:
-        if getattr(arguments, name) is not None and getattr(arguments, name) < 1:
-            raise InvalidValueError(f"--{name.replace('_', '-')}", "at least 1", getattr(arguments, name))

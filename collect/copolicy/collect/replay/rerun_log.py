@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.commandline import progress
-from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, OutputExistsError, RunError
-from copolicy.dataset.staging import about
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
+from copolicy.dataset.staging import new_file, require_new
 from copolicy.dataset.task import GOAL_SIZE, PLAYERS, RECORD_HZ, WINDOW
 
 from ..screen import SEAT_POINTS
@@ -61,8 +61,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
     if path is not None:
         if path.suffix.lower() != ".rrd":
             raise InvalidValueError(str(path), "a name that ends with .rrd", path.suffix)
-        if path.exists():
-            raise OutputExistsError(path)
+        require_new(path)
     rr, blueprint = require_rerun()
     if (
         path is None
@@ -88,26 +87,25 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
     recording = rr.RecordingStream("copolicy", recording_id=track.episode.meta.source_sha256 or None)
     if path is None:
         recording.spawn(default_blueprint=layout)
-    else:
-        with about(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            recording.save(str(path), default_blueprint=layout)
-    try:
-        _log_map(rr, recording, track)
-        for step in progress(range(track.steps + 1), track.steps + 1, "steps"):
-            recording.set_time(_TIMELINE, duration=step / RECORD_HZ)
-            recording.set_time("step", sequence=step)
-            _log_step(rr, recording, track, step)
-        recording.flush()
-    except RuntimeError as error:  # Rerun's, which does not say what the system said, such as that the disk is full
-        if path is None:
-            raise
-        path.unlink(missing_ok=True)
-        raise RunError(f"{path}: expected Rerun to write the file, found {' '.join(str(error).split())}") from None
-    if path is None:
+        _log_track(rr, recording, track)
         return {"viewer": "opened", "steps": track.steps}
-    recording.disconnect()
+    with new_file(path) as partial:
+        recording.save(str(partial), default_blueprint=layout)
+        try:
+            _log_track(rr, recording, track)
+        except RuntimeError as error:  # Rerun's, which does not say what the system said, such as that the disk is full
+            raise RunError(f"{path}: expected Rerun to write the file, found {' '.join(str(error).split())}") from None
+        recording.disconnect()
     return {"out": str(path), "bytes": path.stat().st_size, "steps": track.steps}
+
+
+def _log_track(rr: Any, recording: Any, track: Track) -> None:
+    _log_map(rr, recording, track)
+    for step in progress(range(track.steps + 1), track.steps + 1, "steps"):
+        recording.set_time(_TIMELINE, duration=step / RECORD_HZ)
+        recording.set_time("step", sequence=step)
+        _log_step(rr, recording, track, step)
+    recording.flush()
 
 
 def _log_map(rr: Any, recording: Any, track: Track) -> None:

@@ -16,7 +16,7 @@ from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import write_json
-from ..study_flags import add_protocol_flags, policy_settings, protocol_of, require_positive
+from ..study_flags import add_protocol_flags, policy_settings, protocol_of
 
 
 def add_human_command(commands: argparse._SubParsersAction) -> None:
@@ -126,7 +126,6 @@ def _plan(arguments: argparse.Namespace) -> dict:
     from .plan import Robot, make_plan
 
     require_new(arguments.out, overwrite=arguments.overwrite)
-    require_positive(arguments, "participants", "episodes_per_robot", "actions_per_plan")
     robots = []
     for text in arguments.policies:
         name, path = split_name(text)

@@ -13,7 +13,7 @@ from copolicy.dataset.staging import require_new
 from copolicy.dataset.task import MAP_SETS
 
 from ..result_file import write_json
-from ..study_flags import add_study_flags, planner_of, protocol_of, require_positive, study_needs, study_settings
+from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
 
 if TYPE_CHECKING:
     from .robots import Robot
@@ -73,7 +73,6 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
 def _partner(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
-    require_positive(arguments, "repeats", "actions_per_plan")
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     partners = list(dict.fromkeys(arguments.partners))

@@ -1,0 +1,72 @@
+"""The game with virtual gamepads in its players' hands, step by step."""
+
+from contextlib import contextmanager
+
+from play_session import on_short_map, settings
+
+from copolicy.collect.play.session_run import prepared
+from copolicy.collect.screen import Canvas
+from copolicy.collect.sdl import pygame
+from copolicy.dataset.log import read_episode
+
+
+class Hands:
+    """Presses and ticks by turns, without waiting for the clock."""
+
+    def __init__(self, application):
+        self.application = application
+        self.game = application.game
+
+    @property
+    def phase(self):
+        return type(self.application.phase).__name__
+
+    def ticks(self, count=1):
+        for _ in range(count):
+            assert self.application._tick(self.game.ticker.tick())
+
+    def press(self, button, *pads):
+        """Several pads at the same moment are one that is listed twice, or two people."""
+        for down in (True, False):
+            for pad in pads:
+                pad.button(button, down)
+            self.ticks(4)
+
+    def panel(self, player=0):
+        players = self.game.seats()
+        seat = [one.index for one in players].index(player)
+        return self.application.phase._panel(seat, players[seat])
+
+    def screen(self):
+        canvas = Canvas(pygame.Surface((1200, 760), depth=32))
+        canvas.clear()
+        self.application.phase.draw(canvas, 1.0)
+        return canvas.surface
+
+    def start(self, *pads, button=0):
+        """From the lobby, where all have joined, to the first step."""
+        for pad in pads:
+            self.press(button, pad)
+        self.ticks(20)
+        assert self.phase == "Ready"
+        self.press(button, pads[0])
+        self.ticks(3)
+        assert self.phase == "Running"
+
+
+@contextmanager
+def lobby(tmp_path, **changes):
+    with prepared(settings(tmp_path, **changes)) as application:
+        on_short_map(application)
+        application.phase.enter()
+        yield Hands(application)
+        application.game.break_off("quit")
+
+
+def flags(path):
+    """Of a recording; how fast the test ticks is not looked at."""
+    return set(read_episode(path).meta.quality_flags.split(",")) - {"interrupted", "slow_loop", ""}
+
+
+def devices(hands):
+    return [player.device.name if player.device else None for player in hands.game.players]
