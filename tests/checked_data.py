@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 
 EPISODES = Path("meta/episodes/chunk-000/file-000.parquet")

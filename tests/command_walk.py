@@ -15,7 +15,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.extras import EXTRAS
+from copolicy.dataset.command_line.extras import EXTRAS
 
 SCRIPTS = {
     entry.name: entry.value for entry in entry_points(group="console_scripts") if entry.name.startswith("copolicy-")

@@ -12,7 +12,7 @@ import pyarrow.parquet as parquet
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.features import FEATURES, environment_state
 from copolicy.dataset.statistics import EpisodeRow, Trajectories
-from copolicy.dataset.task import MapConfig
+from copolicy.tasks.table.map_config import MapConfig
 
 ONE = MapConfig((240, 300, math.pi), (960, 300), ((600, 300),))
 TWO = MapConfig((240, 300, math.pi), (960, 300), ((480, 300), (720, 300)))

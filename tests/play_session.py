@@ -12,7 +12,7 @@ from virtual_joystick import VirtualJoystick
 from copolicy.collect.play.application import Application
 from copolicy.collect.play.settings import PilotSpec, PlaySettings
 from copolicy.collect.session import Balance
-from copolicy.dataset.task import MapConfig
+from copolicy.tasks.table.map_config import MapConfig
 
 SHORT_MAP = MapConfig(start=(760.0, 300.0, 3.14), goal=(960.0, 300.0))
 """Straight ahead, two and a half seconds away."""

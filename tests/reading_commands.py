@@ -10,7 +10,7 @@ from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
-from copolicy.train.eval_cli import main as evaluate
+from copolicy.evaluate.cli import main as evaluate
 
 Main = Callable[[list[str]], int]
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.world import TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import MAP_SETS
 from copolicy.dataset.versions.content import read_content
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 EPISODES = 6
 """Recordings of the fixture `unsharded` in conftest.py."""

@@ -2,11 +2,12 @@
 
 import math
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import RUNNING, TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import MapConfig
+from copolicy.dataset.task import RUNNING
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.world import TableWorld
 
 MAP = MapConfig((240.0, 300.0, 3.0), (700.0, 300.0), ((480.0, 480.0),))
 META = EpisodeMeta("u", "s", "P07", "P07-a", "P07-b", map_id="custom", source="human")

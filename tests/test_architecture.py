@@ -6,13 +6,98 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-ROOMS = {
-    "dataset": set(),
-    "collect": {"dataset"},
-    "convert": {"dataset", "collect"},
-    "train": {"dataset", "collect"},
-    "cards": {"dataset"},
+ROOMS = ("dataset", "collect", "convert", "train", "cards")
+ARROWS = {
+    "dataset/copolicy/dataset": set(),
+    "collect/copolicy/collect": {"dataset"},
+    "collect/copolicy/tasks": {"dataset", "collect"},
+    "convert/copolicy/convert": {"dataset", "collect"},
+    "train/lerobot_policy_copolicy": {"dataset", "collect", "train"},
+    "train/copolicy/train": {"dataset", "collect", "lerobot_policy_copolicy"},
+    "train/copolicy/evaluate": {"dataset", "collect", "train", "lerobot_policy_copolicy"},
+    "cards/copolicy/cards": {"dataset"},
 }
+"""Packages, and what each may import beside itself."""
+
+TABLE = "copolicy.tasks.table"
+
+NOT_YET_MOVED = (
+    "cards/copolicy/cards/figures.py",
+    "cards/copolicy/cards/frames.py",
+    "cards/copolicy/cards/report/payload.py",
+    "collect/copolicy/collect/agents/controller.py",
+    "collect/copolicy/collect/agents/people.py",
+    "collect/copolicy/collect/agents/policy.py",
+    "collect/copolicy/collect/agents/replay.py",
+    "collect/copolicy/collect/agents/scripted.py",
+    "collect/copolicy/collect/agents/training_conditions.py",
+    "collect/copolicy/collect/cli.py",
+    "collect/copolicy/collect/demonstration/command.py",
+    "collect/copolicy/collect/demonstration/episode.py",
+    "collect/copolicy/collect/demonstration/pictures.py",
+    "collect/copolicy/collect/play/command.py",
+    "collect/copolicy/collect/play/game.py",
+    "collect/copolicy/collect/play/phase.py",
+    "collect/copolicy/collect/play/player.py",
+    "collect/copolicy/collect/play/result.py",
+    "collect/copolicy/collect/play/settings.py",
+    "collect/copolicy/collect/play/trial.py",
+    "collect/copolicy/collect/recording/episode_messages.py",
+    "collect/copolicy/collect/recording/intact_records.py",
+    "collect/copolicy/collect/recording/recorder.py",
+    "collect/copolicy/collect/recording/recovered_file.py",
+    "collect/copolicy/collect/replay/rerun_log.py",
+    "collect/copolicy/collect/replay/sheet.py",
+    "collect/copolicy/collect/replay/track.py",
+    "collect/copolicy/collect/replay/verify.py",
+    "collect/copolicy/collect/replay/view.py",
+    "collect/copolicy/collect/session/balance.py",
+    "collect/copolicy/collect/simulate/command.py",
+    "collect/copolicy/collect/simulate/episode_job.py",
+    "convert/copolicy/convert/dynamics.py",
+    "convert/copolicy/convert/export/minari.py",
+    "convert/copolicy/convert/export/replay_buffer.py",
+    "convert/copolicy/convert/export/source.py",
+    "convert/copolicy/convert/lerobot/frames.py",
+    "convert/copolicy/convert/lerobot/stored_rewards.py",
+    "convert/copolicy/convert/replay.py",
+    "convert/copolicy/convert/video/scene_pictures.py",
+    "dataset/copolicy/dataset/checks/balance.py",
+    "dataset/copolicy/dataset/checks/contacts.py",
+    "dataset/copolicy/dataset/checks/maps.py",
+    "dataset/copolicy/dataset/episode.py",
+    "dataset/copolicy/dataset/features.py",
+    "dataset/copolicy/dataset/physics_text.py",
+    "dataset/copolicy/dataset/recording/contents.py",
+    "dataset/copolicy/dataset/recording/episode_records.py",
+    "dataset/copolicy/dataset/recording/topics.py",
+    "dataset/copolicy/dataset/statistics/route_entropy.py",
+    "dataset/copolicy/dataset/statistics/trajectories.py",
+    "dataset/copolicy/dataset/statistics/visitation.py",
+    "train/copolicy/evaluate/cli.py",
+    "train/copolicy/evaluate/coplan/figure.py",
+    "train/copolicy/evaluate/coplan/rollouts.py",
+    "train/copolicy/evaluate/human_study/command.py",
+    "train/copolicy/evaluate/human_study/plan.py",
+    "train/copolicy/evaluate/human_study/schedule.py",
+    "train/copolicy/evaluate/partner_study/command.py",
+    "train/copolicy/evaluate/partner_study/configurations.py",
+    "train/copolicy/evaluate/partner_study/robots.py",
+    "train/copolicy/evaluate/partner_study/study.py",
+    "train/copolicy/evaluate/partner_study/table.py",
+    "train/copolicy/evaluate/plans/command.py",
+    "train/copolicy/evaluate/plans/figure.py",
+    "train/copolicy/evaluate/plans/sampling.py",
+    "train/copolicy/evaluate/study_flags.py",
+    "train/copolicy/train/export.py",
+    "train/lerobot_policy_copolicy/copolicy/augmentation.py",
+    "train/lerobot_policy_copolicy/copolicy/features.py",
+    "train/lerobot_policy_copolicy/copolicy/range_scan.py",
+    "train/lerobot_policy_copolicy/env/configuration_table_carrying.py",
+    "train/lerobot_policy_copolicy/env/table_carrying.py",
+)
+"""Modules that know the table and should ask `get_task` instead; the list may only become shorter."""
+
 HEAVY = {"torch", "torchvision", "lerobot", "datasets", "matplotlib", "pandas", "diffusers", "gymnasium"}
 
 
@@ -29,20 +114,32 @@ def _imports(path: Path) -> set[str]:
 
 def _rooms_imported(path: Path) -> set[str]:
     rooms = {name.split(".")[1] for name in _imports(path) if name.startswith("copolicy.")}
-    return rooms | {"train" for name in _imports(path) if name.split(".")[0] == "lerobot_policy_copolicy"}
+    return rooms | {root for name in _imports(path) if (root := name.split(".")[0]) == "lerobot_policy_copolicy"}
 
 
-def _files(room: str) -> list[Path]:
-    files = sorted((ROOT / room).rglob("*.py"))
-    assert files, f"no source under {room}/"
+def _files(folder: str) -> list[Path]:
+    files = sorted((ROOT / folder).rglob("*.py"))
+    assert files, f"no source under {folder}/"
     return files
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_a_room_imports_only_where_its_arrow_points(room):
-    allowed = ROOMS[room] | {room}
-    found = {str(path.relative_to(ROOT)): _rooms_imported(path) - allowed for path in _files(room)}
+@pytest.mark.parametrize("package", ARROWS)
+def test_a_package_imports_only_where_its_arrow_points(package):
+    # Who may import a task is the next test's.
+    allowed = ARROWS[package] | {package.rpartition("/")[2], "tasks"}
+    found = {str(path.relative_to(ROOT)): _rooms_imported(path) - allowed for path in _files(package)}
     assert not {path: rooms for path, rooms in found.items() if rooms}
+
+
+def _imports_the_table(path: Path) -> bool:
+    return any(name == TABLE or name.startswith(f"{TABLE}.") for name in _imports(path))
+
+
+def test_nothing_imports_the_table_but_itself_and_the_importer_of_the_original_program():
+    by_name = {package: [path for path in _files(package) if _imports_the_table(path)] for package in ARROWS}
+    found = {path.relative_to(ROOT).as_posix() for paths in by_name.values() for path in paths}
+    allowed = ("collect/copolicy/tasks/table/", "convert/copolicy/convert/upstream/")
+    assert {path for path in found if not path.startswith(allowed)} == set(NOT_YET_MOVED)
 
 
 @pytest.mark.parametrize("room", ["dataset", "collect"])
@@ -84,9 +181,9 @@ def test_the_walk_sees_text_in_the_encoding_of_the_locale(tmp_path):
 def test_the_walk_sees_a_forbidden_import(tmp_path):
     path = tmp_path / "file.py"
     path.write_text(
-        "def f():\n    from copolicy.train.coplan import coplan\n    import lerobot_policy_copolicy\n", encoding="utf-8"
+        "def f():\n    from copolicy.train.cli import main\n    import lerobot_policy_copolicy\n", encoding="utf-8"
     )
-    assert _rooms_imported(path) == {"train"}
+    assert _rooms_imported(path) == {"train", "lerobot_policy_copolicy"}
 
 
 @pytest.mark.parametrize("room", ROOMS)

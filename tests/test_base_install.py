@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from command_walk import SCRIPTS, every_command
 
+from copolicy.dataset.command_line.extras import EXTRAS, require_packages
 from copolicy.dataset.exceptions import MissingExtraError
-from copolicy.dataset.extras import EXTRAS, require_packages
 
 WORKS = None
 # A call of every command, and the package that it lacks.

@@ -7,7 +7,7 @@ import yaml
 from huggingface_hub import ModelCard
 
 from copolicy.cards.cli import main
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 
 WEIGHTS = b"the weights"

@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.checks.geometry import INNER, OUTER, final_poses, separation
 from copolicy.dataset.checks.limits import limit
 from copolicy.dataset.features import theta_of
-from copolicy.dataset.task import GOAL_SIZE, RECORD_HZ, MapConfig
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.tasks.table.world import TableWorld
 
 GOAL = (600.0, 300.0)
 

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError, RunError
 
 

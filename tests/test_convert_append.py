@@ -12,10 +12,10 @@ from checked_data import contents, make_data_set, make_recordings
 from disk_order import inodes, record_disk_order
 from loaded_sets import assert_same_frames, assert_same_statistics, load
 
-from copolicy.convert import append
 from copolicy.convert.cli import main
+from copolicy.convert.lerobot import append
 from copolicy.dataset.checks.checking import check_dataset
-from copolicy.dataset.exclusions import exclude, excluded_episodes
+from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.collect.world import TableWorld
 from copolicy.convert.dynamics import integrate, step_angular, step_linear, undo_angular, undo_linear
 from copolicy.convert.replay import replay_drift
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.task import MAP_SETS, Physics
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 LIMITS = {"states_cap_pi_over_2": math.pi / 2, "states_cap_pi_over_8": math.pi / 8}
 

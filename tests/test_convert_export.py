@@ -15,12 +15,12 @@ from gymnasium.envs.registration import EnvSpec
 
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_store import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.features import BOUNDS, GYM_ID, OBSERVATION_KEYS, STATE
-from copolicy.dataset.log import read_episode
 from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.task import Physics
+from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.physics import Physics
 
 
 def run(*arguments: object) -> None:

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from copolicy.collect.world import TableWorld
-from copolicy.convert.frames import frame_columns
+from copolicy.convert.lerobot.frames import frame_columns
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import FEATURES, environment_state
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 CONFIG = MAP_SETS["training"][5]
 

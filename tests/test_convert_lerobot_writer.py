@@ -10,14 +10,14 @@ import pytest
 import torch
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from copolicy.collect.world import TableWorld
-from copolicy.convert.lerobot_writer import write_dataset
-from copolicy.convert.prepare import Conversion, prepare_episode
+from copolicy.convert.lerobot.prepare import Conversion, prepare_episode
+from copolicy.convert.lerobot.writer import write_dataset
 from copolicy.dataset.episode import EPISODE_COLUMNS, Episode, EpisodeMeta
 from copolicy.dataset.exceptions import OutputExistsError, RunError
 from copolicy.dataset.features import FEATURES, TASK
 from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 
 def play(index: int, steps: int) -> Episode:
@@ -167,7 +167,7 @@ def test_without_lerobot_the_extra_is_named():
         "import sys; sys.modules['lerobot'] = None\n"
         "from copolicy.convert.cli import main\n"
         "from copolicy.dataset.exceptions import MissingExtraError\n"
-        "try:\n    import copolicy.convert.lerobot_writer\n"
+        "try:\n    import copolicy.convert.lerobot.writer\n"
         "except MissingExtraError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -13,8 +13,8 @@ from loaded_sets import assert_same_frames, assert_same_statistics, load
 from copolicy.convert.cli import main
 from copolicy.convert.merge import merging
 from copolicy.dataset.checks.checking import check_dataset
-from copolicy.dataset.exclusions import exclude, excluded_episodes
-from copolicy.dataset.minimal_card import is_minimal_card
+from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
+from copolicy.dataset.publication.minimal_card import is_minimal_card
 from copolicy.dataset.versions.content import read_content
 
 PEOPLE = {

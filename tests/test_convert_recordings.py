@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.world import TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.convert.cli import main
-from copolicy.convert.frames import frame_columns
+from copolicy.convert.lerobot.frames import frame_columns
 from copolicy.dataset.episode import EPISODE_COLUMNS, EpisodeMeta
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 
 def record(path: Path, index: int, discarded: bool = False, **columns) -> Path:

@@ -6,8 +6,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from copolicy.convert.restricted_npz import load_npz
-from copolicy.convert.restricted_pickle import load_pickle
+from copolicy.convert.upstream.restricted_npz import load_npz
+from copolicy.convert.upstream.restricted_pickle import load_pickle
 from copolicy.dataset.exceptions import FileFormatError
 
 VALUES = [

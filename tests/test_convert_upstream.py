@@ -25,13 +25,13 @@ from upstream_files import (
 )
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream_episode import UpstreamOptions
-from copolicy.convert.upstream_processed import read_processed
-from copolicy.convert.upstream_raw import read_raw
-from copolicy.convert.upstream_zarr import ZarrStore
+from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.processed import read_processed
+from copolicy.convert.upstream.raw import read_raw
+from copolicy.convert.upstream.zarr import ZarrStore
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.physics_text import physics_of
-from copolicy.dataset.task import Physics
+from copolicy.tasks.table.physics import Physics
 
 
 @pytest.mark.parametrize("number", EPISODES)

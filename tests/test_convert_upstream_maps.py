@@ -18,15 +18,17 @@ from upstream_files import (
     zarr_places,
 )
 
-from copolicy.collect.reward import reward
 from copolicy.convert.cli import main
-from copolicy.convert.upstream_map import check_by_path, check_by_rewards
-from copolicy.convert.upstream_processed import read_processed
-from copolicy.convert.upstream_raw import read_raw
-from copolicy.convert.upstream_zarr import ZarrStore
+from copolicy.convert.upstream.maps import check_by_path, check_by_rewards
+from copolicy.convert.upstream.processed import read_processed
+from copolicy.convert.upstream.raw import read_raw
+from copolicy.convert.upstream.zarr import ZarrStore
 from copolicy.dataset.checks.checking import check_dataset
-from copolicy.dataset.exclusions import excluded_episodes, include
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.dataset.lerobot_folder.exclusions import excluded_episodes, include
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.reward import reward
 
 
 def test_a_processed_file_with_another_map_is_noticed_and_set_right(examples):

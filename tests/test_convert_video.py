@@ -16,17 +16,17 @@ from PIL import Image
 from video_difference import video_difference
 
 from copolicy.convert.cli import main
-from copolicy.convert.lerobot_writer import write_dataset
-from copolicy.convert.prepare import Conversion, prepare_episode
-from copolicy.convert.scene_pictures import scene_pictures
-from copolicy.convert.scene_video import SCENE, parse_size, scene_clip
+from copolicy.convert.lerobot.prepare import Conversion, prepare_episode
+from copolicy.convert.lerobot.writer import write_dataset
+from copolicy.convert.video.scene_pictures import scene_pictures
+from copolicy.convert.video.scene_video import SCENE, parse_size, scene_clip
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.exclusions import exclude, excluded_episodes
 from copolicy.dataset.features import STATE
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
+from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.versions.content import read_content
+from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.train.cli import main as train
 
 SIZE = (160, 80)

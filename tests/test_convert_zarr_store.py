@@ -13,11 +13,11 @@ import zarr
 from numcodecs.registry import get_codec
 from zarr.codecs import BloscCodec, GzipCodec
 
-from copolicy.convert import zarr_store
 from copolicy.convert.cli import main
-from copolicy.convert.upstream import open_upstream
-from copolicy.convert.upstream_episode import UpstreamOptions
-from copolicy.convert.zarr_store import ZarrArrays
+from copolicy.convert.upstream import zarr_store
+from copolicy.convert.upstream.conversion import open_upstream
+from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.zarr_store import ZarrArrays
 from copolicy.dataset.exceptions import FileFormatError
 
 LZ4 = {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1, "blocksize": 0}

@@ -8,16 +8,17 @@ import pytest
 import torch
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.world import TableWorld
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
-from copolicy.dataset.task import MAP_SETS, Physics
-from copolicy.train.coplan import coplan
-from copolicy.train.eval_cli import main
-from copolicy.train.planner import Planner
-from copolicy.train.study import success_rate
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.coplan.rollouts import coplan
+from copolicy.evaluate.planner import Planner
+from copolicy.evaluate.summary import success_rate
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 
 def _demonstration(config, seed):

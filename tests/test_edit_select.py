@@ -10,15 +10,15 @@ from checked_data import contents, make_data_set, make_recordings, set_columns
 from edited_data import columns, digests, episode_statistics, info, load, make_people, split_files
 from lerobot.datasets.compute_stats import aggregate_stats
 
-from copolicy.convert.scene_video import SCENE
+from copolicy.convert.video.scene_video import SCENE
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
 from copolicy.dataset.edit.select import select
 from copolicy.dataset.edit.selection import Selection
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.exclusions import exclude
 from copolicy.dataset.features import ACTION
-from copolicy.dataset.minimal_card import is_minimal_card
+from copolicy.dataset.lerobot_folder.exclusions import exclude
+from copolicy.dataset.publication.minimal_card import is_minimal_card
 from copolicy.dataset.versions.content import read_content
 
 VIDEO = ("--no-drift", "--video", "--video-size", "160x80")

@@ -17,8 +17,8 @@ from copolicy.dataset.edit.subset import replace_folder
 from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.withdrawal.withdraw import withdraw
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.dataset.log import read_metadata
-from copolicy.dataset.minimal_card import is_minimal_card
+from copolicy.dataset.publication.minimal_card import is_minimal_card
+from copolicy.dataset.recording.log import read_metadata
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.manifest import Manifest, file_entry
 from copolicy.dataset.versions.release import release

@@ -13,8 +13,7 @@ from lerobot.envs import make_env
 from lerobot.envs.factory import make_env_pre_post_processors
 from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 
-from copolicy.collect.world import TableWorld
-from copolicy.convert.scene_pictures import scene_pictures
+from copolicy.convert.video.scene_pictures import scene_pictures
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import (
     ACTION,
@@ -27,7 +26,8 @@ from copolicy.dataset.features import (
     environment_state,
 )
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.env.configuration_table_carrying import TableCarryingEnvConfig
 from lerobot_policy_copolicy.env.table_carrying import TableCarryingEnv

@@ -13,9 +13,9 @@ from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.policies.factory import make_pre_post_processors
 from lerobot.scripts import lerobot_eval
 
-from copolicy.convert.scene_pictures import scene_pictures
+from copolicy.convert.video.scene_pictures import scene_pictures
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, SCENE_IMAGE, STATE
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
 
 pytestmark = pytest.mark.filterwarnings("ignore:pkg_resources is deprecated")
 

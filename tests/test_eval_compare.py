@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from copolicy.train.comparison.paired import base_map, clustered_mean, mcnemar_exact, welch
-from copolicy.train.eval_cli import main
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.comparison.paired import base_map, clustered_mean, mcnemar_exact, welch
 
 
 def _write(path, successes, *, weights="", seconds=20.0, force=0.1, study="coplan", partner=None, **settings):

@@ -14,20 +14,20 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.session import recordings
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MapConfig
-from copolicy.train.eval_cli import main
-from copolicy.train.human_study.latin_square import williams_square
-from copolicy.train.human_study.plan import Robot, StudyPlan, make_plan
-from copolicy.train.human_study.questionnaire import read_ratings
-from copolicy.train.human_study.repeated_measures import anova, rank_test, tukey
-from copolicy.train.human_study.schedule import BlindPlanner
-from copolicy.train.human_study.session import run_session
-from copolicy.train.human_study.summary import summarise_study
-from copolicy.train.partner_study.configurations import study_configurations
-from copolicy.train.result_file import write_json
+from copolicy.dataset.recording.log import read_episode
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.human_study.latin_square import williams_square
+from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan
+from copolicy.evaluate.human_study.questionnaire import read_ratings
+from copolicy.evaluate.human_study.repeated_measures import anova, rank_test, tukey
+from copolicy.evaluate.human_study.schedule import BlindPlanner
+from copolicy.evaluate.human_study.session import run_session
+from copolicy.evaluate.human_study.summary import summarise_study
+from copolicy.evaluate.partner_study.configurations import study_configurations
+from copolicy.evaluate.result_file import write_json
+from copolicy.tasks.table.map_config import MapConfig
 
 SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
 """Straight ahead, about a second away."""

@@ -11,18 +11,19 @@ import pytest
 from untrained_policy import save_untrained_policy
 
 from copolicy.cards.cli import main as cards
-from copolicy.collect.pilots import Habits, ScriptedPilot
-from copolicy.collect.pilots.partners import PARTNERS, simulated_partner
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
-from copolicy.dataset.task import MAP_SETS, Physics
-from copolicy.train.eval_cli import main
-from copolicy.train.partner_study.configurations import study_configurations
-from copolicy.train.partner_study.outcome import PartnerOutcome
-from copolicy.train.partner_study.robots import PolicyRobot, never_yields, passive
-from copolicy.train.partner_study.study import carry_with_partners
-from copolicy.train.partner_study.summary import differences, summarise_with_partners
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.partner_study.configurations import study_configurations
+from copolicy.evaluate.partner_study.outcome import PartnerOutcome
+from copolicy.evaluate.partner_study.robots import PolicyRobot, never_yields, passive
+from copolicy.evaluate.partner_study.study import carry_with_partners
+from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
+from copolicy.tasks.table.agents import Habits, ScriptedPilot
+from copolicy.tasks.table.agents.partners import PARTNERS, simulated_partner
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 MAPS = MAP_SETS["training"][6:84:14]
 

@@ -11,18 +11,19 @@ from matplotlib import image
 from matplotlib.colors import to_rgb
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.world import TableWorld
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import STATE
-from copolicy.dataset.routes import route_class
-from copolicy.dataset.task import MapConfig, Physics
-from copolicy.train.coplan import PlannedTable
-from copolicy.train.eval_cli import main
-from copolicy.train.planner import Planner
-from copolicy.train.plans import sample_plans
-from copolicy.train.plans_figure import save_plans
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.coplan.rollouts import PlannedTable
+from copolicy.evaluate.planner import Planner
+from copolicy.evaluate.plans.figure import save_plans
+from copolicy.evaluate.plans.sampling import sample_plans
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.routes import route_class
+from copolicy.tasks.table.world import TableWorld
 
 MAP = MapConfig((240.0, 300.0, 3.14), (960.0, 300.0), ((600.0, 300.0),))
 BLUE, VERMILION = "#0072B2", "#D55E00"

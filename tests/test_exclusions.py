@@ -20,7 +20,7 @@ from lerobot.scripts import lerobot_train
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exclusions import exclude, excluded_episodes, include
+from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes, include
 from copolicy.train.memory_training import _datasets_in_memory
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 

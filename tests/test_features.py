@@ -5,7 +5,7 @@ import pytest
 
 from copolicy.dataset import features
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
 
 
 def test_every_column_has_names_and_bounds_of_its_size():

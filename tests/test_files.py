@@ -3,7 +3,7 @@ import os
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files import broken_links, distinct, distinct_files, on_visible_files, visible_files
+from copolicy.dataset.files.listing import broken_links, distinct, distinct_files, on_visible_files, visible_files
 
 
 @pytest.fixture

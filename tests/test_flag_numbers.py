@@ -6,10 +6,10 @@ import pytest
 from command_walk import every_command
 
 from copolicy.collect.cli import main as collect
-from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number, workers
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.flag_numbers import number, seed, whole_number, workers
-from copolicy.train.eval_cli import main as evaluate
+from copolicy.evaluate.cli import main as evaluate
 from copolicy.train.quickstart import main as quickstart
 
 
@@ -56,7 +56,7 @@ def test_every_flag_of_every_command_that_takes_a_number_has_bounds():
     for command, parser in every_command().items():
         for action in parser._actions:
             assert action.type not in (int, float), f"{command} {action.option_strings}: no bounds"
-            if getattr(action.type, "__module__", "") != "copolicy.dataset.flag_numbers":
+            if getattr(action.type, "__module__", "") != "copolicy.dataset.command_line.flag_numbers":
                 continue
             found += 1
             assert callable(action.type)

@@ -13,7 +13,7 @@ from reading_commands import COMMANDS, call
 
 from copolicy.collect.inputs.calibration_store import CalibrationStore
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import kind_of
 
 KINDS = {
     "nothing": "nothing there",

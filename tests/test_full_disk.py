@@ -16,8 +16,8 @@ from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
-from copolicy.dataset.commandline import system_line
-from copolicy.dataset.staging import new_file, new_folder, replacements
+from copolicy.dataset.command_line.commands import system_line
+from copolicy.dataset.files.staging import new_file, new_folder, replacements
 from copolicy.train.cli import main as train
 
 

@@ -13,9 +13,9 @@ from training_table import flags
 from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
 from copolicy.collect.session import recordings
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
-from copolicy.convert.upstream import open_upstream
+from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.hub.raw_recordings import find_raw_recordings

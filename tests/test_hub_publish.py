@@ -23,7 +23,7 @@ from hub_user import Done, HubUser
 from local_hub import READ_TOKEN, TOKEN, LocalHub, Repository
 from versioned_data_set import EPISODES, FRAMES, keep_episodes, set_value, simulated_data_set
 
-from copolicy.dataset.exclusions import exclude
+from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.release import release
 

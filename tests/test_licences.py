@@ -6,8 +6,8 @@ from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.licences import LICENCES, checked_licence, licence_identifier
-from copolicy.train.eval_cli import main as evaluate
+from copolicy.dataset.publication.licences import LICENCES, checked_licence, licence_identifier
+from copolicy.evaluate.cli import main as evaluate
 
 SPELLINGS = {
     "CC-BY-4.0": "cc-by-4.0", "CC BY 4.0": "cc-by-4.0", "cc_by_4.0": "cc-by-4.0", "cc-by-4": "cc-by-4.0",

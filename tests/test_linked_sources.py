@@ -12,7 +12,7 @@ from loaded_sets import load
 from copolicy.collect.cli import main as collect
 from copolicy.collect.session import SessionFolder, recordings
 from copolicy.convert.cli import main as convert
-from copolicy.convert.upstream import open_upstream
+from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import CopolicyError

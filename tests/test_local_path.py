@@ -6,7 +6,7 @@ import pytest
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.local_path import named_on_hub, require_hub_name
+from copolicy.dataset.files.local_path import named_on_hub, require_hub_name
 from copolicy.train.cli import main as train
 
 

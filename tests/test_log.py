@@ -13,16 +13,18 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.episode_records import decode_physics
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.features import state_vector
-from copolicy.dataset.log import read_episode, read_metadata
-from copolicy.dataset.messages.copolicy_pb2 import PlayerAction, TableState
 from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.dataset.recording.episode_records import decode_physics
+from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerAction, TableState
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
 
 MAP = MapConfig((240.0, 120.0, 3.14), (960.0, 180.0), ((480.0, 300.0), (0.1 + 0.2, 420.0)), 45)
 META = EpisodeMeta(

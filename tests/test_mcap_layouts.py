@@ -13,24 +13,24 @@ import pytest
 import zstandard
 from mcap.records import Channel, Message, Metadata, Schema
 
+from copolicy.collect.agents.replay import ReplayController
 from copolicy.collect.cli import main as collect
-from copolicy.collect.controllers.replay import ReplayController
-from copolicy.collect.episode_job import record_episode
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.recover import recover, recover_file
+from copolicy.collect.recording.recover import recover, recover_file
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.collect.replay.track import read_track
 from copolicy.collect.session import recordings
-from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError
 from copolicy.dataset.hub.raw_recordings import find_raw_recordings
-from copolicy.dataset.log import read_episode, read_metadata, read_recording
-from copolicy.dataset.mcap_chunks import LARGEST_CHUNK, chunk_records
-from copolicy.dataset.task import MAP_SETS
-from copolicy.train.human_study.recordings import study_rows
+from copolicy.dataset.recording.log import read_episode, read_metadata, read_recording
+from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, chunk_records
+from copolicy.evaluate.human_study.recordings import study_rows
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.maps import MAP_SETS
 
 LAYOUTS = {**{name: (variant, ()) for name, variant in variants.VERIFIED.items()}, **variants.UNVERIFIED}
 

@@ -18,18 +18,20 @@ from loaded_sets import load
 from copolicy.cards.cli import main as cards
 from copolicy.collect.play.player import make_players, say_other_physics
 from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.simulate import simulate
-from copolicy.collect.world import TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_store import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.features import theta_of
-from copolicy.dataset.log import read_episode
 from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 HALF, EIGHTH = Physics(), Physics(angular_acceleration_limit=math.pi / 8)
 HALF_WORDS, EIGHTH_WORDS = (f"angular acceleration up to {name} rad/s^2" for name in ("pi/2", "pi/8"))

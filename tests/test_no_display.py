@@ -10,7 +10,7 @@ from play_session import settings
 
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.sdl import NoDisplayError, init_events, open_display, pygame
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import RunError
 
 NONE = "neither DISPLAY nor WAYLAND_DISPLAY is set"

@@ -8,7 +8,7 @@ import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.physics_text import physics_counts, physics_of, physics_summary, physics_text
-from copolicy.dataset.task import Physics
+from copolicy.tasks.table.physics import Physics
 
 EIGHTH = Physics(angular_acceleration_limit=math.pi / 8)
 

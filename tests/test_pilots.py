@@ -8,16 +8,17 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from copolicy.collect.pilots import PAIRS, Habits, ScriptedPilot, grid, simulated_pair
-from copolicy.collect.pilots.clearance import square_clearance, wall_clearance
-from copolicy.collect.pilots.cost_to_go import routes
-from copolicy.collect.pilots.partner_force import PartnerForce
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import state_vector, theta_of
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.routes import route_class
-from copolicy.dataset.task import MAP_SETS, MapConfig, map_set
+from copolicy.tasks.table.agents import PAIRS, Habits, ScriptedPilot, grid, simulated_pair
+from copolicy.tasks.table.agents.clearance import square_clearance, wall_clearance
+from copolicy.tasks.table.agents.cost_to_go import routes
+from copolicy.tasks.table.agents.partner_force import PartnerForce
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS, map_set
+from copolicy.tasks.table.routes import route_class
+from copolicy.tasks.table.world import TableWorld
 
 ONE_OBSTACLE = MapConfig((240.0, 300.0, math.pi), (960.0, 300.0), ((600.0, 300.0),))
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from copolicy.collect.pilots import Habits
-from copolicy.collect.pilots.hand import UnsteadyHand
-from copolicy.collect.pilots.partners import NEVER_YIELDS
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.agents import Habits
+from copolicy.tasks.table.agents.hand import UnsteadyHand
+from copolicy.tasks.table.agents.partners import NEVER_YIELDS
 
 MINUTE = 60 * RECORD_HZ
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from copolicy.collect.recover import recover
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import LoopTiming
+from copolicy.collect.recording.recover import recover
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
 
 
 def _command(out: Path, *flags: str) -> list[str]:

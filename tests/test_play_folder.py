@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from copolicy.collect.play.settings import PilotSpec, PlaySettings
-from copolicy.collect.recorder import EpisodeRecorder
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.collect.session import Balance, CollectionLock, Counts, SessionFolder
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
-from copolicy.dataset.task import MAP_SETS, identify
+from copolicy.tasks.table.maps import MAP_SETS, identify
+from copolicy.tasks.table.world import TableWorld
 
 FIXED = {"maps": "training", "seed": 0}
 _AN_ID = "letters, digits, '.', '_' or '-' (an id, no name of a person)"

@@ -7,12 +7,12 @@ import pytest
 from mcap.reader import make_reader
 from play_session import on_short_map, settings
 
-from copolicy.collect.controllers import Reading
+from copolicy.collect.agents import Reading
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.ticker import DT_NS
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
 
 SCRIPTED = (PilotSpec("scripted", "S01"), PilotSpec("scripted", "S01"))
 

@@ -9,15 +9,16 @@ import pytest
 from mcap.reader import make_reader
 from untrained_policy import save_untrained_policy
 
+from copolicy.collect.agents.checkpoint import Checkpoint
+from copolicy.collect.agents.policy import PolicyController
 from copolicy.collect.cli import main
-from copolicy.collect.controllers.checkpoint import Checkpoint
-from copolicy.collect.controllers.policy import PolicyController
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
-from copolicy.dataset.task import MAP_SETS, MapConfig
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 MAP = MAP_SETS["training"][0]
 
@@ -167,8 +168,8 @@ def test_a_folder_without_a_checkpoint_is_named(tmp_path):
 
 
 def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_path, capsys):
-    from copolicy.collect.recorder import EpisodeRecorder
-    from copolicy.collect.wall_clock import WallClockAnchor
+    from copolicy.collect.recording.recorder import EpisodeRecorder
+    from copolicy.collect.recording.wall_clock import WallClockAnchor
     from copolicy.dataset.episode import EpisodeMeta
 
     # A recorded human who pulls hard: the episode is over in seconds, whatever an untrained policy does.

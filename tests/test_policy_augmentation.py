@@ -5,7 +5,6 @@ import math
 import numpy as np
 import torch
 
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.features import (
     ACTION,
     ENVIRONMENT_STATE,
@@ -14,7 +13,9 @@ from copolicy.dataset.features import (
     environment_state,
     map_of,
 )
-from copolicy.dataset.task import MAP_SETS, MapConfig
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 from lerobot_policy_copolicy.copolicy.augmentation import mirror, permute_obstacles
 
 ALL = torch.tensor([True])

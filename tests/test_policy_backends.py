@@ -13,19 +13,19 @@ import torch
 from lerobot.configs import PreTrainedConfig
 from small_policies import MLP, TRANSFORMER, columns, lively_policy
 
-from copolicy.collect.controllers.checkpoint import Checkpoint
+from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from lerobot_policy_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy import fastest_backend
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
-from lerobot_policy_copolicy.copolicy.fast_mlp import FastMlp
-from lerobot_policy_copolicy.copolicy.fast_planner import FastPlanner
-from lerobot_policy_copolicy.copolicy.fast_transformer import FastTransformer
+from lerobot_policy_copolicy.copolicy.fast import fastest_backend
+from lerobot_policy_copolicy.copolicy.fast.mlp import FastMlp
+from lerobot_policy_copolicy.copolicy.fast.numba_kernels import gelu, transformer
+from lerobot_policy_copolicy.copolicy.fast.onnx_denoiser import OnnxDenoiser, denoiser_graph
+from lerobot_policy_copolicy.copolicy.fast.packed_weights import LANES, OUTPUTS, pack
+from lerobot_policy_copolicy.copolicy.fast.planner import FastPlanner
+from lerobot_policy_copolicy.copolicy.fast.transformer import FastTransformer
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-from lerobot_policy_copolicy.copolicy.numba_kernels import gelu, transformer
-from lerobot_policy_copolicy.copolicy.onnx_denoiser import OnnxDenoiser, denoiser_graph
-from lerobot_policy_copolicy.copolicy.packed_weights import LANES, OUTPUTS, pack
 
 NETWORKS = {"transformer": {**TRANSFORMER, "n_layers": 3}, "mlp": MLP}
 

@@ -10,8 +10,8 @@ from small_policies import MLP, OBSERVATIONS, TRANSFORMER, columns, lively_polic
 from copolicy.dataset.exceptions import InvalidValueError
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
-from lerobot_policy_copolicy.copolicy.fast_mlp import FastMlp
-from lerobot_policy_copolicy.copolicy.fast_transformer import FastTransformer
+from lerobot_policy_copolicy.copolicy.fast.mlp import FastMlp
+from lerobot_policy_copolicy.copolicy.fast.transformer import FastTransformer
 
 SAMPLERS = [("ddpm", 100), ("ddpm", 34), ("ddim", 10), ("dpmsolver++", 10)]
 PAPER = {"n_layers": 8, "width": 256, "n_heads": 4, "feedforward_width": 1024}

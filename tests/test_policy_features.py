@@ -14,7 +14,7 @@ from copolicy.dataset.features import (
     environment_state,
     state_vector,
 )
-from copolicy.dataset.task import MapConfig
+from copolicy.tasks.table.map_config import MapConfig
 from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
 from lerobot_policy_copolicy.copolicy.range_scan import RANGE, RAYS, RangeScan
 

@@ -8,7 +8,7 @@ from diffusers.schedulers.scheduling_dpmsolver_multistep import DPMSolverMultist
 from copolicy.dataset.exceptions import UnknownNameError
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.diffusion import PlanDiffusion
-from lerobot_policy_copolicy.copolicy.sampler_table import SamplerTable, trailing_timesteps
+from lerobot_policy_copolicy.copolicy.fast.sampler_table import SamplerTable, trailing_timesteps
 
 PREDICTIONS = ("epsilon", "sample", "v_prediction")
 

@@ -12,19 +12,19 @@ from PIL import Image, ImageSequence
 from play_session import SHORT_MAP, settings
 from safetensors import safe_open
 
+from copolicy.collect.agents.checkpoint import Checkpoint
+from copolicy.collect.agents.checkpoint_folder import checkpoint_folder, pretrained_folder
 from copolicy.collect.cli import main as collect
-from copolicy.collect.controllers.checkpoint import Checkpoint
-from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder, pretrained_folder
 from copolicy.collect.demonstration.episode import demonstrate
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.session import Balance
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state, state_vector
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode
+from copolicy.evaluate.cli import main as evaluate
+from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.train.cli import main as train
-from copolicy.train.eval_cli import main as evaluate
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "train" / "lerobot_policy_copolicy" / "pretrained"
@@ -85,7 +85,7 @@ def test_an_installation_without_it_is_told_so(tmp_path):
     package.mkdir()
     (package / "__init__.py").touch()
     code = """
-from copolicy.collect.controllers.checkpoint_folder import pretrained_folder
+from copolicy.collect.agents.checkpoint_folder import pretrained_folder
 from copolicy.dataset.exceptions import FileFormatError
 try:
     pretrained_folder()

@@ -19,14 +19,14 @@ from mcap.records import Attachment, Chunk, DataEnd, Header, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError, ShapeError
-from copolicy.dataset.log import read_episode, read_metadata
-from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 MAP = MAP_SETS["training"][6]
 META = EpisodeMeta("uuid-1", pair_id="S01", source="simulated")
@@ -334,8 +334,8 @@ def test_one_end_and_nothing_after_it(tmp_path):
 
 KILLED = """
 import sys, time
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.wall_clock import WallClockAnchor
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.task import MAP_SETS
 

@@ -20,15 +20,15 @@ from mcap.stream_reader import StreamReader
 from mcap_variants import library_records, write
 
 from copolicy.collect.cli import main
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.recover import recover, recover_file
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import TableWorld
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.recover import recover, recover_file
+from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.log import read_episode, read_metadata
-from copolicy.dataset.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput, TableState
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput, TableState
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 MAP = MAP_SETS["training"][6]
 META = EpisodeMeta(
@@ -334,7 +334,7 @@ def test_damaged_finished_recordings_are_reported_and_only_on_request_recovered(
 
 RECORDING = """
 import sys, time
-from copolicy.collect.recorder import EpisodeRecorder
+from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.task import MAP_SETS
 

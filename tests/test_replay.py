@@ -24,7 +24,8 @@ from copolicy.collect.replay.viewer import Viewer
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, OutputExistsError
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.task import MapConfig, Physics
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
 
 
 @pytest.fixture(scope="module")

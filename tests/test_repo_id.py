@@ -11,7 +11,7 @@ from copolicy.cards.cli import main as cards
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.repo_id import checked_repo_id, local_repo_id, repo_id_problem
+from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id, repo_id_problem
 from copolicy.train.cli import main as train
 
 REFUSED = ["me/a..b", "me/x.git", "me/a--b", "me/täble", "me/" + "x" * 97, "me/.a", "me/a-", "me/a b", "a/b/c", "table"]

@@ -3,8 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from copolicy.dataset.routes import route_class, winding
-from copolicy.dataset.task import MapConfig
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.routes import route_class, winding
 
 
 def _path(*points):

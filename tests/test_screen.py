@@ -7,7 +7,7 @@ import pytest
 
 from copolicy.collect.inputs import Command, Press
 from copolicy.collect.play.menu import BACK, Menu
-from copolicy.collect.screen import SIZE, Canvas, TableView, between, draw_text, letterbox, palette, text_size
+from copolicy.collect.screen import SIZE, Canvas, draw_text, palette, text_size
 from copolicy.collect.screen.dialogs import (
     HELP,
     Line,
@@ -19,7 +19,8 @@ from copolicy.collect.screen.dialogs import (
 )
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.task import MapConfig
+from copolicy.tasks.table.artist.table_view import TableView, between, letterbox
+from copolicy.tasks.table.map_config import MapConfig
 
 MAP = MapConfig(start=(240.0, 300.0, 0.0), goal=(960.0, 180.0), obstacles=((600.0, 450.0),))
 

@@ -14,18 +14,21 @@ import numpy as np
 import pytest
 
 from copolicy.collect.cli import main
-from copolicy.collect.episode_job import record_episode
-from copolicy.collect.pilots import PAIRS
-from copolicy.collect.recipes import RECIPES, Recipe
-from copolicy.collect.schedule import balanced_schedule
-from copolicy.collect.simulate import simulate
-from copolicy.collect.start_pose import displaced_start
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.collect.world import RUNNING, TableWorld
+from copolicy.collect.recording.wall_clock import WallClockAnchor
+from copolicy.collect.simulate.command import simulate
+from copolicy.collect.simulate.episode_job import record_episode
+from copolicy.collect.simulate.recipes import RECIPES, Recipe
+from copolicy.collect.simulate.schedule import balanced_schedule
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics, identify
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.task import RUNNING
+from copolicy.tasks.table.agents import PAIRS
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS, identify
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.start_pose import displaced_start
+from copolicy.tasks.table.world import TableWorld
 
 STARTED_NS = 1_700_000_000_000_000_000
 SHORT = Physics(step_limit=60)

@@ -4,7 +4,7 @@ import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.staging import about, new_file, new_folder, replacement, require_new
+from copolicy.dataset.files.staging import about, new_file, new_folder, replacement, require_new
 
 
 def names(folder):

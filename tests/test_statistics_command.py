@@ -7,11 +7,11 @@ from constructed_pairs import FREE, TWO, carried_set, row, still, trajectories, 
 
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main
-from copolicy.dataset.commandline import _lines
+from copolicy.dataset.command_line.commands import _lines
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.routes import route_class
 from copolicy.dataset.statistics.command import STATISTICS_FILE, summary, write_document
 from copolicy.dataset.statistics.reading import read_trajectories
+from copolicy.tasks.table.routes import route_class
 
 FAMILIES = [
     "routes", "paths", "actions", "visitation", "leadership", "forces", "activity", "smoothness", "distances", "pairs",

@@ -9,7 +9,7 @@ import pytest
 from copolicy.dataset.statistics.command import summary
 from copolicy.dataset.statistics.compute import compute_statistics
 from copolicy.dataset.statistics.trajectories import EpisodeRow, Trajectories
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
 
 
 def _data(lengths, success=True, obstacles=True, pairs=1, idle=False, still=False) -> Trajectories:

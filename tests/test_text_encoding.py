@@ -10,9 +10,9 @@ import pytest
 from versioned_data_set import simulated_data_set
 
 from copolicy.dataset.cli import main
-from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.text_files import read_older_text, read_text
+from copolicy.dataset.files.text_files import read_older_text, read_text
 
 
 def test_a_byte_order_mark_is_no_letter(tmp_path):

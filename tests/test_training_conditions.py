@@ -15,17 +15,18 @@ from lerobot.datasets import LeRobotDatasetMetadata
 from training_table import flags, write_table
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.controllers import PolicyController
-from copolicy.collect.controllers.training_conditions import TrainingConditions, training_conditions
+from copolicy.collect.agents import PolicyController
+from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.collect.play.command import _angular_limit
 from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.world import TableWorld
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.task import MAP_SETS, Physics
+from copolicy.evaluate.cli import main as evaluate
+from copolicy.evaluate.human_study.plan import StudyPlan
+from copolicy.evaluate.study_flags import protocol_of
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 from copolicy.train.cli import main as train
-from copolicy.train.eval_cli import main as evaluate
-from copolicy.train.human_study.plan import StudyPlan
-from copolicy.train.study_flags import protocol_of
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 from lerobot_policy_copolicy.copolicy.training_data import record_conditions

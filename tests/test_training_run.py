@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from copolicy.cards.checkpoint import Checkpoint as CardCheckpoint
-from copolicy.collect.controllers.checkpoint_folder import checkpoint_folder
+from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.training_run import find_policy_folder
+from copolicy.dataset.policies.training_run import find_policy_folder
 
 
 def _checkpoint(folder: Path) -> Path:

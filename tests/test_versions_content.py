@@ -20,7 +20,7 @@ from versioned_data_set import (
 )
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.exclusions import exclude
+from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.versions.canonical import digest, encode
 from copolicy.dataset.versions.content import Content, EpisodeContent, read_content
 

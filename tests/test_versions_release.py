@@ -17,7 +17,7 @@ from versioned_data_set import (
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
-from copolicy.dataset.exclusions import exclude
+from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.versions.changelog import with_release
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.data_version import DataVersion, newest

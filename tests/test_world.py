@@ -5,12 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.collect.reward import reward
-from copolicy.collect.table import CIRCLE_CENTRE, TRIANGLE, image_size, on_screen
-from copolicy.collect.world import Contact, Outcome, TableWorld
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.dataset.task import Outcome
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.outline import CIRCLE_CENTRE, TRIANGLE, image_size, on_screen
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.reward import reward
+from copolicy.tasks.table.world import Contact, TableWorld
 
 EMPTY = MapConfig(start=(300.0, 300.0, 0.0), goal=(960.0, 300.0))
 STILL = (0.0, 0.0, 0.0, 0.0)

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.collect.world import TableWorld
-from copolicy.convert.upstream_episode import UpstreamOptions
-from copolicy.convert.upstream_processed import read_processed
-from copolicy.convert.upstream_raw import read_raw
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics
+from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.processed import read_processed
+from copolicy.convert.upstream.raw import read_raw
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 OPTIONS = UpstreamOptions()
 EPISODES = (1, 2, 3, 4, 8, 11)

@@ -22,15 +22,15 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 
 import numpy as np
 
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.world import TableWorld
-from copolicy.convert.frames import frame_columns
-from copolicy.convert.prepare import Conversion
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.prepare import Conversion
 from copolicy.convert.recordings import convert_recordings
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.features import FEATURES, TASK
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.world import TableWorld
 
 
 def record(folder: Path, episodes: int, steps: int) -> None:
@@ -99,7 +99,7 @@ def main() -> None:
     logging.disable(logging.WARNING)  # eighty lines about video codecs
     warnings.filterwarnings("ignore")
     importlib.import_module("lerobot.datasets.lerobot_dataset")
-    importlib.import_module("copolicy.convert.lerobot_writer")
+    importlib.import_module("copolicy.convert.lerobot.writer")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         recordings = folder / "recordings"

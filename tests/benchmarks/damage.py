@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from copolicy.collect.episode_job import record_episode
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.recover import recover_file
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.dataset.commandline import progress
+from copolicy.collect.recording.recover import recover_file
+from copolicy.collect.recording.wall_clock import WallClockAnchor
+from copolicy.collect.simulate.episode_job import record_episode
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.maps import MAP_SETS
 
 RESULT_COLUMNS = (
     "success", "termination_reason", "duration_s", "route_class", "quality_flags", "source_sha256", "replay_drift_px",

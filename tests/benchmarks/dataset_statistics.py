@@ -21,8 +21,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from constructed_pairs import carried, row, trajectories, write_folder
 
-from copolicy.dataset.map_config import MapConfig
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
 
 FRAMES, FPS = 480, 30
 

@@ -29,11 +29,12 @@ from pathlib import Path
 
 import numpy as np
 
-from copolicy.dataset.commandline import progress_bar
-from copolicy.dataset.routes import route_class
-from copolicy.dataset.task import MAP_SETS, Physics
-from copolicy.train.coplan import Outcome, coplan
-from copolicy.train.planner import Planner
+from copolicy.dataset.command_line.commands import progress_bar
+from copolicy.evaluate.coplan.rollouts import Outcome, coplan
+from copolicy.evaluate.planner import Planner
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.routes import route_class
 
 REFERENCE = ("ddpm", 100)
 SAMPLERS = [(name, steps) for name in ("ddim", "dpmsolver++") for steps in (10, 8, 5)]

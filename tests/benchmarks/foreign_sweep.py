@@ -21,12 +21,12 @@ from damaged_files import damage_one, sound
 from foreign_files import FOREIGN
 from reading_commands import COMMANDS, call
 
-from copolicy.collect.episode_job import record_episode
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.wall_clock import WallClockAnchor
-from copolicy.dataset.commandline import progress
+from copolicy.collect.recording.wall_clock import WallClockAnchor
+from copolicy.collect.simulate.episode_job import record_episode
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.maps import MAP_SETS
 
 SOUND = {("collect recover", kind) for kind in ("empty folder", "recordings of another project")}
 """Calls that rightly pass: nothing below these folders broke off."""

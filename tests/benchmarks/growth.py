@@ -26,8 +26,8 @@ from pathlib import Path
 
 import psutil
 
-from copolicy.collect.simulate import simulate
-from copolicy.dataset.log import read_episode, read_metadata
+from copolicy.collect.simulate.command import simulate
+from copolicy.dataset.recording.log import read_episode, read_metadata
 
 PART = 1000
 _CONVERT = "from copolicy.convert.cli import main; raise SystemExit(main())"

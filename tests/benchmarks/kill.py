@@ -27,11 +27,12 @@ import numpy as np
 from copolicy.collect.play import trial
 from copolicy.collect.play.session_run import play
 from copolicy.collect.play.settings import PilotSpec, PlaySettings
-from copolicy.collect.recorder import EpisodeRecorder
-from copolicy.collect.recover import recover
-from copolicy.dataset.commandline import progress
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.task import RECORD_HZ, Physics
+from copolicy.collect.recording.recorder import EpisodeRecorder
+from copolicy.collect.recording.recover import recover
+from copolicy.dataset.command_line.commands import progress
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.physics import Physics
 
 EPISODE_STEPS = 150
 

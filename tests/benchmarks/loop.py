@@ -143,7 +143,7 @@ def _read(out: Path, hands: _Hands) -> dict:
     from mcap.reader import make_reader
 
     from copolicy.collect.ticker import DT_NS
-    from copolicy.dataset.messages.copolicy_pb2 import LoopTiming, PlayerInput
+    from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
 
     periods, work, late, latency, skipped, steps = [], [], [], [], 0, 0
     counts = np.array(sorted(hands.set_ns))

@@ -27,7 +27,7 @@ import torch
 from lerobot.configs import FeatureType, PolicyFeature
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, environment_state
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 

@@ -9,11 +9,12 @@ import argparse
 
 import numpy as np
 
-from copolicy.collect.world import TableWorld
-from copolicy.dataset.task import MapConfig, Physics
-from copolicy.train.coplan import coplan
-from copolicy.train.planner import Planner
-from copolicy.train.study import success_rate
+from copolicy.evaluate.coplan.rollouts import coplan
+from copolicy.evaluate.planner import Planner
+from copolicy.evaluate.summary import success_rate
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 _APART = 50.0  # px, so that obstacles do not overlap
 

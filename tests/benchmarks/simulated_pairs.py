@@ -18,21 +18,21 @@ from pathlib import Path
 
 import numpy as np
 
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.pilots.clearance import square_clearance
-from copolicy.collect.recipes import RECIPES, Recipe
-from copolicy.collect.simulate import simulate
+from copolicy.collect.simulate.command import simulate
+from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.dataset import clock
-from copolicy.dataset.commandline import progress
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.features import theta_of
-from copolicy.dataset.log import read_episode
+from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.statistics.estimate import Estimate
 from copolicy.dataset.statistics.human_routes import human_distance
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import EpisodeRow, Trajectories
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.agents.clearance import square_clearance
 
 FPS = 10
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75)

@@ -15,10 +15,12 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
 
-from copolicy.collect.pilots import simulated_pair
-from copolicy.collect.table import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, IMAGE_SIZE, TRIANGLE
-from copolicy.collect.world import TableWorld
-from copolicy.dataset.task import GOAL_SIZE, MAP_SETS, MapConfig
+from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, IMAGE_SIZE, TRIANGLE
+from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.tasks.table.world import TableWorld
 
 STEPS = 40_000
 ROUNDS = 5

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset import json_file
 from copolicy.dataset.checks.stored_check import CHECK_FILE, Validity, content_hash, validity
-from copolicy.dataset.documents import (
+from copolicy.dataset.files import json_file
+from copolicy.dataset.lerobot_folder.documents import (
     RELEASE_FILE,
     STATISTICS_FILE,
     CheckDocument,
@@ -53,7 +53,7 @@ def read_json(path: Path, kind: type = dict, what: str = "a JSON object") -> dic
     """The object in a JSON file, or None where there is no such file.
 
     Args:
-        kind: the type that it must have (`copolicy.dataset.documents`).
+        kind: the type that it must have (`copolicy.dataset.lerobot_folder.documents`).
 
     Raises:
         FileFormatError: there is a file, and it holds something else.

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.json_file import require_type
-from copolicy.dataset.policy_documents import (
+from copolicy.dataset.files.json_file import require_type
+from copolicy.dataset.policies.documents import (
     EvaluationDocument,
     KeptEvaluationsDocument,
     PolicyConfigDocument,
     RecipeDocument,
     TrainingDocument,
 )
-from copolicy.dataset.training_run import find_policy_folder
+from copolicy.dataset.policies.training_run import find_policy_folder
 
 from .artefacts import read_json
 from .facts import DatasetFacts

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from copolicy.dataset.commandline import command_parser, run
+from copolicy.dataset.command_line.commands import command_parser, run
 
 from .commands import add_dataset_command, add_model_command
 from .report import add_report_command

@@ -3,13 +3,13 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.extras import FIGURES, HUB, TABLES
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.extras import FIGURES, HUB, TABLES
-from copolicy.dataset.licences import checked_licence
-from copolicy.dataset.minimal_card import is_minimal_card
-from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
-from copolicy.dataset.staging import replace_text, require_new
+from copolicy.dataset.files.staging import replace_text, require_new
+from copolicy.dataset.publication.licences import checked_licence
+from copolicy.dataset.publication.minimal_card import is_minimal_card
+from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
 
 def add_dataset_command(commands: argparse._SubParsersAction) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
-from copolicy.dataset.files import visible_files
+from copolicy.dataset.files.listing import visible_files
 
 from .artefacts import newest_release
 from .dataset_card import PAPER, licence

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
-from copolicy.dataset.licences import checked_licence, licence_identifier
-from copolicy.dataset.minimal_card import CONFIGS
 from copolicy.dataset.physics_text import physics_counts
-from copolicy.dataset.repo_id import checked_repo_id
+from copolicy.dataset.publication.licences import checked_licence, licence_identifier
+from copolicy.dataset.publication.minimal_card import CONFIGS
+from copolicy.dataset.publication.repo_id import checked_repo_id
 
 from .artefacts import newest_release
 from .datasheet import datasheet

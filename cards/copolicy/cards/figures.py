@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from copolicy.dataset.exceptions import MissingExtraError
-from copolicy.dataset.staging import replacement
-from copolicy.dataset.task import GOAL_SIZE, WINDOW
+from copolicy.dataset.files.staging import replacement
+from copolicy.tasks.table.map_config import WINDOW
+from copolicy.tasks.table.physics import GOAL_SIZE
 
 from .facts import DatasetFacts
 from .frames import EpisodeFrames, read_frames

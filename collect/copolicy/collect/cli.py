@@ -7,17 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number, workers
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.file_kinds import kind_of
-from copolicy.dataset.files import visible_files
-from copolicy.dataset.flag_numbers import number, seed, whole_number, workers
-from copolicy.dataset.task import MAP_SETS
+from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.listing import visible_files
+from copolicy.tasks.table.maps import MAP_SETS
 
 from .demonstration.command import add_demo_command
 from .play.command import add_play_command
-from .recipes import RECIPES
 from .replay.command import add_replay_command
+from .simulate.recipes import RECIPES
 
 
 def parser() -> argparse.ArgumentParser:
@@ -95,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _simulate(arguments: argparse.Namespace) -> dict:
     # Here and below, what a command needs is loaded by it alone: `play` opens its window before anything else.
-    from .simulate import simulate
+    from .simulate.command import simulate
 
     flags = {"--seed": "seed", "--maps": "map_set", "--orientations": "orientations", "--start-noise": "start_noise",
              "--clearance": "clearance"}  # fmt: skip
@@ -109,7 +109,7 @@ def _simulate(arguments: argparse.Namespace) -> dict:
 
 
 def _recover(arguments: argparse.Namespace) -> dict:
-    from .recover import recover, summary
+    from .recording.recover import recover, summary
 
     folder = arguments.folder
     recoveries = recover(folder, finished=True, damaged=arguments.damaged)

@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import get_args
 
 from copolicy.dataset.clock import Hold
-from copolicy.dataset.commandline import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.extras import DATASETS
+from copolicy.dataset.command_line.flag_numbers import whole_number
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.extras import DATASETS
 from copolicy.dataset.features import SCENE_SIZE
-from copolicy.dataset.flag_numbers import whole_number
-from copolicy.dataset.licences import checked_licence
-from copolicy.dataset.repo_id import checked_repo_id
+from copolicy.dataset.publication.licences import checked_licence
+from copolicy.dataset.publication.repo_id import checked_repo_id
 
 from .export.command import add_export_command
+from .lerobot.prepare import Conversion
 from .merge.command import add_merge_command
-from .prepare import Conversion
 from .recordings import convert_recordings
 from .scale.command import add_scale_flags, asks_for_shards, convert_in_shards, scale_of
-from .upstream import convert_upstream
-from .upstream_episode import ANGULAR_LIMITS, UpstreamOptions
+from .upstream.conversion import convert_upstream
+from .upstream.episode import ANGULAR_LIMITS, UpstreamOptions
 
 _DEFAULT_FPS = 10
 
@@ -101,7 +101,7 @@ def _mcap(arguments: argparse.Namespace) -> dict:
     fps, hold = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.hold or "mean"
     convert = convert_recordings
     if arguments.append:
-        from .append import append_recordings, stored_clock
+        from .lerobot.append import append_recordings, stored_clock
 
         fps, hold = stored_clock(arguments.root, arguments.fps, arguments.hold)
         convert = append_recordings
@@ -126,12 +126,12 @@ def _video(arguments: argparse.Namespace) -> tuple[int, int] | None:
         raise InvalidValueError("--video-size", "--video beside it", arguments.video_size)
     if not arguments.video and not arguments.append:
         return None
-    from .scene_video import parse_size
+    from .video.scene_video import parse_size
 
     asked = parse_size(arguments.video_size) if arguments.video_size else None
     if not arguments.append:
         return asked or SCENE_SIZE
-    from .append import stored_video
+    from .lerobot.append import stored_video
 
     return stored_video(arguments.root, arguments.video, asked)
 

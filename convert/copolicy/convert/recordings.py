@@ -8,15 +8,15 @@ from importlib.metadata import version
 from pathlib import Path
 
 from copolicy.dataset.clock import stride
-from copolicy.dataset.commandline import progress
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.file_kinds import kind_of
-from copolicy.dataset.files import broken_links, distinct, distinct_files
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.staging import require_new
+from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.listing import broken_links, distinct, distinct_files
+from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.worker_pool import WorkerPool
 
-from .prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
+from .lerobot.prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
 
 _BATCH = 8  # files handed to a process at a time
 
@@ -53,7 +53,7 @@ def convert_recordings(
     notes: list[str] = []
     with _prepared(files, conversion, min(workers, len(files))) as results:
         # Imported while other processes read already.
-        from .lerobot_writer import write_dataset
+        from .lerobot.writer import write_dataset
 
         shown = progress(results, len(files), "converting")
         written = write_dataset(

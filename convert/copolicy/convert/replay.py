@@ -4,7 +4,8 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.features import theta_of
-from copolicy.dataset.task import RECORD_HZ, Physics
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.physics import Physics
 
 from .dynamics import integrate
 

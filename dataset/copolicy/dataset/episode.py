@@ -5,8 +5,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
+
 from .exceptions import InvalidValueError, ShapeError
-from .task import MapConfig, Physics
 
 Source = Literal["human", "simulated", "upstream"]
 TerminationReason = Literal[

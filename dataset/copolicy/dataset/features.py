@@ -8,8 +8,10 @@ import math
 
 import numpy as np
 
+from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW, MapConfig
+
 from .exceptions import InvalidValueError
-from .task import ACTION_NAMES, MAX_OBSTACLES, STATE_NAMES, WINDOW, MapConfig
+from .task import ACTION_NAMES, STATE_NAMES
 
 STATE = "observation.state"
 ENVIRONMENT_STATE = "observation.environment_state"

@@ -12,8 +12,9 @@ from collections.abc import Iterable
 from dataclasses import asdict, fields
 from typing import Any
 
+from copolicy.tasks.table.physics import Physics
+
 from .exceptions import InvalidValueError
-from .task import Physics
 
 UNKNOWN = "unknown"
 """What `physics_counts` calls the settings of episodes that state none."""

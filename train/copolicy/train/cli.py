@@ -10,7 +10,8 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from copolicy.dataset import commandline
+from copolicy.dataset.command_line import commands as commandline
+from copolicy.dataset.command_line.extras import TRAINING, require_packages
 from copolicy.dataset.exceptions import (
     CopolicyError,
     FileFormatError,
@@ -18,11 +19,10 @@ from copolicy.dataset.exceptions import (
     OutputExistsError,
     RunError,
 )
-from copolicy.dataset.extras import TRAINING, require_packages
-from copolicy.dataset.local_path import require_hub_name, similar_path
-from copolicy.dataset.repo_id import checked_repo_id, local_repo_id
-from copolicy.dataset.staging import about, refusal
-from copolicy.dataset.training_run import POLICY_FILES, find_policy_folder
+from copolicy.dataset.files.local_path import require_hub_name, similar_path
+from copolicy.dataset.files.staging import about, refusal
+from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
+from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
 from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.json_file import read_json
+from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.lerobot_folder.info import is_ours
-from copolicy.dataset.policy_documents import TrainingDocument
+from copolicy.dataset.policies.documents import TrainingDocument
 
 from .local_dataset import training_episodes
 

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.files import visible_files
+from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.lerobot_folder.tables import DAMAGED, damaged, read_parquet
 
 _EPISODE, _FRAME = "episode_index", "frame_index"

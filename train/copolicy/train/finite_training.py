@@ -9,7 +9,7 @@ from typing import Any
 from lerobot.configs.train import TrainPipelineConfig
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.training_run import find_policy_folder
+from copolicy.dataset.policies.training_run import find_policy_folder
 
 from .finite_data import NonFiniteError, NonFiniteLossError
 from .finite_weights import non_finite_weight

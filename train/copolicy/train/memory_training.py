@@ -12,7 +12,7 @@ from lerobot.datasets import factory as lerobot_datasets
 from lerobot.scripts import lerobot_train
 from tqdm import tqdm
 
-from copolicy.dataset.files import on_visible_files
+from copolicy.dataset.files.listing import on_visible_files
 
 from .checked_stream import CheckedStream
 from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes

@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from copolicy.collect.controllers.checkpoint_folder import pretrained_folder
-from copolicy.dataset.commandline import add_command, command_parser
+from copolicy.collect.agents.checkpoint_folder import pretrained_folder
+from copolicy.dataset.command_line.commands import add_command, command_parser
+from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.extras import POLICIES
 
 
 def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:

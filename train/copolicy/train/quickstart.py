@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from copolicy.dataset.commandline import add_common_flags, add_version_flag, run
-from copolicy.dataset.extras import FIGURES, HUB, TRAINING
-from copolicy.dataset.flag_numbers import seed, whole_number, workers
-from copolicy.dataset.staging import replace_text
+from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
+from copolicy.dataset.command_line.extras import FIGURES, HUB, TRAINING
+from copolicy.dataset.command_line.flag_numbers import seed, whole_number, workers
+from copolicy.dataset.files.staging import replace_text
 
 from .quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
 

@@ -16,8 +16,8 @@ from typing import IO
 
 from copolicy.collect.file_lock import hold
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError, RunError
-from copolicy.dataset.files import is_hidden
-from copolicy.dataset.staging import replace_text
+from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.files.staging import replace_text
 
 LOG_FILE = "quickstart.log"
 _RECORD, _LOCK = ".quickstart.json", ".quickstart.lock"

@@ -8,12 +8,12 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.documents import RELEASE_FILE
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.json_file import read_json
+from copolicy.dataset.files.json_file import read_json
+from copolicy.dataset.lerobot_folder.documents import RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
-from copolicy.dataset.policy_documents import ReachedStep, TrainingDocument
+from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"

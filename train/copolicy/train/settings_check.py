@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.flag_numbers import LARGEST_SEED
 
 _WHOLE = {
     "steps": 1,

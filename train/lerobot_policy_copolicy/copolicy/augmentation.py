@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.task import ACTION_NAMES, MAX_OBSTACLES, STATE_NAMES, WINDOW
+from copolicy.dataset.task import ACTION_NAMES, STATE_NAMES
+from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
 
 _HEIGHT = float(WINDOW[1])
 _OBSTACLES = ENVIRONMENT_NAMES.index("obstacle_0_x")

@@ -9,8 +9,8 @@ from lerobot.optim import AdamWConfig
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
 
-from .backend import AUTO, BACKENDS
 from .bounds import require_bounds
+from .fast.backend import AUTO, BACKENDS
 from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from copolicy.dataset.exceptions import UnknownNameError
 
 from .configuration_copolicy import CopolicyConfig
-from .sampler_table import SamplerTable, trailing_timesteps
+from .fast.sampler_table import SamplerTable, trailing_timesteps
 
 
 class ClippedDpmSolver(DPMSolverMultistepScheduler):

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from copolicy.dataset.features import BOUNDS, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.task import MAX_OBSTACLES
+from copolicy.tasks.table.map_config import MAX_OBSTACLES
 
 from .range_scan import RAYS, RangeScan
 

@@ -19,13 +19,13 @@ from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
 from copolicy.train.finite_weights import non_finite_weight
 
 from .augmentation import mirror, permute_obstacles
-from .backend import require_backend
 from .configuration_copolicy import CopolicyConfig
 from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
 from .diffusion import PlanDiffusion
 from .ema import ExponentialMovingAverage
-from .fast_planner import FastPlanner
+from .fast.backend import require_backend
+from .fast.planner import FastPlanner
 from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
 from .training_data import prepare_training, require_same_rate
 

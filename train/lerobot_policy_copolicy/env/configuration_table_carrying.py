@@ -20,8 +20,8 @@ from copolicy.dataset.features import (
     SCENE_SIDES,
     SCENE_SIZE,
 )
-from copolicy.dataset.maps import MAP_SETS
-from copolicy.dataset.task import Physics
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
 
 FEATURES_MAP = {**OBSERVATION_KEYS, SCENE_IMAGE: SCENE_IMAGE, ACTION: ACTION}
 """Keys of the environment, and the columns of a data set that they stand for.

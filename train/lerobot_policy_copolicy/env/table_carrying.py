@@ -8,13 +8,15 @@ import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from copolicy.collect.world import RUNNING, TableWorld
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import BOUNDS, OBSERVATION_KEYS, SCENE_SIZE, environment_state, theta_of
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.task import WINDOW, MapConfig, Physics
-from copolicy.dataset.task import map_set as maps_of
+from copolicy.dataset.task import RUNNING
+from copolicy.tasks.table.map_config import WINDOW, MapConfig
+from copolicy.tasks.table.maps import map_set as maps_of
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
 from .configuration_table_carrying import require_image_size
 
@@ -40,7 +42,7 @@ class TableCarryingEnv(gymnasium.Env):
     | pixels | {"scene": (height, width, 3) uint8}, with `pixels=True` only | observation.images.scene |
 
     ## Reward
-    Of the state that the frame ends in (`copolicy.collect.reward`).
+    Of the state that the frame ends in (`copolicy.tasks.table.reward`).
 
     ## Success
     The table touches the goal square; `info["is_success"]` tells at every step.
@@ -171,8 +173,8 @@ class TableCarryingEnv(gymnasium.Env):
         if not self.render_mode:
             return None
         # Here, because training without videos needs no pygame.
-        from copolicy.collect.screen import TableView
         from copolicy.collect.sdl import pygame
+        from copolicy.tasks.table.artist.table_view import TableView
 
         surface = pygame.Surface((WINDOW[0] // 2, WINDOW[1] // 2), depth=24)
         TableView(self.world.map_config).draw(surface, surface.get_rect(), self.world.pose, self._action.tolist())
@@ -201,20 +203,20 @@ class TableCarryingEnv(gymnasium.Env):
 
 
 def _check_pair(pair_id: str) -> None:
-    from copolicy.collect.pilots import PAIRS
+    from copolicy.tasks.table.agents import PAIRS
 
     if pair_id not in PAIRS:
         raise UnknownNameError("simulated pair", pair_id, PAIRS)
 
 
 def _simulated_human(map_config: MapConfig, pair_id: str, seed: int):
-    from copolicy.collect.pilots import simulated_pair
+    from copolicy.tasks.table.agents import simulated_pair
 
     return simulated_pair(map_config, pair_id, seed)[1]
 
 
 def _scene_image(map_config: MapConfig, size: tuple[int, int]):
-    from copolicy.collect.screen.scene_image import SceneImage
+    from copolicy.tasks.table.artist.scene_image import SceneImage
 
     return SceneImage(map_config, size)
 

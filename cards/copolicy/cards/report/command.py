@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.extras import TABLES
-from copolicy.dataset.staging import replace_text
+from copolicy.dataset.files.staging import replace_text
 
 from ..artefacts import CHECK_FILE, KeptFindings, kept_findings, stored_statistics
 
@@ -35,7 +35,7 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> dict:
-    from copolicy.dataset.staging import require_new
+    from copolicy.dataset.files.staging import require_new
 
     from ..facts import DatasetFacts
     from .page import render_page

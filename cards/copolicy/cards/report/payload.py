@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.task import GOAL_SIZE, RECORD_HZ, WINDOW
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.map_config import WINDOW
+from copolicy.tasks.table.physics import GOAL_SIZE
 
 from ..artefacts import KeptFindings, estimates, statistics_doubt
 from ..facts import DatasetFacts

@@ -5,14 +5,15 @@ import itertools
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.commandline import add_command, progress
+from copolicy.dataset.command_line.commands import add_command, progress
+from copolicy.dataset.command_line.extras import POLICIES
+from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.extras import POLICIES
-from copolicy.dataset.flag_numbers import number, seed, whole_number
-from copolicy.dataset.task import MAP_SETS, RECORD_HZ
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.agents import PAIRS
+from copolicy.tasks.table.maps import MAP_SETS
 
-from ..controllers.checkpoint_folder import PRETRAINED
-from ..pilots import PAIRS
+from ..agents.checkpoint_folder import PRETRAINED
 
 
 def add_demo_command(commands: argparse._SubParsersAction) -> None:
@@ -62,7 +63,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     if path.exists() and not arguments.overwrite:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.
-    from ..controllers.checkpoint import Checkpoint
+    from ..agents.checkpoint import Checkpoint
     from ..replay.film import save_gif
     from .episode import demonstrate
     from .pictures import SIZE, picture_count, pictures

@@ -6,12 +6,15 @@ from typing import cast
 import numpy as np
 
 from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
-from copolicy.dataset.task import MapConfig, Physics, identify
+from copolicy.dataset.task import RUNNING
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import identify
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
-from ..controllers import PolicyController, ScriptedController
-from ..controllers.policy import JointPlanner
+from ..agents import PolicyController, ScriptedController
+from ..agents.policy import JointPlanner
 from ..replay.track import Track, track_of
-from ..world import RUNNING, TableWorld
 
 
 def demonstrate(

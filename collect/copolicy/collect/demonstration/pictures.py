@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.artist.table_view import TableView
 
 from ..replay.track import Track, sampled
-from ..screen import TableView
 from ..screen.canvas import Canvas
 from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
 from ..screen.palette import MUTED, TEXT

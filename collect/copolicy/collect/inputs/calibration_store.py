@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
-from copolicy.dataset.file_kinds import kind_of
-from copolicy.dataset.staging import replace_text
+from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.staging import replace_text
 
 from .calibration import StickCalibration
 from .joysticks import Pad

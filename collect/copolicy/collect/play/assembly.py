@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from copolicy.dataset.exceptions import RunError
 
 from ..inputs import HALVES, CalibrationStore, MappingStore, Pads, user_config_folder
-from ..recover import recover
+from ..recording.recover import recover
 from ..session import CollectionLock, SessionFolder
 from .application import Application
 from .game import Game

@@ -7,11 +7,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.extras import POLICIES
+from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.extras import POLICIES
-from copolicy.dataset.flag_numbers import number, seed, whole_number
-from copolicy.dataset.task import MAP_SETS, Physics
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
 
 from .settings import PilotSpec, PlaySettings
 
@@ -120,8 +121,8 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
 def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None) -> float:
     """The limit that the policies at the table learned with; a flag wins, and is said to contradict them."""
     # What a session without a policy does without.
-    from ..controllers.checkpoint_folder import checkpoint_folder
-    from ..controllers.training_conditions import training_conditions
+    from ..agents.checkpoint_folder import checkpoint_folder
+    from ..agents.training_conditions import training_conditions
 
     given = None if flag is None else _ANGULAR_LIMITS[flag]
     learned: dict[str, float] = {}

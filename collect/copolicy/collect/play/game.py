@@ -9,13 +9,15 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ, MapConfig, identify
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.artist.table_view import TableView
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import identify
 
-from ..screen import TableView
+from ..recording.wall_clock import WallClockAnchor
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
 from ..ticker import Ticker
-from ..wall_clock import WallClockAnchor
 from .player import Player, replayed_map
 from .roster import Roster
 from .settings import PlaySettings

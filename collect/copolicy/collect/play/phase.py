@@ -2,8 +2,10 @@
 
 from enum import Enum, auto
 
+from copolicy.tasks.table.artist.table_view import between
+
 from ..inputs import Press
-from ..screen import WORLD, Canvas, between
+from ..screen import WORLD, Canvas
 from ..screen.hud import draw_hud
 from ..sdl import pygame
 from ..ticker import Tick

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.physics_text import physics_summary
-from copolicy.dataset.task import MapConfig, Physics
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
 
-from ..controllers import Controller, PersonController, PolicyController, ReplayController, ScriptedController
-from ..controllers.checkpoint import Checkpoint
+from ..agents import Controller, PersonController, PolicyController, ReplayController, ScriptedController
+from ..agents.checkpoint import Checkpoint
 from ..inputs import HALVES, KeyboardHalf, Pad
 from .settings import PilotSpec
 

@@ -1,6 +1,6 @@
 """The end of an episode: how it went, and what is to become of its recording."""
 
-from copolicy.dataset.task import WINDOW
+from copolicy.tasks.table.map_config import WINDOW
 
 from ..inputs import Command, Press
 from ..screen import Canvas

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.licences import checked_licence
-from copolicy.dataset.task import MAP_SETS, MapConfig, Physics, map_set
-
-from ..pilots import PAIRS
+from copolicy.dataset.publication.licences import checked_licence
+from copolicy.tasks.table.agents import PAIRS
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS, map_set
+from copolicy.tasks.table.physics import Physics
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 PILOT_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")

@@ -10,15 +10,17 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.messages.copolicy_pb2 import LoopTiming
-from copolicy.dataset.task import PLAYERS, RECORD_HZ, MapConfig, Physics
+from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
+from copolicy.dataset.task import PLAYERS, RECORD_HZ, RUNNING, Outcome
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.world import TableWorld
 
-from ..controllers import Controller, PersonController, PolicyController
-from ..recorder import EpisodeRecorder
+from ..agents import Controller, PersonController, PolicyController
+from ..recording.recorder import EpisodeRecorder
+from ..recording.wall_clock import WallClockAnchor
 from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
-from ..wall_clock import WallClockAnchor
-from ..world import RUNNING, Outcome, TableWorld
 
 Pose = tuple[float, float, float]
 

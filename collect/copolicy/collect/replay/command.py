@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.flag_numbers import number, whole_number
 
 _VIEWER = Path()  # `--rerun` without a file
 

@@ -9,9 +9,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.commandline import progress
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, MissingExtraError, OutputExistsError, RunError
-from copolicy.dataset.staging import new_file
+from copolicy.dataset.files.staging import new_file
 
 from ..sdl import pygame
 from .pictures import picture_count, picture_size, pictures

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.staging import new_file
+from copolicy.dataset.files.staging import new_file
 
 from ..sdl import pygame
 from .playback import Playback

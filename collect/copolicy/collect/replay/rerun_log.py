@@ -7,15 +7,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.commandline import progress
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
-from copolicy.dataset.staging import new_file, require_new
-from copolicy.dataset.task import GOAL_SIZE, PLAYERS, RECORD_HZ, WINDOW
+from copolicy.dataset.files.staging import new_file, require_new
+from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.tasks.table.artist.table_view import SEAT_POINTS, board_outline
+from copolicy.tasks.table.map_config import WINDOW
+from copolicy.tasks.table.outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from copolicy.tasks.table.physics import GOAL_SIZE
 
-from ..screen import SEAT_POINTS
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
-from ..screen.table_view import board_outline
-from ..table import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
 from .track import Pose, Track
 
 _TIMELINE = "sim_time"

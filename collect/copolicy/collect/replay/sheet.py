@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.task import PLAYERS, RECORD_HZ, WINDOW
+from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.tasks.table.map_config import WINDOW
 
 from ..screen.canvas import Canvas
 from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS

@@ -10,10 +10,9 @@ from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import theta_of
 from copolicy.dataset.interaction import interaction_force
-from copolicy.dataset.log import Recording, read_recording
+from copolicy.dataset.recording.log import Recording, read_recording
 from copolicy.dataset.task import RECORD_HZ
-
-from ..screen import between
+from copolicy.tasks.table.artist.table_view import between
 
 Pose = tuple[float, float, float]
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import theta_of
+from copolicy.dataset.task import RUNNING, Outcome
+from copolicy.tasks.table.world import TableWorld
 
-from ..world import RUNNING, Outcome, TableWorld
 from .track import Track
 
 LIMIT_PX = 0.01

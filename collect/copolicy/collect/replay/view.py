@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.tasks.table.artist.table_view import TableView
 
-from ..screen import TableView
 from ..screen.canvas import Canvas
 from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
 from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, YELLOW

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from copolicy.dataset.task import MapConfig, identify
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import identify
 
 Configuration = tuple[str, int]
 """Map id, and who sits where: 0 with player a on the robot's seat, 1 with player b there."""

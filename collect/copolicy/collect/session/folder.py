@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.dataset.staging import replace_text
+from copolicy.dataset.files.staging import replace_text
 
-from ..episode_file import sync_folder
 from ..file_lock import hold
+from ..recording.episode_file import sync_folder
 from .balance import Counts
 from .recorded import Recorded, recordings
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from copolicy.dataset import episode_records
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files import broken_links, distinct_files
-from copolicy.dataset.log import read_metadata
-from copolicy.dataset.recording_checks import require_version
+from copolicy.dataset.files.listing import broken_links, distinct_files
+from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.soundness import require_version
 
 PRACTICE = "practice"
 """Quality flag of an episode to try things out; it is marked discarded too."""

@@ -3,11 +3,11 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.extras import TABLES
+from copolicy.dataset.command_line.flag_numbers import number, seed
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.extras import TABLES
-from copolicy.dataset.flag_numbers import number, seed
-from copolicy.dataset.staging import require_new
+from copolicy.dataset.files.staging import require_new
 
 FORMATS = {
     "zarr": "diffusion_policy's ReplayBuffer, with the arrays of the original program",

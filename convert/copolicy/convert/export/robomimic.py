@@ -20,7 +20,7 @@ from copolicy.dataset.edit.groups import By, groups
 from copolicy.dataset.edit.parts import Part, deal
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS
-from copolicy.dataset.staging import new_file
+from copolicy.dataset.files.staging import new_file
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource

@@ -13,15 +13,16 @@ from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
-from copolicy.dataset.files import visible_files
+from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
 from copolicy.dataset.physics_text import physics_counts, physics_of
-from copolicy.dataset.task import RECORD_HZ, Physics
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.physics import Physics
 
 from ..dynamics import integrate
-from ..upstream_episode import states_7
+from ..upstream.episode import states_7
 
 
 @dataclass(frozen=True, repr=False)

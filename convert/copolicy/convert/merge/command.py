@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.commandline import add_command
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.extras import DATASETS
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.extras import DATASETS
-from copolicy.dataset.repo_id import checked_repo_id
+from copolicy.dataset.publication.repo_id import checked_repo_id
 
 
 def add_merge_command(commands: argparse._SubParsersAction) -> None:

@@ -15,15 +15,15 @@ from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
-from copolicy.dataset.staging import new_folder, require_new
+from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
 from copolicy.dataset.versions.content import Content, read_content
 
-from ..joined_sets import join_data_sets
-from ..mixtures import Mixtures, converter_versions
-from ..stored_rewards import foreign_rewards
+from ..lerobot.joined_sets import join_data_sets
+from ..lerobot.mixtures import Mixtures, converter_versions
+from ..lerobot.stored_rewards import foreign_rewards
 from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
 from .source import read_source, require_alike
 

@@ -10,8 +10,8 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
-from ..joined_sets import join_data_sets
-from ..shifted_tables import write_like
+from ..lerobot.joined_sets import join_data_sets
+from ..lerobot.shifted_tables import write_like
 
 
 def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) -> dict[str, Any]:

@@ -10,11 +10,11 @@ from typing import Any
 
 from copolicy.collect.file_lock import hold
 from copolicy.dataset.clock import stride
+from copolicy.dataset.command_line.flag_numbers import whole_number
 from copolicy.dataset.exceptions import InvalidValueError, RunError
-from copolicy.dataset.flag_numbers import whole_number
-from copolicy.dataset.staging import require_new
+from copolicy.dataset.files.staging import require_new
 
-from ..prepare import Conversion
+from ..lerobot.prepare import Conversion
 from ..recordings import find_recordings
 from .plan import LOCK_FILE, ShardPlan, absolute
 

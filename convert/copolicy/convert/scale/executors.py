@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
 
-from ..prepare import DamagedEpisodeError
+from ..lerobot.prepare import DamagedEpisodeError
 from .local import LocalExecutor, quiet
 from .pipeline import ConvertShard, MergeShards
 from .plan import ShardPlan

@@ -4,7 +4,7 @@ from concurrent.futures import Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
-from copolicy.dataset.commandline import progress
+from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, MissingExtraError
 from copolicy.dataset.worker_pool import WorkerPool
 

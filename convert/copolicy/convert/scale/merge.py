@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.checks.finding import SEVERITIES
-from copolicy.dataset.documents import STATISTICS_FILE
 from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.files.staging import new_folder, require_new
+from copolicy.dataset.lerobot_folder.documents import STATISTICS_FILE
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.minimal_card import CARD_FILE, minimal_card
-from copolicy.dataset.staging import new_folder, require_new
+from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
 
-from ..lerobot_writer import WrittenDataset
-from ..mixtures import Mixtures
-from ..prepare import LeftOut, RepeatedEpisodeError
+from ..lerobot.mixtures import Mixtures
+from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
+from ..lerobot.writer import WrittenDataset
 from .aggregation import aggregate
 from .findings import all_findings
 from .plan import DATA_SET, ShardPlan, ShardRecord

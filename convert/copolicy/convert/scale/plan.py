@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files import is_hidden
-from copolicy.dataset.json_file import read_json
+from copolicy.dataset.files.json_file import read_json
+from copolicy.dataset.files.listing import is_hidden
 
-from ..prepare import Conversion
+from ..lerobot.prepare import Conversion
 
 LOCK_FILE = "lock"
 OPTIONS_FILE = "options.json"

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
 from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
 from copolicy.dataset.episode import Episode
-from copolicy.dataset.log import read_episode
-from copolicy.dataset.staging import new_folder
+from copolicy.dataset.files.staging import new_folder
+from copolicy.dataset.recording.log import read_episode
 
-from ..prepare import DamagedEpisodeError, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
+from ..lerobot.prepare import DamagedEpisodeError, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
 from .plan import DATA_SET, RECORD_FILE, ShardPlan
 
 
@@ -42,7 +42,7 @@ def convert_shard(plan: ShardPlan, rank: int) -> int:
     with new_folder(target) as partial:
         partial.mkdir()
         if prepared:
-            from ..lerobot_writer import write_dataset  # seconds, and a shard may hold nothing to write
+            from ..lerobot.writer import write_dataset  # seconds, and a shard may hold nothing to write
 
             conversion = plan.conversion
             about = {"version": version("lerobot_policy_copolicy")}

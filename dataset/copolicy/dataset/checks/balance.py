@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
 
-from ..task import MAP_SETS, identify
+from copolicy.tasks.table.maps import MAP_SETS, identify
+
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..file_kinds import kind_of
-from ..files import broken_links, distinct_files
+from ..files.file_kinds import kind_of
+from ..files.listing import broken_links, distinct_files
 from . import (
     balance,
     check_sums,

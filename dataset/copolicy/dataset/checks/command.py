@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..commandline import add_command
+from ..command_line.commands import add_command
+from ..command_line.extras import TABLES
 from ..exceptions import InvalidValueError
-from ..extras import TABLES
 from .limits import LIMITS
 from .location import locate
 from .stored_check import CHECK_FILE, check_document, content_hash

@@ -4,8 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
+from copolicy.tasks.table.physics import GOAL_SIZE
+
 from ..features import ENVIRONMENT_STATE, STATE
-from ..task import GOAL_SIZE, MAX_OBSTACLES, RECORD_HZ, WINDOW
+from ..task import RECORD_HZ
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .geometry import INNER, OUTER, final_poses, separation

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from ..exceptions import InvalidValueError
-from ..local_path import require_hub_name
-from ..repo_id import checked_repo_id
+from ..files.local_path import require_hub_name
+from ..publication.repo_id import checked_repo_id
 
 
 def locate(path: str, revision: str | None = None) -> Path:

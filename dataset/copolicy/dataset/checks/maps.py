@@ -7,10 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import MAP_SETS, map_set
+
 from ..exceptions import CopolicyError
-from ..exclusions import FLAG
 from ..features import ENVIRONMENT_STATE, STATE, map_of
-from ..task import MAP_SETS, MapConfig, map_set
+from ..lerobot_folder.exclusions import FLAG
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit

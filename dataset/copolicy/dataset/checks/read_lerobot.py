@@ -8,7 +8,7 @@ import numpy as np
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
-from ..files import visible_files
+from ..files.listing import visible_files
 from ..lerobot_folder.folder import POSITIONS, other_task
 from ..lerobot_folder.info import INFO_FILE, read_info, require_episodes
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..commandline import progress
+from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, ForeignRecordingError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
-from ..files import broken_links, distinct_files
-from ..log import read_episode
+from ..files.listing import broken_links, distinct_files
+from ..recording.log import read_episode
 from ..task import RECORD_HZ
 from .episode_table import COLUMN_TYPES, EpisodeTable
 from .finding import Finding

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from ..documents import RECORD_FILE
 from ..episode import EPISODE_COLUMNS, Source
-from ..episode_rows import episode_tables, with_column, write_tables
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
-from ..licences import checked_licence
+from ..lerobot_folder.documents import RECORD_FILE
+from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
+from ..publication.licences import checked_licence
 from .selection import Selection
 from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import record_text, stored_record

@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from ..commandline import add_command
+from ..command_line.commands import add_command
+from ..command_line.extras import TABLES
+from ..command_line.flag_numbers import seed
 from ..exceptions import InvalidValueError
-from ..extras import TABLES
-from ..flag_numbers import seed
 
 _ROOT = "folder of a LeRobot data set"
 

@@ -17,15 +17,15 @@ from ..checks.duplicates import motion_digests
 from ..checks.episode_table import EpisodeTable
 from ..checks.read_lerobot import read_lerobot
 from ..clock import Hold, frame_actions, frame_states
-from ..commandline import progress
-from ..documents import RECORD_FILE
+from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
-from ..episode_rows import episode_tables, with_column, write_tables
 from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION
-from ..files import visible_files
+from ..files.listing import visible_files
+from ..lerobot_folder.documents import RECORD_FILE
+from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
-from ..log import read_episode
+from ..recording.log import read_episode
 from .amend import today
 from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import record_text, stored_record

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import RunError
-from ..staging import new_folder, require_new
+from ..files.staging import new_folder, require_new
 from .amend import today
 from .selection import Selection
 from .subset.replace_folder import finish_interrupted

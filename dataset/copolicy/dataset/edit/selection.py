@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Any, get_args
 
 from ..episode import Source, TerminationReason
-from ..episode_rows import chosen_episodes
 from ..exceptions import InvalidValueError, RunError
+from ..lerobot_folder.episode_rows import chosen_episodes
 from .expression import parse_condition
 
 RESULTS = ("success", "failure", *get_args(TerminationReason))

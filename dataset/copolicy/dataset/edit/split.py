@@ -6,7 +6,7 @@ from typing import Any
 
 from ..exceptions import RunError
 from ..features import ACTION, STATE
-from ..staging import new_folder, require_new
+from ..files.staging import new_folder, require_new
 from .groups import By, base_map, groups
 from .parts import Part, deal
 from .select import selection_record, subset_facts

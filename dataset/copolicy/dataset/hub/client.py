@@ -5,7 +5,7 @@ import logging
 from collections.abc import Iterator
 
 from ..exceptions import CopolicyError, MissingExtraError, RunError
-from ..staging import refusal
+from ..files.staging import refusal
 
 try:
     import httpx

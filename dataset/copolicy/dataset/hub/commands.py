@@ -4,8 +4,8 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from ..commandline import add_command
-from ..extras import HUB, TABLES
+from ..command_line.commands import add_command
+from ..command_line.extras import HUB, TABLES
 
 
 def add_publish_command(commands: argparse._SubParsersAction) -> None:

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from ..exceptions import RunError
-from ..repo_id import checked_repo_id
+from ..publication.repo_id import checked_repo_id
 from ..versions.data_version import newest
 from .client import hub_api, hub_errors, snapshot_download
 from .repository import read_repository

@@ -12,12 +12,12 @@ from typing import Any
 from ..checks.checking import check_dataset
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
-from ..exclusions import excluded_episodes
-from ..json_file import parse_json
+from ..files.json_file import parse_json
+from ..files.staging import replace_text
+from ..lerobot_folder.exclusions import excluded_episodes
 from ..lerobot_folder.info import read_info
-from ..minimal_card import CARD_FILE, is_minimal_card
-from ..repo_id import checked_repo_id
-from ..staging import replace_text
+from ..publication.minimal_card import CARD_FILE, is_minimal_card
+from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.data_version import newest
 from ..versions.manifest import MANIFEST_FILE, Manifest

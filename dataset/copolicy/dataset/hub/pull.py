@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
-from ..files import visible_files
-from ..repo_id import checked_repo_id
-from ..staging import about, require_new
+from ..files.listing import visible_files
+from ..files.staging import about, require_new
+from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release

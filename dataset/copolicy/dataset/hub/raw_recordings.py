@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
-from ..files import distinct_files
+from ..files.listing import distinct_files
 from ..lerobot_folder.folder import LeRobotFolder
 from ..versions.manifest import FileEntry, Manifest, file_entry
 

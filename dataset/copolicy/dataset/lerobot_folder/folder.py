@@ -10,7 +10,7 @@ import numpy as np
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
-from ..files import visible_files
+from ..files.listing import visible_files
 from .info import INFO_FILE, read_info, require_episodes, stripped_hint
 from .tables import column_types, damaged, episode_values, pa, read_parquet
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError
-from ..file_kinds import kind_of
-from ..files import visible_files
-from ..json_file import read_json
+from ..files.file_kinds import kind_of
+from ..files.json_file import read_json
+from ..files.listing import visible_files
 
 INFO_FILE = Path("meta/info.json")
 STATS_FILE = Path("meta/stats.json")

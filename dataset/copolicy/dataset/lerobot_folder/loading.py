@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..exceptions import CopolicyError, FileFormatError
-from ..files import visible_files
-from ..json_file import read_json
+from ..files.json_file import read_json
+from ..files.listing import visible_files
 from .folder import POSITIONS, LeRobotFolder
 from .info import STATS_FILE, TASKS_FILE
 from .references import (

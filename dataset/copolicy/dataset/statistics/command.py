@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..commandline import add_command
-from ..documents import STATISTICS_FILE
+from ..command_line.commands import add_command
+from ..command_line.extras import TABLES
+from ..command_line.flag_numbers import seed
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
-from ..extras import TABLES
-from ..flag_numbers import seed
-from ..staging import replace_text
+from ..files.staging import replace_text
+from ..lerobot_folder.documents import STATISTICS_FILE
 
 
 def add_stats_command(commands: argparse._SubParsersAction) -> None:

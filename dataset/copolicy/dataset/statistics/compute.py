@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..commandline import progress
+from ..command_line.commands import progress
 from .activity import activity_statistics
 from .energy_distance import energy_statistics
 from .estimate import rounded

@@ -4,7 +4,8 @@ from collections import Counter
 
 import numpy as np
 
-from ..routes import route_class, winding
+from copolicy.tasks.table.routes import route_class, winding
+
 from .entropy import entropy, miller_madow, simpson
 from .estimate import Estimate
 from .resampling import Bootstrap, interval

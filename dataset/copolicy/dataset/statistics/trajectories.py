@@ -6,10 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from copolicy.tasks.table.map_config import MapConfig
+
 from ..exceptions import ShapeError
 from ..features import theta_of
 from ..interaction import interaction_force
-from ..map_config import MapConfig
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..map_config import WINDOW
+from copolicy.tasks.table.map_config import WINDOW
+
 from .entropy import entropy, miller_madow
 from .estimate import Estimate, Null
 from .resampling import Bootstrap, exchangeable, interval, permuted_within

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from ..commandline import add_command
+from ..command_line.commands import add_command
+from ..command_line.extras import TABLES
 from ..exceptions import CopolicyError, RunError
-from ..extras import TABLES
 
 _SHOWN = 20
 

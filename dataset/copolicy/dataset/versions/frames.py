@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..files import visible_files
+from ..files.listing import visible_files
 from ..lerobot_folder.tables import column_types, feature_values, read_parquet
 from .canonical import encode
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TypedDict
 
 from ..exceptions import FileFormatError
-from ..files import is_hidden, visible_files
-from ..json_file import parse_json, read_json
+from ..files.json_file import parse_json, read_json
+from ..files.listing import is_hidden, visible_files
 from .canonical import digest
 
 MANIFEST_FILE = "meta/manifest.json"

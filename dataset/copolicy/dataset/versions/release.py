@@ -5,8 +5,8 @@ from pathlib import Path
 
 from ..checks.stored_check import CHECK_FILE
 from ..exceptions import InvalidValueError, RunError
-from ..staging import replacements
-from ..text_files import read_older_text
+from ..files.staging import replacements
+from ..files.text_files import read_older_text
 from .changelog import CHANGELOG_FILE, with_release
 from .content import Content, read_content
 from .data_version import BUMPS, Bump, DataVersion

@@ -5,10 +5,10 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
-from ..documents import RELEASE_FILE
 from ..exceptions import FileFormatError, UnknownNameError
-from ..files import visible_files
-from ..json_file import read_json
+from ..files.json_file import read_json
+from ..files.listing import visible_files
+from ..lerobot_folder.documents import RELEASE_FILE
 from .content import Content, ContentFields
 from .data_version import DataVersion
 from .withdrawals import is_anonymous

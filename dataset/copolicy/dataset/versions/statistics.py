@@ -4,8 +4,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..documents import STATISTICS_FILE
-from ..json_file import read_json
+from ..files.json_file import read_json
+from ..lerobot_folder.documents import STATISTICS_FILE
 
 
 def read_statistics(root: Path) -> dict[str, Any] | None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict
 
-from ..json_file import read_json
+from ..files.json_file import read_json
 from .content import Content, EpisodeContent
 
 WITHDRAWALS_FILE = Path("meta/copolicy_withdrawals.json")

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.staging import replace_text
-from copolicy.dataset.text_files import read_text
+from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.files.text_files import read_text
 
 from .mapping import GamepadMapping
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...staging import sync_folder, sync_tree
+from ...files.staging import sync_folder, sync_tree
 
 _BEFORE = "before-edit"
 _DELETED = "deleted"

@@ -7,14 +7,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ...documents import RECORD_FILE, ConversionRecord
 from ...episode import EPISODE_COLUMNS
-from ...episode_rows import episode_tables
 from ...exceptions import FileFormatError, MissingExtraError
-from ...json_file import read_json
+from ...files.json_file import read_json
+from ...lerobot_folder.documents import RECORD_FILE, ConversionRecord
+from ...lerobot_folder.episode_rows import episode_tables
 from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, stripped_hint
 from ...lerobot_folder.loading import require_loadable
-from ...minimal_card import CARD_FILE, is_minimal_card
+from ...publication.minimal_card import CARD_FILE, is_minimal_card
 from ...versions.content import Content, read_content
 from ...versions.manifest import data_set_files
 

@@ -12,7 +12,7 @@ from ...exceptions import FileFormatError, MissingExtraError, RunError
 from ...lerobot_folder.info import INFO_FILE, TASKS_FILE
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
 from ...lerobot_folder.tables import read_parquet
-from ...minimal_card import CARD_FILE, minimal_card
+from ...publication.minimal_card import CARD_FILE, minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
 from .numbered_files import Place, next_place, numbered

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ...checks.stored_check import CHECK_FILE
-from ...documents import RECORD_FILE, RELEASE_FILE, STATISTICS_FILE
 from ...exceptions import CopolicyError
 from ...hub.raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
+from ...lerobot_folder.documents import RECORD_FILE, RELEASE_FILE, STATISTICS_FILE
 from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE
-from ...minimal_card import CARD_FILE
+from ...publication.minimal_card import CARD_FILE
 from ...versions.changelog import CHANGELOG_FILE
 from ...versions.content import EpisodeContent
 from ...versions.manifest import MANIFEST_FILE, Manifest

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ... import log
 from ...exceptions import CopolicyError, ForeignRecordingError
-from ...staging import replace_text, sync_folder
+from ...files.staging import replace_text, sync_folder
+from ...recording import log
 from ..selection import consents_of
 from .traces import Traces
 

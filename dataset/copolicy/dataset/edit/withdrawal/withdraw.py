@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...exceptions import FileFormatError, InvalidValueError, RunError
-from ...json_file import read_json
+from ...files.json_file import read_json
 from ...lerobot_folder.folder import LeRobotFolder
 from ...lerobot_folder.info import INFO_FILE, stripped_hint
 from ..selection import consents_of

@@ -1,0 +1,101 @@
+"""People: a joystick, or one half of the keyboard."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
+from copolicy.tasks.table.map_config import MapConfig
+
+from ..inputs import InputSample, KeyboardHalf, Pad, RestWatch, StickCalibration, keyboard_force
+from .controller import Reading
+
+Force = tuple[float, float]
+
+
+class PersonController:
+    """A person with a device in hand; which one can change whenever it is unplugged.
+
+    The device is read in `read` itself, so a reading serves one step and no other.
+
+    Attributes:
+        name: of the kind of device.
+    """
+
+    is_person = True
+
+    def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns):
+        self.name = name
+        self._device: Pad | KeyboardHalf | None = None
+        self._calibration = StickCalibration()
+        self._rest = RestWatch()
+        self._clock = clock
+
+    @property
+    def device(self) -> Pad | KeyboardHalf | None:
+        """Joystick or half of the keyboard; None until somebody has joined with one."""
+        return self._device
+
+    @device.setter
+    def device(self, device: Pad | KeyboardHalf | None) -> None:
+        self._device, self._rest = device, RestWatch()
+
+    @property
+    def calibration(self) -> StickCalibration:
+        """Of a joystick."""
+        return self._calibration
+
+    @calibration.setter
+    def calibration(self, calibration: StickCalibration) -> None:
+        self._calibration, self._rest = calibration, RestWatch()
+
+    @property
+    def push_at_rest(self) -> float:
+        """How hard the stick pushes while nobody touches it, share of the full force; 0 where it does not."""
+        return self._rest.push
+
+    def watch_rest(self) -> None:
+        """Looks at the stick while no table is carried; once a tick."""
+        if self._has_stick:
+            still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
+            self._rest.add(self.force(self.sample()), still)
+
+    def sample(self) -> InputSample:
+        """What the device says now.
+
+        Raises:
+            RunError: there is no device.
+        """
+        if self.device is None:
+            raise RunError(f"{self.name}: expected a device, found none")
+        return self.device.sample(self._clock())
+
+    def force(self, sample: InputSample) -> Force:
+        """The force that a sample stands for."""
+        device = self.device
+        return device.force(sample, self.calibration) if isinstance(device, Pad) else keyboard_force(sample)
+
+    def begin(self, seat: int, map_config: MapConfig, seed: int) -> None:
+        """Nothing to prepare."""
+
+    def read(self, state: np.ndarray) -> Reading:
+        """Reads the device."""
+        sample = self.sample()
+        force = self.force(sample)
+        if self._has_stick and not self.calibration.measured:
+            self._rest.add(force, RestWatch.CARRYING)
+        age = self._clock() - sample.time_ns
+        return Reading(force, PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age))
+
+    @property
+    def _has_stick(self) -> bool:
+        device = self.device
+        return isinstance(device, Pad) and not device.steering(self.calibration).digital
+
+    def executed(self, action: np.ndarray) -> None:
+        """A person sees for themselves."""
+
+    def close(self) -> None:
+        """The device stays as it is."""

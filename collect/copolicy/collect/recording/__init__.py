@@ -1,0 +1,1 @@
+"""Writes an episode while it happens, and completes what broke off."""

@@ -1,0 +1,110 @@
+"""The file of a recording: written as `NAME.mcap.part`, given its name only when it is complete and on the disk."""
+
+import os
+from importlib.metadata import version
+from pathlib import Path
+
+from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
+
+from copolicy.dataset.exceptions import OutputExistsError
+from copolicy.dataset.recording.topics import ENCODING, TOPICS, Topic, schema_data
+
+from ..file_lock import hold
+
+PART_SUFFIX = ".part"
+"""What a recording's name ends with while it runs, and after it broke off."""
+
+_CHUNK_SIZE = 1 << 20
+
+
+class EpisodeFile:
+    """One MCAP file in the making.
+
+    Chunks of 1 MiB under zstd, with a check sum over every byte: without `enable_data_crcs` a flipped bit in a
+    metadata record would go unnoticed.
+    """
+
+    def __init__(self, path: Path):
+        """Opens `path` + `.part`.
+
+        Raises:
+            OutputExistsError: the file, or the remains of a recording that broke off, would be overwritten.
+        """
+        self.path = path
+        if path.exists():
+            raise OutputExistsError(path)
+        try:
+            self._file = self.part.open("xb")
+        except FileExistsError:
+            raise OutputExistsError(self.part) from None
+        hold(self._file, wait=True)  # tells `recover` that this recording is running
+        self._writer = Writer(
+            self._file, chunk_size=_CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
+        self._writer.start(library=f"copolicy/{version('lerobot_policy_copolicy')} {LIBRARY_IDENTIFIER}")
+        self._channels: dict[str, int] = {}
+
+    @property
+    def part(self) -> Path:
+        """The file's name until it is published."""
+        return self.path.with_name(self.path.name + PART_SUFFIX)
+
+    def declare_topics(self) -> None:
+        """Writes the schema and the channel of every topic."""
+        schemas: dict[str, int] = {}
+        for topic in TOPICS:
+            name = topic.schema_name
+            if name not in schemas:
+                schemas[name] = self._writer.register_schema(name, ENCODING, schema_data(topic.message))
+            self._channels[topic.name] = self._writer.register_channel(
+                topic.name, ENCODING, schemas[name], topic.metadata
+            )
+
+    def add_metadata(self, name: str, entries: dict[str, str]) -> None:
+        """Writes a metadata record."""
+        self._writer.add_metadata(name, entries)
+
+    def add_attachment(self, name: str, media_type: str, data: bytes, time_ns: int) -> None:
+        """Writes an attachment."""
+        self._writer.add_attachment(time_ns, time_ns, name, media_type, data)
+
+    def add(self, topic: Topic, payload: bytes, time_ns: int, sequence: int) -> None:
+        """Writes a serialised message; `time_ns` is UTC, nanoseconds since 1970."""
+        self._writer.add_message(self._channels[topic.name], time_ns, payload, time_ns, sequence)
+
+    def flush(self) -> None:
+        """Hands everything so far to the system: what is lost with this process is what comes after."""
+        self._writer.flush()
+
+    def complete(self) -> None:
+        """Writes the summary and forces the file onto the disk, still as `.part`."""
+        self._writer.finish()
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+    def publish(self) -> None:
+        """Gives the complete file its name.
+
+        Raises:
+            OutputExistsError: another file took the name meanwhile; the recording stays as `.part`.
+        """
+        if self.path.exists():
+            raise OutputExistsError(self.path)
+        os.replace(self.part, self.path)
+        sync_folder(self.path.parent)
+
+    def close(self) -> None:
+        """Lets go of the file as it is."""
+        self._file.close()
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes a renaming survive a power failure, where the system lets a folder be opened."""
+    if os.name == "nt":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,267 @@
+"""What can be trusted of a recording that broke off or was damaged: its records up to the first doubt."""
+
+import struct
+import zlib
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
+from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, MESSAGE_HEAD, chunk_records
+from copolicy.dataset.recording.mcap_records import RecordWalk
+from copolicy.dataset.recording.messages.copolicy_pb2 import (
+    EpisodeEvent,
+    Interaction,
+    LoopTiming,
+    PlayerAction,
+    TableState,
+)
+from copolicy.dataset.recording.soundness import CheckSums, channels_text
+from copolicy.dataset.recording.topics import ACTIONS, EVENT, INTERACTION, LOOP_TIMING, TABLE_STATE, is_ours
+from copolicy.tasks.table.map_config import MapConfig
+
+from ..ticker import LoopStatistics, Tick
+
+_LARGEST: dict[int, int] = {
+    Opcode.SCHEMA: 1 << 20,
+    Opcode.CHANNEL: 1 << 20,
+    Opcode.METADATA: 1 << 20,
+    Opcode.ATTACHMENT: 16 << 20,
+    Opcode.CHUNK: LARGEST_CHUNK,
+    Opcode.MESSAGE: 1 << 20,
+}
+_HEAD = struct.Struct("<BQ")  # opcode, length of the body
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_OUR_METADATA = (*episode_records.COLUMNS_AT_START, episode_records.RESULT)
+_ENDED = "expected an intact and complete MCAP file, found its end"
+
+
+@dataclass
+class IntactPart:
+    """The beginning of a recording that is proven to be what was written.
+
+    Attributes:
+        path: of the file.
+        metadata: its metadata records; those of the start are proven by their digest.
+        map_config: the map.
+        steps: complete steps: as many actions of both players, and one state more.
+        records: how many records of the file, counted as `intact_records` gives them, are part of it.
+        stopped_by: what ended it; empty where the file is whole.
+        between_records: the file simply ends there, as after a kill, rather than going on with damage.
+        total_reward: over the steps.
+        events: what happened, the events after the last complete step among them.
+        unverified: what of it carries no check sum, a sentence each.
+        loop: how well the loop kept its time over the steps; without ticks where time was simulated.
+    """
+
+    path: Path
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    map_config: MapConfig | None = None
+    steps: int = 0
+    records: int = 0
+    stopped_by: str = ""
+    between_records: bool = False
+    total_reward: float = 0.0
+    events: list[EpisodeEvent] = field(default_factory=list)
+    unverified: tuple[str, ...] = ()
+    loop: LoopStatistics = field(default_factory=LoopStatistics)
+    positions: array = field(default_factory=lambda: array("d"), repr=False)
+
+    @property
+    def table_path(self) -> np.ndarray:
+        """`(steps + 1, 2)` the table's centre, px."""
+        return np.asarray(self.positions).reshape(-1, 2)[: self.steps + 1]
+
+
+def intact_records(path: Path, check_sums: CheckSums | None = None) -> Iterator[McapRecord]:
+    """Schemas, channels, messages, metadata and attachments from the beginning of a file, one chunk in memory.
+
+    Args:
+        check_sums: learns what of the file carries one.
+
+    Raises:
+        FileFormatError: at the first record that fails a check sum or a parser, and where the file breaks off.
+    """
+    check_sums = CheckSums() if check_sums is None else check_sums
+    with path.open("rb") as file:
+        walk = RecordWalk(path, file, path.stat().st_size)
+        for opcode, body in walk.records(_LARGEST):
+            try:
+                yield from _records_of(opcode, body, check_sums)
+            except CopolicyError:
+                raise
+            except Exception as error:
+                # Damaged bytes fail in as many ways as there are parsers (struct, zstd, UTF-8, ...).
+                raise walk.damage(f"damage ({error or type(error).__name__}) in the record that ends") from None
+        check_sums.data = walk.data_verified
+
+
+def read_intact_part(path: Path) -> IntactPart:
+    """Walks a file once and finds out how far it can be trusted.
+
+    Raises:
+        FileFormatError: the metadata or the map at its start are not what was written, or it is no recording.
+        ForeignRecordingError: it is a recording of something else.
+    """
+    part = IntactPart(path)
+    count = _StepCount(part)
+    check_sums = CheckSums()
+    try:
+        for record in intact_records(path, check_sums):
+            if isinstance(record, Metadata):
+                if record.name in part.metadata and record.name in _OUR_METADATA:
+                    raise ValueError(f"a second metadata record {record.name!r}")
+                part.metadata[record.name] = record.metadata
+            elif isinstance(record, Attachment):
+                if record.name == episode_records.MAP_ATTACHMENT:
+                    part.map_config = MapConfig.from_json(record.data)
+            else:
+                count.take(record)
+            part.records += 1
+    except FileFormatError as error:
+        part.stopped_by = str(error).removeprefix(f"{path}: ")
+    except CopolicyError as error:
+        part.stopped_by = str(error)
+    except Exception as error:
+        part.stopped_by = f"expected the next step, found {error or type(error).__name__}"
+    part.between_records = not part.stopped_by or part.stopped_by.startswith(_ENDED)
+    part.steps = count.complete
+    _check_start(part, count.foreign)
+    part.unverified = check_sums.content_notes()
+    count.sum_up()
+    return part
+
+
+def _records_of(opcode: int, body: bytes, check_sums: CheckSums) -> Iterator[McapRecord]:
+    if opcode == Opcode.METADATA:
+        yield Metadata.read(ReadDataStream(BytesIO(body)))
+    elif opcode == Opcode.ATTACHMENT:
+        expected = int.from_bytes(body[-4:], "little")
+        if expected not in (0, zlib.crc32(body[:-4])):
+            raise ValueError("an attachment that fails its check sum")
+        attachment = Attachment.read(ReadDataStream(BytesIO(body)))
+        if attachment.name == episode_records.MAP_ATTACHMENT:
+            check_sums.map = expected != 0
+        yield attachment
+    elif opcode == Opcode.CHUNK:
+        data, verified = chunk_records(body)
+        check_sums.chunks += 1
+        check_sums.chunks_without += not verified
+        yield from _records_in_chunk(data)
+    else:
+        check_sums.lone_messages += opcode == Opcode.MESSAGE
+        yield from _record(opcode, body)
+
+
+def _records_in_chunk(data: bytes) -> Iterator[McapRecord]:
+    position = 0
+    while position < len(data):
+        opcode, length = _HEAD.unpack_from(data, position)
+        begin = position + _HEAD.size
+        position = begin + length
+        if position > len(data):
+            raise ValueError("a record that leaves its chunk")
+        yield from _record(opcode, data[begin:position])
+
+
+def _record(opcode: int, body: bytes) -> Iterator[McapRecord]:
+    if opcode == Opcode.MESSAGE:
+        channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+        yield Message(channel, log_time, body[MESSAGE_HEAD:], publish_time, sequence)
+    elif opcode == Opcode.SCHEMA:
+        yield Schema.read(ReadDataStream(BytesIO(body)))
+    elif opcode == Opcode.CHANNEL:
+        yield Channel.read(ReadDataStream(BytesIO(body)))
+
+
+class _StepCount:
+    """Follows the steps of a recording and refuses the first message out of order."""
+
+    def __init__(self, part: IntactPart):
+        self._part = part
+        self._schemas: dict[int, str] = {}
+        self._declared: set[int] = set()
+        self._topics: dict[int, str] = {}  # of channels that are ours; of others nothing follows
+        self._others: set[str] = set()
+        self._next = {topic.name: 0 for topic in (TABLE_STATE, *ACTIONS)}
+        self._sequence = 0
+        self._rewards = array("d")
+        self._ticks = array("q")  # step, scheduled, start, skipped
+
+    @property
+    def complete(self) -> int:
+        """Steps with a state, both actions and a state after it; -1 without any state."""
+        states, *actions = self._next.values()
+        return min(states - 1, *actions)
+
+    @property
+    def foreign(self) -> tuple[str, ...]:
+        """The topics of a file that has none of ours."""
+        return () if self._topics else tuple(sorted(self._others))
+
+    def take(self, record: McapRecord) -> None:
+        if isinstance(record, Schema):
+            self._schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            self._declared.add(record.id)
+            if is_ours(record, self._schemas.get(record.schema_id, "")):
+                self._topics[record.id] = record.topic
+            else:
+                self._others.add(record.topic)
+        elif isinstance(record, Message) and record.channel_id not in self._declared:
+            raise ValueError(f"a message of a channel {record.channel_id} that was never declared")
+        elif isinstance(record, Message) and record.channel_id in self._topics:
+            if record.sequence < self._sequence:
+                raise ValueError(f"step {record.sequence} after step {self._sequence}")
+            self._sequence = record.sequence
+            self._follow(self._topics[record.channel_id], record)
+
+    def sum_up(self) -> None:
+        """Tells the part about its complete steps."""
+        steps = max(0, self._part.steps)
+        self._part.total_reward = sum(self._rewards[:steps])
+        paused = {event.step for event in self._part.events if event.kind == "pause"}
+        for step, scheduled, start, skipped in np.asarray(self._ticks).reshape(-1, 4).tolist():
+            if step in paused:
+                self._part.loop.pause()
+            if step < steps:
+                self._part.loop.add(Tick(scheduled, start, skipped))
+
+    def _follow(self, topic: str, message: Message) -> None:
+        if topic == TABLE_STATE.name:
+            state = TableState.FromString(message.data)
+            self._advance(topic, state.step, message.sequence)
+            self._part.positions.extend((state.x, state.y))
+        elif topic in self._next:
+            self._advance(topic, PlayerAction.FromString(message.data).step, message.sequence)
+        elif topic == INTERACTION.name:
+            self._rewards.append(Interaction.FromString(message.data).reward)
+        elif topic == LOOP_TIMING.name:
+            timing = LoopTiming.FromString(message.data)
+            self._ticks.extend((timing.step, timing.scheduled_ns, timing.start_ns, timing.skipped_ticks))
+        elif topic == EVENT.name:
+            self._part.events.append(EpisodeEvent.FromString(message.data))
+
+    def _advance(self, topic: str, step: int, sequence: int) -> None:
+        if not step == sequence == self._next[topic]:
+            raise ValueError(f"step {step} in place {self._next[topic]} of {topic}")
+        self._next[topic] += 1
+
+
+def _check_start(part: IntactPart, foreign: tuple[str, ...]) -> None:
+    digest = part.metadata.get("dataset_info", {}).get(episode_records.START_DIGEST)
+    if digest is None and foreign:
+        raise ForeignRecordingError(part.path, "a recording of this task", channels_text(foreign))
+    if part.map_config is None or digest is None:
+        found = part.stopped_by.rpartition("found ")[2] or "none"
+        raise FileFormatError(part.path, "the start of a recording of this task: metadata and map", found)
+    if digest != episode_records.start_digest(part.metadata):
+        raise FileFormatError(part.path, "the metadata that was written at the start", "another")

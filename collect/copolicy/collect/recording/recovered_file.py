@@ -1,0 +1,192 @@
+"""Writes what can be trusted of a broken recording as a finished one."""
+
+import contextlib
+import itertools
+import os
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
+
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+from copolicy.dataset.files.staging import about
+from copolicy.dataset.interaction import identical, may_be_one_device
+from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerAction, TableState
+from copolicy.dataset.recording.soundness import RECOVERY, UNVERIFIED
+from copolicy.dataset.recording.topics import ACTIONS, EVENT, SCENE, TABLE_STATE, is_ours
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.artist.scene import TableScene
+from copolicy.tasks.table.artist.scene_solids import TableFrame
+from copolicy.tasks.table.routes import route_class
+
+from ..session.recorded import OFF_CENTRE, PRACTICE
+from .episode_file import sync_folder
+from .episode_messages import Record, event_record
+from .intact_records import IntactPart, intact_records
+from .recorder import IDENTICAL_ACTIONS
+
+RECOVERED = "recovered"
+"""Quality flag of a recovered episode, and what its name ends with."""
+
+_UNFINISHED = ".unfinished"  # a recovered file in the making; the next run starts it anew
+
+
+def write_recovered(part: IntactPart, output: Path, source_sha256: str) -> None:
+    """Writes the complete steps of a part to `output`, which gets its name only after it was read back.
+
+    Raises:
+        FileFormatError: what was written does not read back; nothing is left of it.
+        OutputExistsError: another file took the name meanwhile.
+    """
+    unfinished = output.with_name(output.name + _UNFINISHED)
+    try:
+        with about(output, unfinished), unfinished.open("wb") as file:
+            _write(part, file, source_sha256)
+            file.flush()
+            os.fsync(file.fileno())
+        steps = len(read_episode(unfinished).actions)
+        if steps != part.steps:
+            raise FileFormatError(part.path, f"{part.steps} steps that can be copied", str(steps))
+        if output.exists():
+            raise OutputExistsError(output)
+        os.replace(unfinished, output)
+    except BaseException:
+        # Ours, and worth nothing: the source has all there is.
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        raise
+    sync_folder(output.parent)
+
+
+def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
+    software = version("lerobot_policy_copolicy")
+    writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(library=f"copolicy/{software} {LIBRARY_IDENTIFIER}")
+    copy = _Copy(writer, part.steps)
+    for record in itertools.islice(intact_records(part.path), part.records):
+        copy.take(record)
+    copy.end(part.stopped_by)
+    writer.add_metadata(episode_records.RESULT, _result(part, copy.actions))
+    recovery = {
+        "source": part.path.name,
+        "source_sha256": source_sha256,
+        "source_bytes": str(part.path.stat().st_size),
+        "steps": str(part.steps),
+        "stopped_by": part.stopped_by,
+        "recovered_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software_version": software,
+    }
+    if part.unverified:
+        recovery[UNVERIFIED] = "; ".join(part.unverified)
+    writer.add_metadata(RECOVERY, recovery)
+    writer.finish()
+
+
+class _Copy:
+    """Copies what belongs to the complete steps and the state after them, with times and sequence numbers."""
+
+    def __init__(self, writer: Writer, steps: int):
+        self._writer, self._steps = writer, steps
+        self._schemas: dict[int, int] = {0: 0}
+        self._channels: dict[int, int] = {}
+        self._names: dict[int, str] = {}
+        self._topics: dict[int, str] = {}
+        self._forces: tuple[list[tuple[float, float]], list[tuple[float, float]]] = ([], [])
+        self._final = TableState()
+        self._time_ns = 0  # of the final state
+
+    @property
+    def actions(self) -> np.ndarray:
+        """`(steps, 4)` robot xy, human xy of the complete steps."""
+        return np.hstack([np.reshape(forces, (-1, 2)) for forces in self._forces])
+
+    def take(self, record: McapRecord) -> None:
+        """Copies one record, or passes it by."""
+        writer = self._writer
+        if isinstance(record, Message):
+            self._take_message(record)
+        elif isinstance(record, Schema):
+            self._schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            self._names[record.id] = record.name
+        elif isinstance(record, Channel):
+            schema = self._schemas[record.schema_id]
+            channel = writer.register_channel(record.topic, record.message_encoding, schema, record.metadata)
+            self._channels[record.id] = channel
+            if is_ours(record, self._names.get(record.schema_id, "")):
+                self._topics[record.id] = record.topic
+        elif isinstance(record, Attachment):
+            writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+        elif isinstance(record, Metadata) and record.name not in (episode_records.RESULT, RECOVERY):
+            writer.add_metadata(record.name, record.metadata)
+
+    def end(self, stopped_by: str) -> None:
+        """Adds the scene of the final state, in which no force acts any more, and the event of the recovery."""
+        pose = self._final.x, self._final.y, self._final.theta
+        self._add_ours((SCENE, TableScene().update(self._time_ns, pose, (0.0, 0.0, 0.0, 0.0))))
+        self._add_ours(TableFrame().record(self._time_ns, pose))
+        self._add_ours(event_record(self._steps, RECOVERED, stopped_by))
+
+    def _take_message(self, message: Message) -> None:
+        topic = self._topics.get(message.channel_id)
+        # Sequence numbers are steps. Of the step after the last complete one count the state, and the events before
+        # it, but not what was chosen in it.
+        last = self._steps if topic in (TABLE_STATE.name, EVENT.name) else self._steps - 1
+        if topic is not None and message.sequence > last:
+            return
+        if topic == TABLE_STATE.name and message.sequence == self._steps:
+            self._final, self._time_ns = TableState.FromString(message.data), message.log_time
+        for forces, action_topic in zip(self._forces, ACTIONS, strict=True):
+            if topic == action_topic.name:
+                action = PlayerAction.FromString(message.data)
+                forces.append((action.fx, action.fy))
+        channel = self._channels[message.channel_id]
+        self._writer.add_message(channel, message.log_time, message.data, message.publish_time, message.sequence)
+
+    def _add_ours(self, record: Record) -> None:
+        topic, payload = record
+        for channel, name in self._topics.items():
+            if name == topic.name:
+                self._writer.add_message(self._channels[channel], self._time_ns, payload, self._time_ns, self._steps)
+
+
+def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
+    recorded = part.metadata.get(episode_records.RESULT)
+    if recorded is not None and not part.stopped_by:
+        flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]
+        return recorded | {"quality_flags": ",".join([*flags, RECOVERED])}
+    assert part.map_config is not None
+    happened = {event.kind: event for event in part.events}
+    practice = PRACTICE in happened
+    columns = {name: text for record in ("episode", "players") for name, text in part.metadata[record].items()}
+    who = (columns["source"], columns["controller_0"], columns["controller_1"])
+    flags = {
+        PRACTICE: practice,
+        "paused": "pause" in happened,
+        "slow_loop": part.loop.slow,
+        OFF_CENTRE: OFF_CENTRE in happened,
+        IDENTICAL_ACTIONS: may_be_one_device(*who) and identical(actions),
+        RECOVERED: True,
+    }
+    meta = EpisodeMeta(
+        "",
+        termination_reason="crash_recovered",
+        duration_s=part.steps / RECORD_HZ,
+        achieved_hz=part.loop.achieved_hz,
+        late_ticks=part.loop.late,
+        route_class=route_class(part.table_path, part.map_config),
+        quality_flags=",".join(flag for flag, raised in flags.items() if raised),
+        discarded=practice,
+    )
+    notes = [event.detail for event in part.events if event.kind == "note"]
+    if "outcome" in happened:
+        # It was played to its end; the crash came before the verdict on it.
+        notes.append(f"ended at step {happened['outcome'].step} with {happened['outcome'].detail}, without a verdict")
+    result = episode_records.encode(meta, episode_records.COLUMNS_AT_END)
+    return result | {"steps": str(part.steps), "total_reward": repr(part.total_reward), "notes": "; ".join(notes)}

@@ -1,0 +1,1 @@
+"""Episodes of scripted pairs, as fast as the machine goes."""

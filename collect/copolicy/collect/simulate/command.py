@@ -1,0 +1,208 @@
+"""Records episodes of scripted pairs, as fast as the machine goes."""
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import time
+import uuid
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import as_completed
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.command_line.commands import progress
+from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
+from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.worker_pool import WorkerPool
+from copolicy.tasks.table.agents import PAIRS
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.maps import identify
+from copolicy.tasks.table.maps import map_set as maps_of
+from copolicy.tasks.table.physics import Physics
+from copolicy.tasks.table.start_pose import displaced_start
+
+from ..recording.episode_file import PART_SUFFIX
+from ..recording.wall_clock import WallClockAnchor
+from .episode_job import EpisodeJob, EpisodeResult
+from .schedule import balanced_schedule
+
+
+def simulate(
+    out: Path | str,
+    episodes: int,
+    seed: int,
+    map_set: str = "training",
+    workers: int | None = None,
+    orientations: bool = False,
+    pairs: Sequence[str] | None = None,
+    physics: Physics | None = None,
+    started_ns: int | None = None,
+    start_noise: float = 0.0,
+    clearance: float | None = None,
+) -> dict:
+    """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
+
+    States and actions depend on the seed, the set and the pairs alone, not on the workers or the machine's load:
+    each episode draws from `SeedSequence((seed, index))`. Failures and time-outs are kept, marked as what they are.
+
+    Args:
+        out: the folder; made if missing.
+        episodes: how many.
+        seed: of the schedule and of the pilots.
+        map_set: one of `MAP_SETS`.
+        workers: processes; by default one for each processor.
+        orientations: each map with four start orientations.
+        pairs: names out of `PAIRS`; by default all.
+        physics: settings of the dynamics.
+        started_ns: the moment that the recordings carry, UTC, nanoseconds since 1970; by default now. With a given
+            one, equal calls write equal bytes.
+        start_noise: how far from the map's start episodes begin, see `displaced_start`; 0 begins at the start.
+        clearance: how wide both players keep from obstacles, instead of their habits' own.
+
+    Returns:
+        Counts and rates, JSON-able.
+
+    Raises:
+        OutputExistsError: the folder holds recordings already, or is none; nothing was written.
+        UnknownNameError: no such map set or pair.
+        InvalidValueError: less than one episode or worker, or a negative seed.
+        OSError: the disk refuses; no recording of this call is left.
+    """
+    out = Path(out)
+    workers = _processors() if workers is None else workers
+    least = {"episodes": (episodes, 1), "workers": (workers, 1), "seed": (seed, 0), "start_noise": (start_noise, 0)}
+    for name, (value, bound) in least.items():
+        if value < bound:
+            raise InvalidValueError(name, f"at least {bound}", value)
+    maps = maps_of(map_set, orientations)
+    pairs = tuple(PAIRS) if pairs is None else tuple(pairs)
+    for pair in pairs:
+        if pair not in PAIRS:
+            raise UnknownNameError("pair", pair, PAIRS)
+    _refuse_recordings(out)
+
+    anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
+    variant = f"{map_set}{'-orientations' if orientations else ''}"
+    variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
+    variant += "" if clearance is None else f"-clearance_{clearance:g}"
+    physics = physics or Physics()
+    jobs = []
+    for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed)):
+        meta = _meta(maps[place], pair, variant, seed, index)
+        config = maps[place]
+        if start_noise:
+            config = displaced_start(config, start_noise, np.random.default_rng((seed, index)))
+            meta = replace(meta, map_id=f"{meta.map_id}-displaced")
+        jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", config, physics, meta, anchor, clearance))
+    new = not out.exists()
+    out.mkdir(parents=True, exist_ok=True)
+    started = time.perf_counter()
+    try:
+        results = list(progress(_record_all(jobs, workers), len(jobs), "episodes"))
+    except OSError:
+        _remove(jobs, out if new else None)
+        raise
+    return _summary(out, results, time.perf_counter() - started)
+
+
+def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
+    map_id, map_set = identify(map_config)
+    software = version("lerobot_policy_copolicy")
+    return EpisodeMeta(
+        episode_uuid=str(uuid.uuid5(uuid.NAMESPACE_OID, f"copolicy {software} {variant} {pair} {seed} {index}")),
+        session_id=f"simulated-{variant}-{seed}",
+        pair_id=pair,
+        player_0_id=f"{pair}-robot",
+        player_1_id=f"{pair}-human",
+        controller_0="scripted",
+        controller_1="scripted",
+        map_id=map_id,
+        map_set=map_set,
+        seed=int(np.random.SeedSequence((seed, index)).generate_state(1)[0]),
+        source="simulated",
+        software_version=software,
+    )
+
+
+def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]:
+    groups = _groups_by_plan(jobs, workers)
+    if workers == 1 or len(groups) == 1:
+        for group in groups:
+            for job in group:
+                yield job.record()
+        return
+    # Without a lock, which a worker that is killed would never give back.
+    stop = multiprocessing.get_context("spawn").RawValue(ctypes.c_bool, False)
+    with WorkerPool(min(workers, len(groups)), _keep_stop, (stop,)) as pool:
+        futures = [pool.submit(_record_group, group) for group in groups]
+        try:
+            for future in as_completed(futures):
+                yield from future.result()
+        except BaseException:
+            stop.value = True
+            raise
+
+
+def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[EpisodeJob]]:
+    """Episodes with the same goal and obstacles together: planning around them takes time, and a process keeps it."""
+    by_plan: dict[tuple, list[EpisodeJob]] = defaultdict(list)
+    for job in jobs:
+        config = job.map_config
+        by_plan[config.goal, config.obstacles, config.obstacle_size].append(job)
+    parts = -(-workers // len(by_plan))
+    return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
+
+
+_stop: ctypes.c_bool | None = None  # of a worker process, true once the command is stopped
+
+
+def _keep_stop(stop: ctypes.c_bool) -> None:
+    global _stop
+    _stop = stop
+
+
+def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
+    return [job.record() for job in jobs if _stop is None or not _stop.value]
+
+
+def _remove(jobs: list[EpisodeJob], folder: Path | None) -> None:
+    """What was recorded before the disk refused: the same call makes it again, to the byte, where there is room."""
+    for job in jobs:
+        for path in (job.path, job.path.with_name(job.path.name + PART_SUFFIX)):
+            path.unlink(missing_ok=True)
+    if folder is not None:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+def _refuse_recordings(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise OutputExistsError(out)
+    for pattern in ("*.mcap", f"*.mcap{PART_SUFFIX}"):
+        for path in sorted(path for path in out.glob(pattern) if not is_hidden(path.name)):
+            raise OutputExistsError(path)
+
+
+def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict:
+    steps = sum(result.steps for result in results)
+    size = sum(result.size for result in results)
+    return {
+        "out": str(out),
+        "episodes": len(results),
+        "success_rate": sum(result.success for result in results) / len(results),
+        "termination_reasons": dict(sorted(Counter(result.termination_reason for result in results).items())),
+        "steps": steps,
+        "bytes": size,
+        "seconds": round(seconds, 3),
+        "steps_per_second": round(steps / seconds, 1),
+    }
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

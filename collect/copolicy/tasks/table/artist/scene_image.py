@@ -1,0 +1,28 @@
+"""The image of the scene that policies see, drawn without a display: in videos of data sets and in the environment."""
+
+import numpy as np
+
+from copolicy.collect.sdl import pygame
+from copolicy.dataset.features import SCENE_SIZE
+
+from ..map_config import MapConfig
+from .table_view import Pose, TableView
+
+
+class SceneImage:
+    """Draws the table on one map.
+
+    An image shows what is there before the frame's action: map and table, and no arrows of the forces, which would
+    give the action away to whoever learns it from the image. Where the size is not twice as wide as high, black bars
+    fill the rest.
+    """
+
+    def __init__(self, map_config: MapConfig, size: tuple[int, int] = SCENE_SIZE):
+        # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
+        self._surface = pygame.Surface(size, depth=32)
+        self._view = TableView(map_config)
+
+    def draw(self, pose: Pose) -> np.ndarray:
+        """The image at a pose (px, px, rad): `(height, width, 3)` uint8."""
+        self._view.draw(self._surface, self._surface.get_rect(), pose)
+        return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

@@ -1,0 +1,1 @@
+"""Writes and extends LeRobot v3 data sets."""

@@ -1,0 +1,51 @@
+"""An episode as the columns of a LeRobot data set."""
+
+import numpy as np
+
+from copolicy.dataset.clock import Hold, frame_actions, frame_states, previous_actions, stride
+from copolicy.dataset.episode import Episode
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.reward import reward
+
+
+def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, np.ndarray]:
+    """The columns of `features.FEATURES` for one episode, `(T', n)` float32 or `(T',)`, by the rules of the one clock.
+
+    `next.reward` is the reward of the state that the frame's held steps led to; `next.done` marks the last frame,
+    `next.success` the last frame of a success.
+
+    Raises:
+        InvalidValueError: no steps, a value that is not finite, an `fps` that does not divide 30, or an episode that
+            was stored at a lower rate and is asked for at another.
+    """
+    states, actions = _at_rate(episode, fps, hold)
+    after = np.vstack((states[1:], episode.final_state))
+    frames = len(states)
+    last = np.arange(frames) == frames - 1
+    columns = {
+        STATE: states.astype(np.float32),
+        ENVIRONMENT_STATE: np.tile(environment_state(episode.map_config).astype(np.float32), (frames, 1)),
+        HUMAN_ACTION: previous_actions(actions)[:, 2:].astype(np.float32),
+        ACTION: actions.astype(np.float32),
+        "next.reward": np.array([reward(x, y, episode.map_config) for x, y in after[:, :2].tolist()], np.float32),
+        "next.done": last,
+        "next.success": last & episode.meta.success,
+    }
+    for name, column in columns.items():
+        if not np.isfinite(column).all():
+            raise InvalidValueError(f"{name} of episode {episode.meta.episode_uuid}", "finite values", "nan or inf")
+    return columns
+
+
+def _at_rate(episode: Episode, fps: int, hold: Hold) -> tuple[np.ndarray, np.ndarray]:
+    if not len(episode.actions):
+        raise InvalidValueError(f"steps of episode {episode.meta.episode_uuid}", "at least one", 0)
+    if episode.fps == RECORD_HZ:
+        return frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
+    stride(fps)
+    if fps != episode.fps:
+        rate = f"{episode.fps}, the only rate at which episode {episode.meta.episode_uuid} was stored"
+        raise InvalidValueError("fps", rate, fps)
+    return episode.states, episode.actions

@@ -1,0 +1,201 @@
+"""Writes a LeRobot v3 data set in one go: whole episodes as row groups, metadata once at the end.
+
+LeRobot's own `add_frame` / `save_episode` spends most of its time on images that are not there, rewrites the
+metadata at every episode, and loses the set when it is interrupted. The files are the same, row for row.
+"""
+
+import json
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.clock import Hold
+from copolicy.dataset.episode import EPISODE_COLUMNS
+from copolicy.dataset.exceptions import MissingExtraError, RunError
+from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.files.staging import new_folder
+from copolicy.dataset.lerobot_folder.documents import RECORD_FILE
+from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
+from copolicy.dataset.publication.licences import licence_identifier
+from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
+from copolicy.dataset.task import RECORD_HZ
+
+from ..video.scene_video import SCENE, scene_encoder, scene_feature
+from ..video.video_files import VideoFiles
+from .frame_files import FrameFiles
+from .mixtures import Mixtures
+from .prepare import PreparedEpisode, RepeatedEpisodeError
+from .statistics import episode_statistics
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from lerobot.datasets.compute_stats import aggregate_stats
+    from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+    from lerobot.datasets.io_utils import write_info, write_stats
+    from lerobot.datasets.utils import DEFAULT_EPISODES_PATH
+except ImportError as error:
+    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
+
+_ARROW_TYPES = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
+
+
+@dataclass(frozen=True)
+class WrittenDataset:
+    """What was written."""
+
+    root: Path
+    repo_id: str
+    fps: int
+    hold: Hold
+    episodes: int
+    frames: int
+    successes: int
+    mixtures: Mixtures
+
+    def summary(self) -> dict:
+        """For the end of a command."""
+        facts = {name: value for name, value in vars(self).items() if name != "mixtures"}
+        return {**facts, "root": str(self.root), **self.mixtures.summary()}
+
+
+def write_dataset(
+    episodes: Iterable[PreparedEpisode],
+    root: Path,
+    repo_id: str,
+    fps: int,
+    hold: Hold,
+    record: Callable[[], dict],
+    data_file_mb: int | None = None,
+    video_file_mb: int | None = None,
+) -> WrittenDataset:
+    """Writes the episodes, in their order, as a LeRobot v3 data set at `root`.
+
+    How actions were held is an extra key of the feature `action` in meta/info.json, where it survives loading,
+    pushing, splitting and editing and keeps sets of different holds from being merged. The rest of `record`
+    (versions, sources, what was left out, notes by episode) is in meta/copolicy.json: extra keys at the top of
+    info.json do not survive, and inside a feature they would keep sets of different versions from being merged.
+
+    Args:
+        episodes: consumed one by one; all have a film, or none has.
+        record: JSON-able facts about the conversion, asked for once all episodes are consumed.
+        data_file_mb: size of a data file after which the next is begun, LeRobot's default if None.
+        video_file_mb: the same for a video file.
+
+    Raises:
+        OutputExistsError: there is something at `root`; nothing is touched.
+        RunError: no episodes, or two with the same episode_uuid; nothing is left behind.
+    """
+    with new_folder(root) as partial:
+        remaining = iter(episodes)
+        first = next(remaining, None)
+        if first is None:
+            raise RunError(f"{root}: expected at least one episode to write, found none")
+        features = _features(hold, first)
+        meta = LeRobotDatasetMetadata.create(
+            repo_id, fps, features, ROBOT_TYPE, partial, use_videos=SCENE in features,
+            data_files_size_in_mb=data_file_mb, video_files_size_in_mb=video_file_mb,
+        )  # fmt: skip
+        meta.save_episode_tasks([TASK])
+        rows, statistics, notes = _write_data(chain((first,), remaining), meta)
+        _write_episodes(rows, statistics, partial)
+        meta.info.total_episodes, meta.info.total_frames = len(rows), rows[-1]["dataset_to_index"]
+        meta.info.total_tasks, meta.info.splits = 1, {"train": f"0:{len(rows)}"}
+        if SCENE in features:
+            meta.update_video_info(SCENE, scene_encoder(fps))
+        write_info(meta.info, partial)
+        write_stats(aggregate_stats(statistics), partial)
+        text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
+        (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
+        card = minimal_card({row["license"] for row in rows})
+        (partial / CARD_FILE).write_text(card, encoding="utf-8")
+    _warn_of_licences(root, rows)
+    successes = sum(row["success"] for row in rows)
+    frames = rows[-1]["dataset_to_index"]
+    return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows))
+
+
+def _warn_of_licences(root: Path, rows: list[dict]) -> None:
+    """Recordings say what they say; that a card will refuse it is told before the data set is worked with."""
+    unlisted = Counter(row["license"] for row in rows if row["license"] and not licence_identifier(row["license"]))
+    for licence, count in unlisted.items():
+        logging.warning(
+            "warning: %s: %d episodes state the licence %r, which is none of the Hub's identifiers: "
+            "a card will refuse it", root, count, licence,
+        )  # fmt: skip
+
+
+def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
+    action = {**FEATURES[ACTION], "hold": hold, "record_hz": RECORD_HZ}
+    video = {SCENE: scene_feature(example.scene.size)} if example.scene else {}
+    return {**FEATURES, ACTION: action, **video}
+
+
+def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
+    """Rows of meta/episodes without statistics, statistics of every episode, and notes by episode."""
+    rows: list[dict] = []
+    statistics: list[dict] = []
+    notes: dict[str, list[str]] = {}
+    origins: dict[str, str] = {}
+    start = 0
+    with (
+        FrameFiles(meta.root, meta.features, meta.data_files_size_in_mb, meta.chunks_size) as frames,
+        VideoFiles(meta.root, SCENE, meta.fps, meta.video_files_size_in_mb, meta.chunks_size) as videos,
+    ):
+        for index, episode in enumerate(episodes):
+            uuid = episode.meta.episode_uuid
+            if uuid in origins:
+                raise RepeatedEpisodeError(uuid, origins[uuid], episode.origin or f"episode {index}")
+            origins[uuid] = episode.origin or f"episode {index}"
+            clock = _clock_columns(index, start, episode.frames, meta.fps)
+            end = start + episode.frames
+            rows.append(
+                {
+                    "episode_index": index,
+                    "tasks": [TASK],
+                    "length": episode.frames,
+                    **frames.append({**episode.columns, **clock}),
+                    **(videos.append(episode.scene.mp4, episode.frames) if episode.scene else {}),
+                    "dataset_from_index": start,
+                    "dataset_to_index": end,
+                    **asdict(episode.meta),
+                    "meta/episodes/chunk_index": 0,
+                    "meta/episodes/file_index": 0,
+                }
+            )
+            statistics.append({**episode.statistics, **episode_statistics(clock)})
+            if episode.notes:
+                notes[uuid] = list(episode.notes)
+            start = end
+    return rows, statistics, notes
+
+
+def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, np.ndarray]:
+    order = np.arange(frames)
+    return {
+        "timestamp": (order / fps).astype(np.float32),
+        "frame_index": order,
+        "episode_index": np.full(frames, index),
+        "index": start + order,
+        "task_index": np.zeros(frames, np.int64),
+    }
+
+
+def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> None:
+    columns = {}
+    for name in rows[0]:
+        kind = EPISODE_COLUMNS.get(name)
+        # A number that is not known is no number: every reader of tables takes null for that.
+        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None, from_pandas=True)
+    for feature, kinds in statistics[0].items():
+        for kind in kinds:
+            columns[f"stats/{feature}/{kind}"] = pa.array([entry[feature][kind].tolist() for entry in statistics])
+    path = root / DEFAULT_EPISODES_PATH.format(chunk_index=0, file_index=0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=True)

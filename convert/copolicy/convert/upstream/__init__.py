@@ -1,0 +1,1 @@
+"""Files of the original program, in its three formats."""

@@ -1,0 +1,147 @@
+"""Imports `trajectories/ep_N.pkl`, what the original program writes while playing.
+
+A row holds the state after its action, so that the states before the actions are the rows moved by one. The state
+before the first action is the map file's start if that, with the dynamics, leads to the first row, else it is found
+by undoing the step. Goal and obstacles are those of the rows, whatever the map file says. The program saves
+episodes that end by success or collision only; time-outs are lost.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.episode import Episode
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.map_config import MapConfig
+from copolicy.tasks.table.physics import Physics
+
+from ..dynamics import step_angular, step_linear, undo_angular, undo_linear
+from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, start_pose
+from .maps import start_differs
+from .restricted_npz import load_npz
+from .restricted_pickle import load_pickle
+
+_FIXED_FIELDS = 19  # of a row; two for each obstacle are one array more
+_EXACT = 1e-6  # px, rad: raw files are in double precision
+_FOLLOWS = 1e-3
+
+
+def read_raw(path: Path, options: UpstreamOptions) -> Episode:
+    """One `ep_N.pkl`, with `../map_cfg/ep_N.npz` and `../fluency/ep_N.npz` where they exist.
+
+    Raises:
+        FileFormatError: a damaged file, or one that is not what the original program writes.
+    """
+    if not path.is_file():
+        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", kind_of(path))
+    content = path.read_bytes()
+    rows = load_pickle(content, path)
+    after, actions, goal, obstacles, recorded_success = _parse(rows, path)
+    notes: tuple[str, ...] = ()
+    file_map = _map_file(path.parent.parent / "map_cfg" / f"{path.stem}.npz", options.obstacle_size)
+    start = file_map.start if file_map else None
+    trajectory = best_fit(lambda physics: _shift(after, actions, start, physics), options.angular_limit)
+    first = trajectory.states[0]
+    begins = start if start is not None and np.allclose(first[:3], start, rtol=0, atol=_EXACT) else start_pose(first)
+    config = MapConfig(begins, goal, obstacles, options.obstacle_size)
+    flags: tuple[str, ...] = ()
+    if file_map is None:
+        notes += ("no map file of this name: start found by undoing the first step",)
+    elif difference := _difference(file_map, config, first):
+        flags += ("map_mismatch", "map_recovered")
+        notes += (f"map file is not the one played: {difference}; start, goal and obstacles are those of the rows",)
+    if trajectory.residual > _FOLLOWS:
+        flags += ("dynamics_mismatch",)
+        notes += (f"a step differs from the dynamics by {trajectory.residual:.2g} px or rad",)
+    notes += _fluency_note(path.parent.parent / "fluency" / f"{path.stem}.npz", len(actions))
+    origin = f"{path.parent.name}/{path.name}"
+    return build_episode(trajectory, config, content, RECORD_HZ, origin, flags, notes, recorded_success)
+
+
+def _parse(rows: object, path: Path):
+    """States after `(T, 6)`, clipped actions `(T, 4)`, goal, obstacles and the success flag of the last row."""
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        raise FileFormatError(path, "a list of rows, each a list", type(rows).__name__)
+    width = len(rows[0])
+    if width < _FIXED_FIELDS or any(len(row) != width for row in rows):
+        raise FileFormatError(path, f"rows of one length of at least {_FIXED_FIELDS}", f"{width} fields in the first")
+    try:
+        after = np.array([row[:6] for row in rows], dtype=float)
+        actions = np.array([np.ravel(row[6]) for row in rows], dtype=float)
+        settings = np.array([np.concatenate([np.ravel(part) for part in row[12 : width - 6]]) for row in rows], float)
+        steps = np.array([row[10] for row in rows], dtype=int)
+        periods = np.array([row[11] for row in rows], dtype=float)
+        success = bool(rows[-1][9])
+    except (TypeError, ValueError, OverflowError) as error:
+        raise FileFormatError(path, "rows of numbers as the original program writes them", str(error)) from None
+    if actions.shape != (len(rows), 4) or settings.shape != (len(rows), 2 + 2 * (width - _FIXED_FIELDS)):
+        raise FileFormatError(
+            path, "four forces, a goal and obstacles in each row", f"{actions.shape}, {settings.shape}"
+        )
+    if not (np.isfinite(after).all() and np.isfinite(actions).all() and np.isfinite(settings).all()):
+        raise FileFormatError(path, "finite numbers", "nan or inf")
+    if (steps != np.arange(1, len(rows) + 1)).any():
+        raise FileFormatError(path, f"steps numbered 1 to {len(rows)}", f"{steps[0]} to {steps[-1]}")
+    if not np.allclose(periods, 1 / RECORD_HZ):
+        raise FileFormatError(path, f"steps of 1/{RECORD_HZ} s", f"{periods.min():.4g} to {periods.max():.4g} s")
+    if (settings != settings[0]).any():
+        raise FileFormatError(path, "one goal and one set of obstacles", "rows that differ in them")
+    pairs = [(float(x), float(y)) for x, y in settings[0].reshape(-1, 2)]
+    return after, np.clip(actions, -1, 1), pairs[0], tuple(pairs[1:]), success
+
+
+def _map_file(path: Path, obstacle_size: int) -> MapConfig | None:
+    if not path.is_file():
+        return None
+    fields = load_npz(path)
+    try:
+        table, goal = fields["table"].item(), fields["goal"].item()["goal"]
+        obstacles = np.asarray(fields["obstacles"].item()["obstacles"], dtype=float).reshape(-1, 2)
+        start = (float(table["x"]), float(table["y"]), float(table["angle"]))
+        return MapConfig(start, (float(goal[0]), float(goal[1])), tuple(map(tuple, obstacles)), obstacle_size)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise FileFormatError(path, "a map file with table, goal and obstacles", repr(error)) from None
+
+
+def _shift(after: np.ndarray, actions: np.ndarray, start: tuple | None, physics: Physics) -> Trajectory:
+    first = _undone(after[0], actions[0], physics)
+    if start is not None:
+        told = np.array((*start, 0.0, 0.0, 0.0))
+        if _step_error(told[None], actions[:1], after[:1], physics) <= _EXACT:
+            first = told
+    states = np.vstack((first, after[:-1]))
+    return Trajectory(states, actions, after[-1], physics, _step_error(states, actions, after, physics))
+
+
+def _undone(after: np.ndarray, action: np.ndarray, physics: Physics) -> np.ndarray:
+    """The state `(6,)` before the first; of the possible spins the slowest, since an episode starts at rest."""
+    position, velocity = undo_linear(after[:2], after[3:5], action, physics)
+    angles, spins = undo_angular(after[2], after[5], action, physics)
+    slowest = int(np.nan_to_num(np.abs(spins), nan=np.inf).argmin())
+    return np.array((*position, angles[slowest] % (2 * np.pi), *velocity, spins[slowest]))
+
+
+def _step_error(states: np.ndarray, actions: np.ndarray, after: np.ndarray, physics: Physics) -> float:
+    position, velocity = step_linear(states[:, :2], states[:, 3:5], actions, physics)
+    theta, omega = step_angular(states[:, 2], states[:, 5], actions, physics)
+    turn = (theta - after[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    differences = (position - after[:, :2], velocity - after[:, 3:5], turn, omega - after[:, 5])
+    return max(float(np.abs(difference).max()) for difference in differences)
+
+
+def _difference(file_map: MapConfig, config: MapConfig, first: np.ndarray) -> str:
+    if file_map.goal != config.goal:
+        return f"its goal is {file_map.goal}"
+    if file_map.obstacles != config.obstacles:
+        return f"its obstacles are {file_map.obstacles}"
+    return start_differs(file_map, first)
+
+
+def _fluency_note(path: Path, steps: int) -> tuple[str, ...]:
+    """The fluency file holds what follows from the rows; only its length says something new."""
+    if not path.is_file():
+        return ()
+    lengths = {len(np.atleast_1d(values)) for values in load_npz(path).values()}
+    return () if lengths == {steps} else (f"fluency file has {sorted(lengths)} steps for {steps} rows",)

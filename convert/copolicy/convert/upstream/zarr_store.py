@@ -1,0 +1,190 @@
+"""Reads arrays of numbers from a Zarr store of version 2 or 3, a folder or one zip file.
+
+The `zarr` library decodes the chunks. What its metadata ask for is looked at first: a codec may unpickle, and a
+shape or an archive may claim more memory than any demonstrations take.
+"""
+
+import json
+import math
+import zipfile
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.files.file_kinds import kind_of
+
+_LARGEST = 1 << 30  # of an array, of a chunk of it and of an unpacked archive, bytes
+_LARGEST_METADATA = 1 << 20
+_MOST_CHUNKS = 1 << 20
+_COMPRESSORS = ("blosc", "bz2", "gzip", "lz4", "lzma", "zlib", "zstd")  # of version 2; numcodecs also has pickle
+_CODECS = ("blosc", "bytes", "crc32c", "gzip", "sharding_indexed", "transpose", "zstd")  # of version 3
+
+
+def array_metadata_files(array: str) -> tuple[str, str]:
+    """Where the metadata of an array are, in a store of version 2 and of version 3."""
+    return f"{array}/.zarray", f"{array}/zarr.json"
+
+
+def is_zipped(path: Path) -> bool:
+    """Whether there is a zip file, whatever it holds."""
+    return path.is_file() and zipfile.is_zipfile(path)
+
+
+class ZarrArrays:
+    """The arrays of a store.
+
+    Attributes:
+        path: of the folder or the zip file.
+    """
+
+    def __init__(self, path: Path, array: str):
+        """
+        Args:
+            array: one that must be there, such as `data/obs`; in an archive it may lie below a folder.
+
+        Raises:
+            FileFormatError: no such store, or an archive that is damaged, too large or has names outside of it.
+        """
+        self.path = path
+        self._prefix = ""
+        self._members: dict[str, zipfile.ZipInfo] | None = None
+        if path.is_file():
+            self._members = _members(path)
+            ends = array_metadata_files(array)
+            prefixes = {name.removesuffix(end) for name in self._members for end in ends if name.endswith(end)}
+            prefixes = {prefix for prefix in prefixes if not prefix or prefix.endswith("/")}
+            if len(prefixes) != 1:
+                found = f"{len(prefixes)} of them" if prefixes else f"{kind_of(path)} without it"
+                raise FileFormatError(path, f"one zipped Zarr store with an array {array}", found)
+            self._prefix = prefixes.pop()
+
+    def read(self, array: str) -> np.ndarray:
+        """An array by its path in the store.
+
+        Raises:
+            FileFormatError: there is none, its metadata ask for what is not read here (filters, data types other than
+                numbers, codecs beyond the numeric ones, a size beyond reason), or a chunk is damaged.
+            MissingExtraError: zarr is not installed.
+        """
+        place = self.path / array
+        version = self._screened(array)
+        try:
+            import zarr
+            from zarr.storage import LocalStore, ZipStore
+        except ImportError:
+            raise MissingExtraError("zarr") from None
+        try:
+            kind = LocalStore if self._members is None else ZipStore
+            store = kind(self.path, read_only=True)
+            try:
+                opened = zarr.open_array(store, path=f"{self._prefix}{array}", zarr_format=version, mode="r")  # type: ignore[arg-type]
+                return np.asarray(opened[...])
+            finally:
+                store.close()
+        except (Exception, MemoryError) as error:  # as many kinds as there are codecs
+            raise FileFormatError(place, "an array with intact chunks", _line(error)) from None
+
+    def _screened(self, array: str) -> int:
+        """The version of an array whose metadata ask for nothing but numbers of a reasonable amount."""
+        for name, version, require in zip(array_metadata_files(array), (2, 3), (_require_2, _require_3), strict=True):
+            text = self._text(name)
+            if text is None:
+                continue
+            try:
+                require(json.loads(text))
+            except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
+                raise FileFormatError(self.path / name, "the metadata of an array of numbers", _line(error)) from None
+            return version
+        raise FileFormatError(self.path / array, "a Zarr array (.zarray or zarr.json)", "none")
+
+    def _text(self, name: str) -> bytes | None:
+        try:
+            if self._members is not None:
+                member = self._members.get(self._prefix + name)
+                if member is None:
+                    return None
+                with zipfile.ZipFile(self.path) as archive, archive.open(member) as file:
+                    return file.read(_LARGEST_METADATA)
+            path = self.path / name
+            if not path.is_file():
+                return None
+            with path.open("rb") as file:
+                return file.read(_LARGEST_METADATA)
+        except Exception as error:  # zlib, CRC, encryption, permissions
+            raise FileFormatError(self.path / name, "readable metadata of an array", _line(error)) from None
+
+
+def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except OSError as error:
+        raise FileFormatError(path, "a readable zip file", error.strerror or str(error)) from None
+    except Exception as error:
+        found = kind_of(path)
+        found = f"a damaged one ({_line(error)})" if "zip" in found else found
+        raise FileFormatError(path, "a zipped Zarr store", found) from None
+    for member in members:
+        name = PurePosixPath(member.filename.replace("\\", "/"))
+        if name.is_absolute() or ".." in name.parts or any(":" in part for part in name.parts[:1]):
+            raise FileFormatError(path, "names inside of the archive", repr(member.filename))
+    size = sum(member.file_size for member in members)
+    if size > _LARGEST:
+        raise FileFormatError(path, f"an archive of at most {_LARGEST >> 20} MiB unpacked", f"{size >> 20} MiB")
+    return {member.filename: member for member in members}
+
+
+def _require_2(fields: dict[str, Any]) -> None:
+    if fields["zarr_format"] != 2:
+        raise ValueError(f"zarr_format {fields['zarr_format']!r}")
+    if fields.get("filters"):
+        raise ValueError(f"filters {fields['filters']!r}")
+    compressor = fields["compressor"]
+    if compressor is not None and compressor.get("id") not in _COMPRESSORS:
+        raise ValueError(f"compressor {compressor.get('id')!r}, none of {', '.join(_COMPRESSORS)}")
+    dtype = np.dtype(fields["dtype"])
+    if dtype.kind not in "biuf":
+        raise ValueError(f"data type {fields['dtype']!r}")
+    _require_size(fields["shape"], fields["chunks"], dtype.itemsize)
+
+
+def _require_3(fields: dict[str, Any]) -> None:
+    if (fields["zarr_format"], fields["node_type"]) != (3, "array"):
+        raise ValueError(f"zarr_format {fields['zarr_format']!r}, node_type {fields['node_type']!r}")
+    if fields.get("storage_transformers"):
+        raise ValueError(f"storage_transformers {fields['storage_transformers']!r}")
+    if not isinstance(fields["data_type"], str) or np.dtype(fields["data_type"]).kind not in "biuf":
+        raise ValueError(f"data type {fields['data_type']!r}")
+    grid = fields["chunk_grid"]
+    if grid["name"] != "regular":
+        raise ValueError(f"chunk_grid {grid['name']!r}")
+    itemsize = np.dtype(fields["data_type"]).itemsize
+    _require_size(fields["shape"], grid["configuration"]["chunk_shape"], itemsize)
+    _require_codecs(fields["codecs"])
+
+
+def _require_codecs(codecs: list[Any]) -> None:
+    for entry in codecs:
+        codec: dict[str, Any] = {"name": entry} if isinstance(entry, str) else entry
+        name = codec["name"]
+        if name not in _CODECS:
+            raise ValueError(f"codec {name!r}, none of {', '.join(_CODECS)}")
+        if name == "sharding_indexed":
+            _require_codecs(codec["configuration"]["codecs"])
+            _require_codecs(codec["configuration"].get("index_codecs", []))
+
+
+def _require_size(shape: list[int], chunks: list[int], itemsize: int) -> None:
+    if not all(type(size) is int for size in (*shape, *chunks)) or len(shape) != len(chunks):
+        raise ValueError(f"shape {shape} in chunks {chunks}")
+    if min((*chunks, 1)) < 1 or min((*shape, 0)) < 0:
+        raise ValueError(f"shape {shape} in chunks {chunks}")
+    number = math.prod(-(-size // chunk) for size, chunk in zip(shape, chunks, strict=True))
+    if max(math.prod(shape), math.prod(chunks)) * itemsize > _LARGEST or number > _MOST_CHUNKS:
+        raise ValueError(f"shape {shape} in chunks {chunks}, more than {_LARGEST >> 20} MiB or {_MOST_CHUNKS} chunks")
+
+
+def _line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,1 @@
+"""What every command has in common: parsers, output, exit status, flags that are numbers."""

@@ -1,0 +1,1 @@
+"""The files of a trained policy, read without torch."""

@@ -1,0 +1,248 @@
+"""What a walk over a recording collects, and the episode that it makes in the end."""
+
+import math
+import zlib
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Metadata, Schema
+
+from copolicy.tasks.table.map_config import MapConfig
+
+from ..episode import Episode
+from ..exceptions import FileFormatError, ForeignRecordingError
+from ..physics_text import physics_text
+from ..task import RECORD_HZ
+from . import episode_records
+from .mcap_chunks import MESSAGE_HEAD, chunk_records, walk_chunk
+from .mcap_records import RecordWalk
+from .messages.copolicy_pb2 import EpisodeEvent, PlayerAction, TableState
+from .soundness import (
+    RECOVERY,
+    UNVERIFIED,
+    CheckSums,
+    channels_text,
+    require_start_digest,
+    require_statistics,
+    require_version,
+    sole_records,
+)
+from .topics import ACTIONS, EVENT, SCHEMA_PACKAGE, TABLE_STATE, Topic, channel_difference
+
+_MOTION = (TABLE_STATE, *ACTIONS)
+
+
+class RecordingContents:
+    """What a walk over a file has collected so far: 88 bytes a step and the events, whatever else the file holds.
+
+    Attributes:
+        check_sums: what of the file carries one.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.check_sums = CheckSums()
+        self._declared: dict[tuple[int, int], bytes] = {}
+        self._schemas: dict[int, Schema] = {}
+        self._handlers: dict[int, Callable[[bytes], None]] = {}
+        self._topics: set[str] = set()  # of every channel
+        self._differences: dict[str, str] = {}  # by topic of ours: what keeps a channel of that name from being read
+        self._read: set[str] = set()  # topics of ours with a channel that can be read
+        self._ours = False  # a channel has a schema of ours, of this version or another
+        self._records: dict[str, list[dict[str, str]]] = {}
+        self._maps: set[bytes] = set()
+        self._messages = 0
+        self._events: list[EpisodeEvent] = []
+        self._steps = {topic.name: array("q") for topic in _MOTION}
+        self._values = {topic.name: array("d") for topic in _MOTION}
+
+    @property
+    def events(self) -> tuple[EpisodeEvent, ...]:
+        """What happened, by step."""
+        return tuple(sorted(self._events, key=lambda event: event.step))
+
+    def take(self, opcode: int, body: bytes) -> None:
+        """Keeps what matters of one record of the data section.
+
+        Raises:
+            UnreadChunkError: a chunk that may be sound is not read here.
+            Exception: the record is damaged.
+        """
+        if opcode == Opcode.CHUNK:
+            data, verified = chunk_records(body)
+            self.check_sums.chunks += 1
+            self.check_sums.chunks_without += not verified
+            self._messages += walk_chunk(data, self._handlers, self._declare)
+        elif opcode == Opcode.MESSAGE:
+            if len(body) < MESSAGE_HEAD:
+                raise ValueError(f"a message of {len(body)} bytes")
+            handler = self._handlers.get(int.from_bytes(body[:2], "little"))
+            if handler is not None:
+                self.check_sums.lone_messages += 1
+                handler(body[MESSAGE_HEAD:])
+        elif opcode == Opcode.METADATA:
+            record = Metadata.read(ReadDataStream(BytesIO(body)))
+            self._records.setdefault(record.name, []).append(record.metadata)
+        elif opcode == Opcode.ATTACHMENT:
+            self._take_attachment(body)
+        else:
+            self._declare(opcode, body)
+
+    def _take_attachment(self, body: bytes) -> None:
+        expected = int.from_bytes(body[-4:], "little")
+        if expected not in (0, zlib.crc32(body[:-4])):
+            raise ValueError("an attachment that fails its check sum")
+        attachment = Attachment.read(ReadDataStream(BytesIO(body)))
+        if attachment.name == episode_records.MAP_ATTACHMENT:
+            self._maps.add(attachment.data)
+            self.check_sums.map = expected != 0
+
+    def _declare(self, opcode: int, body: bytes) -> None:
+        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
+            return
+        key = (opcode, int.from_bytes(body[:2], "little"))
+        if key in self._declared:
+            if self._declared[key] != body:
+                raise ValueError(f"two {'schemas' if opcode == Opcode.SCHEMA else 'channels'} of number {key[1]}")
+            return
+        self._declared[key] = body
+        stream = ReadDataStream(BytesIO(body))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self._schemas[schema.id] = schema
+            return
+        channel = Channel.read(stream)
+        schema = self._schemas.get(channel.schema_id)
+        if schema is None and channel.schema_id:
+            raise ValueError(f"a channel without its schema of number {channel.schema_id}")
+        self._ours |= schema is not None and schema.name.startswith(SCHEMA_PACKAGE)
+        self._topics.add(channel.topic)
+        for topic in (*_MOTION, EVENT):
+            if topic.name == channel.topic:
+                difference = channel_difference(channel, schema, topic)
+                if difference:
+                    # Another project may have a channel of this name beside ours.
+                    self._differences[topic.name] = difference
+                else:
+                    self._read.add(topic.name)
+                    self._handlers[channel.id] = self._handler(topic)
+
+    def _handler(self, topic: Topic) -> Callable[[bytes], None]:
+        if topic is EVENT:
+            return lambda payload: self._events.append(EpisodeEvent.FromString(payload))
+        step, extend = self._steps[topic.name].append, self._values[topic.name].extend
+        if topic is TABLE_STATE:
+            parse_state = TableState.FromString
+
+            def take_state(payload: bytes) -> None:
+                state = parse_state(payload)
+                step(state.step)
+                extend((state.x, state.y, state.theta, state.vx, state.vy, state.omega))
+
+            return take_state
+        parse_action = PlayerAction.FromString
+
+        def take_action(payload: bytes) -> None:
+            action = parse_action(payload)
+            step(action.step)
+            extend((action.fx, action.fy))
+
+        return take_action
+
+    def require_this_task(self, summary_topics: Sequence[str] = ()) -> None:
+        """Checks that the file is a recording of this task and of a version that this reader knows.
+
+        Args:
+            summary_topics: further channels of the file, from parts of it that were not read.
+
+        Raises:
+            ForeignRecordingError: it is none.
+        """
+        infos = self._records.get("dataset_info", [])
+        ours = [info for info in infos if episode_records.START_DIGEST in info]
+        if not self._ours and not ours:
+            found = channels_text((*self._topics, *summary_topics))
+            raise ForeignRecordingError(self.path, "a recording of this task", found)
+        for info in ours or infos:
+            require_version(self.path, {"dataset_info": info})
+
+    def episode(self, walk: RecordWalk) -> Episode:
+        """The episode, once the whole file has been walked.
+
+        Raises:
+            FileFormatError: it is not whole.
+            InvalidValueError: the metadata or the map are not what they should be.
+        """
+        path, records = self.path, sole_records(self.path, self._records)
+        for topic in self._steps:
+            if topic in self._differences and topic not in self._read:
+                raise FileFormatError(path, "a recording of this task", self._differences[topic])
+        meta = episode_records.decode(records)
+        physics = episode_records.decode_physics(records)
+        if len(self._maps) != 1:
+            found = "none" if not self._maps else f"{len(self._maps)} of them"
+            raise FileFormatError(path, f"an attachment {episode_records.MAP_ATTACHMENT!r}", found)
+        fps = records["dataset_info"].get("fps")
+        if fps != str(RECORD_HZ):
+            raise FileFormatError(path, f"a recording at {RECORD_HZ} Hz", f"fps {fps!r}")
+        require_statistics(path, walk, self._messages + walk.counts[Opcode.MESSAGE])
+        states, actions = self._motion(records[episode_records.RESULT].get("steps"))
+        sums = self.check_sums
+        sums.data = walk.data_verified
+        if not sums.data:
+            sums.start = require_start_digest(path, records)
+        config = MapConfig.from_json(*self._maps)
+        seen = {"physics": physics_text(physics), "obstacle_size": config.obstacle_size}
+        meta = replace(meta, source_sha256=walk.sha256, **seen)
+        # What a recovered file could not verify in its source, its own check sums do not vouch for.
+        earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")
+        notes = (*filter(None, (earlier,)), *sums.notes())
+        return Episode(states[:-1], actions, states[-1], meta, config, RECORD_HZ, physics, notes)
+
+    def _motion(self, expected: str | None) -> tuple[np.ndarray, np.ndarray]:
+        """States `(T + 1, 7)` and actions `(T, 4)` by step, whatever the order of their messages.
+
+        Args:
+            expected: steps, as the result of the episode counts them.
+        """
+        count = len(self._steps[TABLE_STATE.name]) - 1
+        if expected != str(count):
+            raise FileFormatError(self.path, f"states of {expected} steps and the final one", f"{count + 1} states")
+        values = []
+        for topic, length in ((TABLE_STATE, count + 1), *((topic, count) for topic in ACTIONS)):
+            steps = np.asarray(self._steps[topic.name])
+            order = np.argsort(steps, kind="stable")
+            if not np.array_equal(steps[order], np.arange(length)):
+                gap = _first_gap(steps[order], length)
+                raise FileFormatError(self.path, f"steps 0 to {length - 1} in {topic.name}", gap)
+            values.append(np.asarray(self._values[topic.name]).reshape(length, 6 if topic is TABLE_STATE else 2)[order])
+        table, actions = values[0], np.hstack(values[1:])
+        if not np.isfinite(table).all():
+            raise FileFormatError(self.path, "finite states", "others")
+        if not (np.abs(actions) <= 1).all():
+            raise FileFormatError(self.path, "actions in [-1, 1]", "others")
+        return _state_vectors(table), actions
+
+
+def _first_gap(steps: np.ndarray, count: int) -> str:
+    if len(steps) != count:
+        return f"{len(steps)} messages"
+    index = int(np.flatnonzero(steps != np.arange(count))[0])
+    return f"step {steps[index]} in place {index}"
+
+
+def _state_vectors(table: np.ndarray) -> np.ndarray:
+    """`(T, 6)` x, y, theta, velocity to `(T, 7)`, with the same cosine as `features.state_vector`, to the last bit."""
+    thetas = table[:, 2].tolist()
+    states = np.empty((len(table), 7))
+    states[:, :2] = table[:, :2]
+    states[:, 2] = [math.cos(theta) for theta in thetas]
+    states[:, 3] = [math.sin(theta) for theta in thetas]
+    states[:, 4:] = table[:, 3:]
+    return states

@@ -1,0 +1,150 @@
+"""How an episode's columns are spread over the metadata records of its recording, there and back."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any, get_args
+
+from copolicy.tasks.table.physics import Physics
+
+from ..episode import EPISODE_COLUMNS, EpisodeMeta, Source, TerminationReason
+from ..exceptions import InvalidValueError
+from ..features import ACTION, FEATURES, STATE
+from ..task import RECORD_HZ
+
+SCHEMA_VERSION = "1"
+"""Version of what a recording holds; a reader refuses one that it does not know."""
+
+MAP_ATTACHMENT = "map_config.json"
+"""Name of the attachment with the map, `MapConfig.to_json`."""
+
+COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
+    "session": ("session_id",),
+    "episode": ("episode_uuid", "map_id", "map_set", "seed", "source"),
+    "players": ("pair_id", "player_0_id", "player_1_id", "controller_0", "controller_1"),
+    "devices": (),
+    "software": ("software_version",),
+    "consent": ("consent_id", "license"),
+    "physics": (),
+    "dataset_info": (),
+}
+"""The metadata records at the start of a recording and the episode columns that each holds."""
+
+RESULT = "episode_result"
+COLUMNS_AT_END = (
+    "success",
+    "termination_reason",
+    "duration_s",
+    "achieved_hz",
+    "late_ticks",
+    "route_class",
+    "quality_flags",
+    "discarded",
+)
+"""The episode columns of the record `episode_result` at the end of a recording."""
+
+START_DIGEST = "start_sha256"
+"""The entry of the record `dataset_info` that vouches for all records at the start (`start_digest`)."""
+
+_CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
+
+
+def dataset_info() -> dict[str, str]:
+    """What a converter needs to know about the numbers, so that it need not know the program that wrote them."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "fps": str(RECORD_HZ),
+        "state_names": json.dumps(FEATURES[STATE]["names"]),
+        "state_units": "px, px, 1, 1, px/s, px/s, rad/s",
+        "action_names": json.dumps(FEATURES[ACTION]["names"]),
+        "action_units": "a player's full force, [-1, 1]",
+        "alignment": "the action of step k was taken in the state of step k; one more state follows the last action",
+    }
+
+
+def encode_physics(physics: Physics) -> dict[str, str]:
+    """The record `physics`: every setting of the dynamics, in exact digits."""
+    return {name: repr(value) for name, value in asdict(physics).items()}
+
+
+def decode_physics(records: Mapping[str, Mapping[str, str]]) -> Physics:
+    """The inverse of `encode_physics` over all records of a recording.
+
+    Raises:
+        InvalidValueError: a setting is missing or no number.
+    """
+    entries = records.get("physics", {})
+    settings: dict[str, Any] = {}
+    for setting in fields(Physics):
+        text = entries.get(setting.name)
+        try:
+            settings[setting.name] = int(text or "") if setting.name == "step_limit" else float(text or "")
+        except ValueError:
+            raise InvalidValueError(f"metadata record 'physics', entry {setting.name!r}", "a number", text) from None
+    return Physics(**settings)
+
+
+def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
+    """The sha256 of the metadata records at the start, without the digest itself.
+
+    The check sum over a recording's metadata stands at the end of its file; where a recording broke off, this entry
+    alone tells whether they are still what was written.
+    """
+    start = {
+        record: {name: text for name, text in records[record].items() if name != START_DIGEST}
+        for record in COLUMNS_AT_START
+        if record in records
+    }
+    return hashlib.sha256(json.dumps(start, sort_keys=True).encode()).hexdigest()
+
+
+def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:
+    """The texts of some columns; `true` and `false` for a bool, the shortest exact digits for a float."""
+    return {name: _encode(getattr(meta, name)) for name in columns}
+
+
+def decode(records: Mapping[str, Mapping[str, str]]) -> EpisodeMeta:
+    """The inverse of `encode` over all records of a recording.
+
+    Raises:
+        InvalidValueError: a record or one of its entries is missing or is not of its column's type.
+    """
+    columns: dict[str, Any] = {}
+    for record, names in {**COLUMNS_AT_START, RESULT: COLUMNS_AT_END}.items():
+        if record not in records:
+            raise InvalidValueError("metadata", f"a record {record!r}", sorted(records))
+        for name in names:
+            if name not in records[record]:
+                raise InvalidValueError(f"metadata record {record!r}", f"an entry {name!r}", sorted(records[record]))
+            columns[name] = _decode(name, records[record][name])
+    version = records["dataset_info"].get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise InvalidValueError("schema_version", SCHEMA_VERSION, version)
+    return EpisodeMeta(**columns)
+
+
+def _encode(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _decode(name: str, text: str) -> object:
+    kind = EPISODE_COLUMNS[name]
+    try:
+        if kind == "bool":
+            return {"true": True, "false": False}[text]
+        if kind == "int":
+            return int(text)
+        if kind == "float":
+            number = float(text)
+            if math.isinf(number):
+                raise ValueError
+            return number
+    except (KeyError, ValueError):
+        raise InvalidValueError(f"metadata entry {name!r}", kind, text) from None
+    if name in _CHOICES and text not in _CHOICES[name]:
+        raise InvalidValueError(f"metadata entry {name!r}", f"one of {_CHOICES[name]}", text)
+    return text

@@ -1,0 +1,103 @@
+"""`copolicy-eval`: the paper's studies, replayed on a checkpoint."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
+from copolicy.dataset.command_line.flag_numbers import whole_number
+from copolicy.dataset.files.staging import require_new
+from copolicy.tasks.table.maps import MAP_SETS, map_set
+
+from .comparison import add_compare_command
+from .human_study import add_human_command
+from .partner_study import add_partner_command
+from .plans.command import add_plans_command
+from .result_file import write_json
+from .study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of `copolicy-eval`."""
+    parser, commands = command_parser("copolicy-eval", "Judge a co-policy as the paper does.")
+    coplan = add_command(
+        commands,
+        "coplan",
+        _coplan,
+        "both players act on one sampled plan, on all maps of a set",
+        "copolicy-eval coplan --policy outputs/run/checkpoints/last/pretrained_model --maps holdout --out eval.json",
+        study_needs,
+    )
+    coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
+    coplan.add_argument("--maps", default="holdout", choices=sorted(MAP_SETS), help="map set (default: holdout)")
+    coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    coplan.add_argument(
+        "--repeats", type=whole_number("--repeats", 1, 10_000), default=1, help="episodes a map (default: 1)"
+    )
+    coplan.add_argument(
+        "--limit", type=whole_number("--limit"), help="only the first N maps, for a quick look; stated in the result"
+    )
+    coplan.add_argument("--out", required=True, type=Path, help="where eval.json goes; the picture stands beside it")
+    add_study_flags(coplan, actions_per_plan=8)
+    add_partner_command(commands)
+    add_human_command(commands)
+    add_compare_command(commands)
+    add_plans_command(commands)
+    return run(parser, argv)
+
+
+def _coplan(arguments: argparse.Namespace) -> dict:
+    picture = arguments.out.with_suffix(".png")
+    require_new(arguments.out, picture, overwrite=arguments.overwrite)
+    # Deferred: `--help` and a wrong call should not wait for torch.
+    from .coplan.figure import save_trajectories
+    from .coplan.rollouts import coplan
+    from .summary import summarise
+
+    planner = planner_of(arguments.policy, arguments)
+    maps = map_set(arguments.maps, arguments.orientations)[: arguments.limit]
+    protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
+    with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
+        outcomes = coplan(
+            planner,
+            maps,
+            protocol.physics,
+            repeats=arguments.repeats,
+            actions_per_plan=arguments.actions_per_plan,
+            fps=protocol.fps,
+            seed=arguments.seed,
+            on_plan=lambda finished: bar.update(finished - bar.n),
+        )
+    summary = summarise(outcomes, planner)
+    result = {
+        "study": "coplan",
+        "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
+        "policy": planner.describe(),
+        "settings": {
+            "maps": arguments.maps,
+            "orientations": arguments.orientations,
+            "map_count": len(maps),
+            "complete_set": arguments.limit is None,
+            "repeats": arguments.repeats,
+            **study_settings(arguments, protocol),
+        },
+        "summary": summary,
+        "episodes": [outcome.to_json() for outcome in outcomes],
+    }
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    success = summary["success"]
+    percent = f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %"
+    save_trajectories(
+        outcomes, picture, f"co-planning on {arguments.maps}: {percent} of {success['episodes']} episodes"
+    )
+    write_json(arguments.out, result)  # last, so that a result is there whole or not at all
+    return {
+        "success": percent,
+        "episodes": success["episodes"],
+        "ended_by": summary["ended_by"],
+        "time_to_completion_s": summary["time_to_completion_s"]["mean"],
+        "interaction_force": summary["interaction_force"]["mean"],
+        "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
+        "result": str(arguments.out),
+        "picture": str(picture),
+    }

@@ -1,0 +1,109 @@
+"""The recordings of a study as rows, one an episode."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from copolicy.collect.session import recordings
+from copolicy.dataset.episode import Episode
+from copolicy.dataset.exceptions import FileFormatError, RunError
+from copolicy.dataset.features import theta_of
+from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.task import RECORD_HZ
+
+from .plan import StudyPlan
+from .schedule import CODE_PREFIX
+
+_PLANS = re.compile(r"seat 0: \d+ plans, p50 (\d+) ms")
+
+
+def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any]], dict[str, int]]:
+    """Kept episodes below a folder, and how many were left out for which reason.
+
+    Args:
+        plan: of the study; None where the robots are named by what the recordings say of the robot's seat.
+
+    Raises:
+        FileFormatError: a damaged recording, or one that contradicts the plan.
+        RunError: no episode counts.
+    """
+    rows: list[dict[str, Any]] = []
+    left_out: dict[str, int] = {}
+    paths: dict[tuple[str, str], Path] = {}
+    for one in recordings(folder):
+        recording = read_recording(one.path)
+        reason = _left_out(recording.episode, one.counts, plan)
+        if reason:
+            left_out[reason] = left_out.get(reason, 0) + 1
+            continue
+        row = _row(one.path, recording, plan)
+        place = (row["participant"], row["trial"])
+        if plan and place in paths:
+            raise FileFormatError(one.path, f"one kept recording of {' '.join(place)}", f"another in {paths[place]}")
+        paths[place] = one.path
+        rows.append(row)
+    if not rows:
+        raise RunError(f"{folder}: expected kept recordings of the study, found none (left out: {left_out or 'none'})")
+    return rows, left_out
+
+
+def _left_out(episode: Episode, counts: bool, plan: StudyPlan | None) -> str:
+    meta = episode.meta
+    if not counts:
+        return "practice, discarded or interrupted"
+    if plan and not meta.controller_0.startswith(f"{CODE_PREFIX}:{plan.plan_id}:"):
+        other = meta.controller_1.startswith(f"{CODE_PREFIX}:{plan.plan_id}:")
+        return "seats swapped" if other else "not of this plan"
+    return ""
+
+
+def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, Any]:
+    episode = recording.episode
+    meta = episode.meta
+    after = np.vstack((episode.states[1:], episode.final_state))
+    force = np.abs(interaction_force(theta_of(after), episode.actions))
+    row: dict[str, Any] = {
+        "participant": meta.pair_id,
+        "trial": "",
+        "block": 0,
+        "robot": meta.controller_0,
+        "human": meta.controller_1,
+        "source": meta.source,
+        "map_id": meta.map_id,
+        "start_theta": episode.map_config.start[2],
+        "obstacles": len(episode.map_config.obstacles),
+        "success": meta.success,
+        "reason": meta.termination_reason,
+        "steps": len(episode.actions),
+        "time_s": len(episode.actions) / RECORD_HZ,
+        "interaction_mean": float(force.mean()),
+        "interaction_p95": float(np.quantile(force, 0.95)),
+        "planning_ms": _planning_ms(recording),
+        "quality_flags": meta.quality_flags,
+        "recording": path.name,
+        "session_id": meta.session_id,
+    }
+    if plan is None:
+        return row
+    _, _, participant, code = meta.controller_0.split(":", 3)
+    trial = next((one for one in plan.of(participant) if one.code == code), None)
+    if trial is None or participant != meta.pair_id:
+        raise FileFormatError(path, f"a trial of {meta.pair_id} in plan {plan.plan_id}", meta.controller_0)
+    planned = plan.configurations[trial.configuration]
+    if planned != episode.map_config:
+        raise FileFormatError(path, f"the start that plan {plan.plan_id} has for {participant} {code}", meta.map_id)
+    if episode.physics != plan.physics:
+        raise FileFormatError(path, f"the physics of plan {plan.plan_id}", str(episode.physics))
+    return {**row, "trial": code, "block": trial.block, "robot": trial.robot}
+
+
+def _planning_ms(recording: Recording) -> float | None:
+    """Median of the episode's plans, as the recording tells it; None where it tells nothing."""
+    for event in recording.events:
+        median = _PLANS.search(event.detail) if event.kind == "plans" else None
+        if median:
+            return float(median[1])
+    return None

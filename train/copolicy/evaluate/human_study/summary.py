@@ -1,0 +1,107 @@
+"""What a human study found: for each robot and between robots, within persons."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.exceptions import RunError
+
+from ..comparison.paired import between_runs
+from ..summary import success_rate
+from .questionnaire import questions
+from .repeated_measures import anova, rank_test, tukey
+
+LABELS = {
+    "human": "human-in-the-loop study: people at the human seat",
+    "simulated": "SIMULATED: a scripted player sat at the human seat, no person took part; a trial of the procedure",
+}
+DEFINITIONS = {
+    "robots": "mean over participants of a participant's mean, standard error between participants; time of successes "
+    "only; interaction force |(u_robot - u_human) . e| / 2, full forces",
+    "anova": "one-way repeated measures over the participants who have a value with every robot; "
+    "p_greenhouse_geisser allows for unequal variances of the differences",
+    "tukey": "honestly significant differences on the error term of the ANOVA",
+    "ratings": "Friedman's test, with two robots Wilcoxon's signed-rank test, over participants who rated every robot",
+}
+_MEASURES = ("success", "time_s", "interaction_mean", "interaction_p95", "planning_ms")
+_TESTED = ("success", "time_s", "interaction_mean")
+
+
+def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """The content of the study's result, without its episodes.
+
+    Raises:
+        RunError: people and simulated players among the rows.
+    """
+    sources = sorted({row["source"] for row in rows})
+    if len(sources) > 1:
+        raise RunError(f"recordings: expected one source, found {' and '.join(sources)}: summarise them apart")
+    robots = list(dict.fromkeys(sorted(row["robot"] for row in rows)))
+    people = list(dict.fromkeys(sorted(row["participant"] for row in rows)))
+    tests = {}
+    for measure in _TESTED:
+        complete = _complete(people, robots, lambda p, r, measure=measure: _mean(rows, measure, p, r))
+        tests[measure] = {"anova": anova(complete), "pairs": tukey(complete, robots) if len(complete) else []}
+    result: dict[str, Any] = {
+        "label": LABELS.get(sources[0], f"recordings of source {sources[0]}"),
+        "source": sources[0],
+        "participants": people,
+        "robots": {
+            robot: {
+                "episodes": sum(row["robot"] == robot for row in rows),
+                "pooled_success": success_rate([bool(row["success"]) for row in rows if row["robot"] == robot]),
+                **{
+                    measure: _between([_mean(rows, measure, person, robot) for person in people])
+                    for measure in _MEASURES
+                },
+            }
+            for robot in robots
+        },
+        "tests": tests,
+    }
+    if ratings:
+        result["ratings"] = _ratings(ratings)
+    return {**result, "definitions": DEFINITIONS}
+
+
+def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    robots = list(dict.fromkeys(sorted(row["robot"] for row in ratings)))
+    people = list(dict.fromkeys(sorted(row["participant"] for row in ratings)))
+    found = {}
+    for question in questions(ratings):
+
+        def answer(person: str, robot: str, question: str = question) -> float:
+            for row in ratings:
+                if (row["participant"], row["robot"]) == (person, robot) and row.get(question) is not None:
+                    return row[question]
+            return float("nan")
+
+        found[question] = {
+            "robots": {robot: _between([answer(person, robot) for person in people]) for robot in robots},
+            "test": rank_test(_complete(people, robots, answer)),
+        }
+    return found
+
+
+def _between(values: Sequence[float]) -> dict[str, Any]:
+    spread = between_runs(values)
+    return {"mean": spread["mean"], "standard_error": spread["standard_error"], "participants": spread["runs"]}
+
+
+def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str, robot: str) -> float:
+    """A participant's mean with a robot; nan where there is none."""
+    values = [
+        float(row[measure])
+        for row in rows
+        if (row["participant"], row["robot"]) == (person, robot)
+        and row[measure] is not None
+        and (row["success"] or measure != "time_s")
+    ]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def _complete(people: Sequence[str], robots: Sequence[str], value: Callable[[str, str], float]) -> np.ndarray:
+    """`(n, k)` of the participants who have a value with every robot."""
+    table = np.array([[value(person, robot) for robot in robots] for person in people]).reshape(-1, len(robots))
+    return table[np.isfinite(table).all(axis=1)]

@@ -1,0 +1,205 @@
+"""`copolicy-eval partner`."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from copolicy.dataset.command_line.commands import add_command, progress_bar
+from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, whole_number
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.files.staging import require_new
+from copolicy.tasks.table.agents.partners import PARTNERS
+from copolicy.tasks.table.maps import MAP_SETS
+
+from ..result_file import write_json
+from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
+
+if TYPE_CHECKING:
+    from .robots import Robot
+
+LABEL = (
+    "human-in-the-loop protocol with SIMULATED partners: scripted pilots with a will of their own sit at the human "
+    "seat, no person took part; they know every way of the map, which flatters any robot"
+)
+
+
+def add_partner_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `partner` to the commands of `copolicy-eval`."""
+    command = add_command(
+        commands,
+        "partner",
+        _partner,
+        "the robot's half of a checkpoint with simulated partners of several kinds at the human seat",
+        "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
+        study_needs,
+    )
+    command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, with a name for the result")
+    command.add_argument(
+        "--baseline",
+        nargs="+",
+        default=["passive", "never-yields"],
+        metavar="[NAME=]CKPT",
+        help="other checkpoints, passive (zero force), never-yields (scripted, endless patience) or scripted (a usual "
+        "simulated pilot), on the same starts with the same partners (default: passive never-yields)",
+    )
+    command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
+    command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
+    command.add_argument(
+        "--configurations",
+        type=whole_number("--configurations", None),
+        default=60,
+        help="starts: a quarter as many maps, spread over the set, each in four orientations (default: 60)",
+    )
+    command.add_argument(
+        "--partners", nargs="+", default=list(PARTNERS), metavar="KIND", help=f"of {', '.join(PARTNERS)} (default: all)"
+    )
+    command.add_argument(
+        "--repeats",
+        type=whole_number("--repeats", 1, 10_000),
+        default=1,
+        help="partners of each kind on each start (default: 1)",
+    )
+    command.add_argument(
+        "--partner-seed",
+        type=whole_number("--partner-seed", None, LARGEST_SEED),
+        default=0,
+        help="seed of the partners (default: 0)",
+    )
+    command.add_argument("--out", required=True, type=Path, help="where the result goes; the picture stands beside it")
+    add_study_flags(command, actions_per_plan=1)
+
+
+def _partner(arguments: argparse.Namespace) -> dict:
+    picture = arguments.out.with_suffix(".png")
+    require_new(arguments.out, picture, overwrite=arguments.overwrite)
+    if arguments.partner_seed < 0:
+        raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
+    partners = list(dict.fromkeys(arguments.partners))
+    for kind in partners:
+        if kind not in PARTNERS:
+            raise UnknownNameError("kind of partner", kind, PARTNERS)
+    # Deferred: `--help` and a wrong call should not wait for torch.
+    from .configurations import study_configurations
+    from .figure import save_partner_figure
+    from .study import carry_with_partners
+    from .summary import DEFINITIONS, differences, summarise_with_partners
+
+    maps = study_configurations(arguments.maps, arguments.configurations)
+    robots = [make_robot(text, arguments) for text in (arguments.policy, *arguments.baseline)]
+    names = [robot.name for robot in robots]
+    if len(set(names)) < len(names):
+        raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
+    policies = [(robot.name, robot.planner.checkpoint.conditions) for robot in robots if robot.planner is not None]
+    protocol = protocol_of(arguments, policies)
+    # Each policy plans at its own rate; a scripted robot acts at every step of the world.
+    rates = [
+        protocol.fps if arguments.fps is not None or robot.planner is None else robot.planner.fps for robot in robots
+    ]
+    found = []
+    episodes = len(maps) * len(partners) * arguments.repeats
+    with progress_bar(episodes * len(robots), "episodes") as bar:
+        for place, (robot, fps) in enumerate(zip(robots, rates, strict=True)):
+            outcomes = carry_with_partners(
+                robot,
+                maps,
+                partners,
+                protocol.physics,
+                repeats=arguments.repeats,
+                fps=fps,
+                seed=arguments.seed,
+                partner_seed=arguments.partner_seed,
+                on_frame=lambda finished, done=place * episodes: bar.update(done + finished - bar.n),
+            )
+            found.append(outcomes)
+    summaries = [
+        summarise_with_partners(outcomes, robot.planner) for robot, outcomes in zip(robots, found, strict=True)
+    ]
+    described = [
+        {
+            "name": robot.name,
+            "policy": robot.describe(),
+            "summary": summary,
+            "episodes": [o.to_json() for o in outcomes],
+        }
+        for robot, summary, outcomes in zip(robots, summaries, found, strict=True)
+    ]
+    paired = {robot.name: differences(found[0], other) for robot, other in zip(robots[1:], found[1:], strict=True)}
+    result = {
+        "study": "partner",
+        "label": LABEL,
+        **described[0],
+        "settings": {
+            "maps": arguments.maps,
+            "configurations": len(maps),
+            "map_count": len(maps),
+            "complete_set": len(maps) == 4 * len({config.digest for config in MAP_SETS[arguments.maps]}),
+            "orientations": True,
+            "partners": {kind: asdict(PARTNERS[kind]) for kind in partners},
+            "partner_seed": arguments.partner_seed,
+            "repeats": arguments.repeats,
+            **study_settings(arguments, protocol),
+        },
+        "definitions": DEFINITIONS,
+        "baselines": described[1:],
+        "differences": paired,
+    }
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    by_name = dict(zip(names, summaries, strict=True))
+    title = f"simulated partners on {arguments.maps}: {len(maps)} starts, {episodes} episodes a robot, no person"
+    save_partner_figure(by_name, picture, title)
+    write_json(arguments.out, result)
+    return {
+        "label": "simulated partners, no person took part",
+        "episodes_per_robot": episodes,
+        "robots": {name: _line(summary) for name, summary in by_name.items()},
+        "success_difference": {
+            f"{names[0]} - {name}": _difference(one["all"]["success"]) for name, one in paired.items()
+        },
+        "result": str(arguments.out),
+        "picture": str(picture),
+    }
+
+
+def make_robot(text: str, arguments: argparse.Namespace) -> "Robot":
+    """The robot behind `[NAME=]CKPT` or one of the scripted names.
+
+    Raises:
+        FileFormatError: no such checkpoint.
+        InvalidValueError: it plans fewer actions than are to be executed.
+    """
+    from .robots import SCRIPTED_ROBOTS, PolicyRobot
+
+    if text in SCRIPTED_ROBOTS:
+        return SCRIPTED_ROBOTS[text]()
+    name, path = split_name(text)
+    planner = planner_of(path, arguments)
+    return PolicyRobot(name or planner.checkpoint.name, planner, arguments.actions_per_plan)
+
+
+def split_name(text: str) -> tuple[str, str]:
+    """`NAME=PATH` in two; the name is empty where there is none (a path may hold `=` behind a slash)."""
+    name, sign, path = text.partition("=")
+    return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)
+
+
+def _line(summary: dict) -> dict:
+    success, time = summary["success"], summary["time_to_completion_s"]["mean"]
+    line = {
+        "success": f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %",
+        "time_s": None if time is None else round(time, 2),
+        "interaction_force": round(summary["interaction_force"]["mean"], 4),
+        "robot_share": round(summary["robot_share"], 3),
+        "deadlock_time_share": round(summary["deadlock"]["time_share"], 4),
+    }
+    for kind, part in summary["by_partner"].items():
+        line[kind] = f"{100 * part['success']['mean']:.1f} %"
+    return line
+
+
+def _difference(one: dict) -> str:
+    mean = f"{100 * one['mean']:+.1f} points"
+    if one["bootstrap_95"] is None:
+        return f"{mean} (one map: no interval)"
+    low, high = (100 * bound for bound in one["bootstrap_95"])
+    return f"{mean} (95 % {low:+.1f} to {high:+.1f}, bootstrap over {one['maps']} maps)"

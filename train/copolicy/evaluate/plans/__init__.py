@@ -1,0 +1,1 @@
+"""Many action chunks from one state."""

@@ -1,0 +1,69 @@
+"""What a study reports: success with its uncertainty, times, forces, by map."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .coplan.rollouts import Outcome
+from .planner import Planner
+
+
+def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
+    """Share of successes with its binomial standard error and Wilson's 95 % interval."""
+    n = len(successes)
+    p = sum(successes) / n
+    z = 1.959963984540054
+    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    return {
+        "mean": p,
+        "standard_error": math.sqrt(p * (1 - p) / n),
+        "wilson_95": [max(0.0, centre - half), min(1.0, centre + half)],
+        "episodes": n,
+    }
+
+
+def summarise(outcomes: Sequence[Outcome], planner: Planner | None) -> dict[str, Any]:
+    """The summary of `eval.json`. Times to completion count successes only, as the paper's do.
+
+    Args:
+        planner: whose planning time is told; None where nothing planned.
+    """
+    planning_seconds, tables = (planner.planning_seconds, sum(planner.batch_sizes)) if planner else ([], 0)
+    rows = [outcome.to_json() for outcome in outcomes]
+    reasons: dict[str, int] = defaultdict(int)
+    by_map: dict[str, list[bool]] = defaultdict(list)
+    by_obstacles: dict[str, list[bool]] = defaultdict(list)
+    for row in rows:
+        reasons[row["reason"]] += 1
+        by_map[row["map_id"]].append(row["success"])
+        by_obstacles[str(row["obstacles"])].append(row["success"])
+    forces = np.abs(np.concatenate([outcome.interaction for outcome in outcomes]))
+    return {
+        "success": success_rate([row["success"] for row in rows]),
+        "ended_by": dict(sorted(reasons.items())),
+        "time_to_completion_s": _spread([row["time_s"] for row in rows if row["success"]]),
+        "interaction_force": {"mean": float(forces.mean()), "p95": float(np.quantile(forces, 0.95))},
+        "planning_ms_per_call": _spread([1e3 * seconds for seconds in planning_seconds]),
+        "planning_ms_per_table": 1e3 * sum(planning_seconds) / tables if tables else None,
+        "by_obstacles": {count: success_rate(flags) for count, flags in sorted(by_obstacles.items())},
+        "by_map": {
+            name: {"success": sum(flags) / len(flags), "episodes": len(flags)} for name, flags in by_map.items()
+        },
+    }
+
+
+def _spread(values: Sequence[float]) -> dict[str, float | int | None]:
+    if not values:
+        return {"mean": None, "standard_error": None, "p50": None, "p95": None, "n": 0}
+    n = len(values)
+    return {
+        "mean": float(np.mean(values)),
+        "standard_error": float(np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else None,
+        "p50": float(np.quantile(values, 0.5)),
+        "p95": float(np.quantile(values, 0.95)),
+        "n": n,
+    }

@@ -1,0 +1,1 @@
+"""The same action chunks in less time: packed weights, ONNX Runtime, numba."""
