@@ -3,10 +3,12 @@
 Fixtures import their builders when they are asked for: torch, LeRobot and Playwright take seconds.
 """
 
+import functools
 import logging
 import os
 import shutil
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -51,6 +53,19 @@ def _private_home(tmp_path_factory):
     home = tmp_path_factory.mktemp("home")
     os.environ["HF_HOME"] = str(home / "huggingface")
     os.environ["HF_LEROBOT_HOME"] = str(home / "lerobot")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _settings_described_once():
+    """LeRobot's parser reads the sources of all settings for their help, a second of work at every call."""
+    if "draccus" not in sys.modules:  # collecting has imported it where a test is about training
+        yield
+        return
+    from draccus.wrappers import docstring
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(docstring, "get_attribute_docstring", functools.cache(docstring.get_attribute_docstring))
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -131,20 +146,29 @@ def copied_table(random_table, tmp_path) -> Path:
     return Path(shutil.copytree(random_table, tmp_path / "copied_table"))
 
 
+@pytest.fixture(scope="session")
+def _report_sets() -> dict[int, Path]:
+    """Data sets of `report_set` by their number of episodes."""
+    return {}
+
+
 @pytest.fixture(scope="module")
-def report_set(request, tmp_path_factory) -> Path:
+def report_set(request, tmp_path_factory, _report_sets) -> Path:
     """A data set of as many simulated episodes as `EPISODES` of the file of tests says."""
     from report_page import make_data_set
 
-    return make_data_set(tmp_path_factory.mktemp("report"), request.module.EPISODES)
+    episodes = request.module.EPISODES
+    if episodes not in _report_sets:
+        _report_sets[episodes] = make_data_set(tmp_path_factory.mktemp("report"), episodes)
+    return _report_sets[episodes]
 
 
 @pytest.fixture(scope="module")
 def report(report_set) -> Path:
     """The page of that data set."""
-    from report_page import make_report
+    from report_page import REPORT, make_report
 
-    return make_report(report_set)
+    return report_set / REPORT if (report_set / REPORT).exists() else make_report(report_set)
 
 
 @pytest.fixture(scope="module")

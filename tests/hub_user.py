@@ -1,4 +1,4 @@
-"""Somebody who runs `copolicy-dataset` against a local hub: one subprocess with the real client, many commands.
+"""Somebody who runs our commands against a local hub: one subprocess with the real client, many commands.
 
 The client reads `HF_ENDPOINT` when it is imported, which must not happen in the process of the tests; importing it
 for each command anew would take most of the time.
@@ -14,15 +14,15 @@ from pathlib import Path
 from local_hub import TOKEN, LocalHub
 
 _WORKER = """
-import contextlib, io, json, os, sys, time
+import contextlib, importlib, io, json, os, sys, time
 time.sleep = lambda seconds: None  # the client waits up to 8 s before it tries again
 replies, sys.stdout = sys.stdout, sys.stderr
-from copolicy.dataset.cli import main
 for line in sys.stdin:
     request = json.loads(line)
     os.environ.pop("HF_TOKEN", None)
     if request["token"]:
         os.environ["HF_TOKEN"] = request["token"]
+    main = importlib.import_module(request["module"]).main
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -72,11 +72,12 @@ class HubUser:
         self._worker.communicate()
         self._stderr.close()
 
-    def run(self, *arguments: object, token: str | None = TOKEN) -> Done:
-        """Runs `copolicy-dataset`; whatever it prints, it never prints the token."""
+    def run(self, *arguments: object, token: str | None = TOKEN, module: str = "copolicy.dataset.cli") -> Done:
+        """Runs `copolicy-dataset`, or the command of another module; whatever it prints, it never prints the token."""
         assert self._worker.stdin is not None
         assert self._worker.stdout is not None
-        print(json.dumps({"arguments": list(map(str, arguments)), "token": token}), file=self._worker.stdin, flush=True)
+        request = {"module": module, "arguments": list(map(str, arguments)), "token": token}
+        print(json.dumps(request), file=self._worker.stdin, flush=True)
         done = Done(*json.loads(self._worker.stdout.readline()))
         assert token is None or token not in done.out + done.err + (self.home / "stderr.txt").read_text(
             encoding="utf-8"

@@ -12,6 +12,7 @@ from virtual_joystick import VirtualJoystick
 from copolicy.collect.play.application import Application
 from copolicy.collect.play.settings import PilotSpec, PlaySettings
 from copolicy.collect.session import Balance
+from copolicy.collect.ticker import MonotonicClock
 from copolicy.tasks.table.map_config import MapConfig
 
 SHORT_MAP = MapConfig(start=(760.0, 300.0, 3.14), goal=(960.0, 300.0))
@@ -43,14 +44,59 @@ def on_short_map(application: Application) -> None:
     game.balance = Balance(game.maps, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False)
 
 
+class SimulatedClock(MonotonicClock):
+    """A clock that stands still while a thread works, and moves on once all that follow it wait.
+
+    It moves to the moment at which the first of them wakes, and wakes that one alone: what happens is the same
+    whatever the machine is busy with, in the order in which it would happen on an idle one.
+    """
+
+    def __init__(self, threads: int = 1):
+        """
+        Args:
+            threads: that follow it; each says when it no longer does.
+        """
+        self._now = time.monotonic_ns()
+        self._threads = threads
+        self._wakes: set[int] = set()
+        self._moved = threading.Condition()
+
+    def __call__(self) -> int:
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        with self._moved:
+            wake = self._now + max(1, round(seconds * 1e9))
+            while wake in self._wakes:
+                wake += 1
+            self._wakes.add(wake)
+            self._move()
+            while wake in self._wakes:
+                if not self._moved.wait(60):
+                    raise AssertionError("waited a minute for a thread that neither works on nor waits")
+
+    def leave(self) -> None:
+        """The calling thread follows it no longer."""
+        with self._moved:
+            self._threads -= 1
+            self._move()
+
+    def _move(self) -> None:
+        if self._wakes and len(self._wakes) >= self._threads:
+            self._now = min(self._wakes)
+            self._wakes.remove(self._now)
+            self._moved.notify_all()
+
+
 class Players(threading.Thread):
     """A thread that does what two people do, while the program runs in the main one.
 
-    An error in it ends the session; `finish` raises it again.
+    Both follow the clock of the session. An error in the thread ends the session; `finish` raises it again.
     """
 
     def __init__(self, application: Application, play: Callable[["Players"], None]):
         super().__init__(daemon=True)
+        self.clock = application.game.clock
         self.application = application
         self._play = play
         self._error: BaseException | None = None
@@ -62,20 +108,30 @@ class Players(threading.Thread):
             self._error = error
         finally:
             self.application.game.stop = self.application.game.stop or "the players went home"
+            self._leave()
 
     def finish(self) -> None:
         """Waits for the thread, and raises what went wrong in it."""
+        self._leave()
         self.join(30)
         if self._error is not None:
             raise self._error
 
+    def _leave(self) -> None:
+        if isinstance(self.clock, SimulatedClock):
+            self.clock.leave()
+
+    def sleep(self, seconds: float) -> None:
+        """Waits by the clock of the session."""
+        self.clock.sleep(seconds)
+
     def until(self, condition: Callable[[], object], what: str, seconds: float = 15.0) -> None:
         """Waits for something to come true."""
-        limit = time.monotonic() + seconds
+        limit = self.clock() + seconds * 1e9
         while not condition():
-            if time.monotonic() > limit:
+            if self.clock() > limit:
                 raise AssertionError(f"waited {seconds} s for {what}, in phase {type(self.application.phase).__name__}")
-            time.sleep(0.005)
+            self.sleep(0.005)
 
     def phase(self, name: str) -> None:
         """Waits for a phase."""
@@ -85,9 +141,9 @@ class Players(threading.Thread):
         """Presses a button as a person does, and lets the program see it."""
         self.until(lambda: pad.is_open, "an open joystick")
         pad.button(button, True)
-        time.sleep(0.08)
+        self.sleep(0.08)
         pad.button(button, False)
-        time.sleep(0.08)
+        self.sleep(0.08)
 
     def carry(self, *pads: VirtualJoystick, steps: int | None = None) -> None:
         """Pushes with both sticks towards the goal, for a number of steps or until the episode ends."""
@@ -95,17 +151,17 @@ class Players(threading.Thread):
         trial = game.trial
         assert trial is not None
         last = trial.steps + (steps or 10**6)
-        limit = time.monotonic() + 40
-        while trial.steps < last and not trial.outcome.done and time.monotonic() < limit:
+        limit = self.clock() + 40e9
+        while trial.steps < last and not trial.outcome.done and self.clock() < limit:
             x, y, _ = trial.world.pose
             dx, dy = trial.map_config.goal[0] - x, trial.map_config.goal[1] - y
             for pad in pads:
                 pad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
-            time.sleep(0.01)
+            self.sleep(0.01)
         for pad in pads:
             pad.move(0.0, 0.0)
 
     def result(self) -> None:
         """Waits for the result, and until it listens."""
         self.phase("Result")
-        time.sleep(0.5)
+        self.sleep(0.5)

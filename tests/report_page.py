@@ -23,6 +23,7 @@ from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+REPORT = "report.html"
 FINDINGS = {
     "rules": 37,
     "findings": [
@@ -79,7 +80,7 @@ def make_report(root: Path) -> Path:
     (root / CHECK_FILE).write_text(json.dumps(FINDINGS), encoding="utf-8")
     (root / STATISTICS_FILE).write_text(json.dumps(STATISTICS), encoding="utf-8")
     assert main(["report", str(root), "--title", "Simulated <i>pairs</i>"]) == 0
-    return root / "report.html"
+    return root / REPORT
 
 
 @contextlib.contextmanager

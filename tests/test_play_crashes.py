@@ -31,7 +31,13 @@ def _start(out: Path, *flags: str, seconds: float = 2.0, limit: int | None = Non
 
     before = set(out.rglob("*.part"))
     program = subprocess.Popen(
-        _command(out, *flags), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=limited
+        _command(out, *flags),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=limited,
+        # Python takes what fits into a limited file for a whole `.pyc`.
+        env=os.environ | ({"PYTHONDONTWRITEBYTECODE": "1"} if limit else {}),
     )
     end = time.monotonic() + 60
     while set(out.rglob("*.part")) <= before:

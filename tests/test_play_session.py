@@ -1,13 +1,15 @@
-"""Two people with real (virtual) joysticks, from the lobby to the end, and back on another day."""
+"""Two people with real (virtual) joysticks, from the lobby to the end, and back on another day.
+
+Sessions with a lobby follow a simulated clock; without one, and where the window is closed, they follow the machine's.
+"""
 
 import json
 import math
-import time
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from play_session import SHORT_MAP, A, B, Players, X, on_short_map, settings
+from play_session import SHORT_MAP, A, B, Players, SimulatedClock, X, on_short_map, settings
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.play.session_run import prepared
@@ -51,8 +53,10 @@ def _run(application, play):
     on_short_map(application)
     players = Players(application, play)
     players.start()
-    application.run()
-    players.finish()
+    try:
+        application.run()
+    finally:
+        players.finish()
     return application.summary()
 
 
@@ -71,12 +75,12 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         players.press(a, B)
         players.press(a, A)
         a.move(0.1, 0.0)  # rests off its centre
-        time.sleep(1.4)
+        players.sleep(1.4)
         for step in range(170):
             a.move(0.1 + 0.8 * math.cos(step / 12), 0.8 * math.sin(step / 12))
-            time.sleep(0.015)
+            players.sleep(0.015)
         a.move(0.1, 0.0)
-        time.sleep(0.1)
+        players.sleep(0.1)
         players.until(lambda: (tmp_path / "config" / "calibrations.json").exists(), "the calibration on the disk")
         assert game.players[1].person.force(game.players[1].person.sample()) == (0.0, 0.0)
         for _ in range(7):
@@ -99,7 +103,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         players.phase("Paused")
         held = game.trial.steps
         players.press(a, A)  # nobody can go on without a device
-        time.sleep(0.3)
+        players.sleep(0.3)
         assert type(players.application.phase).__name__ == "Paused"
         assert game.trial.steps == held
         spare.append(VirtualJoystick("Beta pad", product=2))
@@ -122,7 +126,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         players.press(a, A)
 
     try:
-        with prepared(settings(tmp_path, consents=("C-17", "C-18"))) as application:
+        with prepared(settings(tmp_path, consents=("C-17", "C-18")), clock=SimulatedClock(2)) as application:
             summary = _run(application, first_day)
     finally:
         for pad in spare:
@@ -186,7 +190,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
 
     # SDL forgets its virtual joysticks when the program closes it.
     pads[:] = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
-    with prepared(settings(tmp_path)) as application:
+    with prepared(settings(tmp_path), clock=SimulatedClock(2)) as application:
         summary = _run(application, second_day)
     assert summary["kept_in_session"] == 1
     names = sorted(path.name for path in folder.glob("episode_*"))
@@ -206,9 +210,9 @@ def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
         players.phase("Paused")
         players.press(a, 4)  # a note, the second of the list
         a.hat(0, -1)
-        time.sleep(0.08)
+        players.sleep(0.08)
         a.hat(0, 0)
-        time.sleep(0.08)
+        players.sleep(0.08)
         players.press(a, A)
         assert game.trial.notes == ["hesitated"]
         players.press(b, B)
@@ -222,7 +226,7 @@ def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
         assert game.folder.counts.kept.total() == 0
         assert game.folder.counts.tried.total() == 1
 
-    with prepared(settings(tmp_path)) as application:
+    with prepared(settings(tmp_path), clock=SimulatedClock(2)) as application:
         _run(application, play)
     (path,) = (tmp_path / "recordings").rglob("*.mcap")
     assert read_episode(path).meta.discarded
@@ -240,7 +244,7 @@ def test_practice_is_recorded_but_never_counts(tmp_path, pads):
         players.phase("Ready")
         assert not game.trial.practice
 
-    with prepared(settings(tmp_path, practice=1)) as application:
+    with prepared(settings(tmp_path, practice=1), clock=SimulatedClock(2)) as application:
         summary = _run(application, play)
     (path,) = (tmp_path / "recordings").rglob("*.mcap")
     meta = read_episode(path).meta

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 _SCRIPT = """
 import json, logging, sys
 logging.disable()
@@ -20,12 +22,26 @@ print(json.dumps({
     "gymnasium": "copolicy/TableCarrying-v0" in gymnasium.registry,
     "loaded": sorted(name for name in sys.modules if "copolicy" in name or "pygame" in name),
 }))
+sys.argv = ["lerobot-teleoperate", "--teleop.type=copolicy_pair", "--help"]
+from lerobot.scripts.lerobot_teleoperate import teleoperate
+teleoperate()
 """
 
 
-def test_lerobot_discovers_the_plugin_and_its_import_builds_nothing():
-    run = subprocess.run([sys.executable, "-c", _SCRIPT], capture_output=True, text=True, check=True)
-    found = json.loads(run.stdout.splitlines()[-1])
+@pytest.fixture(scope="module")
+def discovered() -> subprocess.CompletedProcess:
+    """A new process that looks for plugins, then the help of LeRobot's own command for teleoperators in it."""
+    return subprocess.run([sys.executable, "-c", _SCRIPT], capture_output=True, text=True, check=False)
+
+
+def test_lerobots_own_command_accepts_the_teleoperator(discovered):
+    assert "CopolicyPairConfig ['teleop']" in discovered.stdout, discovered.stderr[-500:]
+    assert "--teleop.join" in discovered.stdout
+
+
+def test_lerobot_discovers_the_plugin_and_its_import_builds_nothing(discovered):
+    assert discovered.returncode == 0, discovered.stderr[-500:]
+    found = json.loads(next(line for line in discovered.stdout.splitlines() if line.startswith("{")))
     loaded = found.pop("loaded")
     assert found == {"policy": True, "env": True, "schedule": True, "gymnasium": True}
     assert "lerobot_policy_copolicy.copolicy.configuration_copolicy" in loaded

@@ -1,3 +1,5 @@
+import contextlib
+import io
 import json
 
 import numpy as np
@@ -29,10 +31,19 @@ def folder(constructed, tmp_path):
     return write_folder(constructed, tmp_path / "table")
 
 
-def test_statistics_lie_in_the_data_set_and_are_the_same_the_next_time(folder, capsys):
-    assert main(["stats", str(folder)]) == 0
+@pytest.fixture(scope="module")
+def described(constructed, tmp_path_factory):
+    """That data set with its statistics in it, and what the command printed."""
+    folder = write_folder(constructed, tmp_path_factory.mktemp("described") / "table")
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["stats", str(folder)]) == 0
+    return folder, printed.getvalue()
+
+
+def test_statistics_lie_in_the_data_set_and_are_the_same_the_next_time(described, capsys):
+    folder, text = described
     first = (folder / STATISTICS_FILE).read_bytes()
-    text = capsys.readouterr().out
     assert main(["stats", str(folder), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (folder / STATISTICS_FILE).read_bytes() == first
@@ -49,9 +60,8 @@ def test_statistics_lie_in_the_data_set_and_are_the_same_the_next_time(folder, c
     assert document["statistics"]["paths"]["path_modes"]["value"] == 4
 
 
-def test_every_statistic_has_unit_definition_interval_or_a_reason(folder):
-    assert main(["stats", str(folder)]) == 0
-    document = json.loads((folder / STATISTICS_FILE).read_text(encoding="utf-8"))
+def test_every_statistic_has_unit_definition_interval_or_a_reason(described):
+    document = json.loads((described[0] / STATISTICS_FILE).read_text(encoding="utf-8"))
     for family, estimates in document["statistics"].items():
         for name, entry in estimates.items():
             assert entry["unit"], name
@@ -64,10 +74,11 @@ def test_every_statistic_has_unit_definition_interval_or_a_reason(folder):
                 assert entry["resampled"], name
 
 
-def test_another_seed_moves_the_draws_and_not_the_values(folder, tmp_path):
-    for seed in ("0", "1"):
-        assert main(["stats", str(folder), "--seed", seed, "--out", str(tmp_path / f"{seed}.json")]) == 0
-    one, other = (json.loads((tmp_path / f"{seed}.json").read_text(encoding="utf-8"))["statistics"] for seed in "01")
+def test_another_seed_moves_the_draws_and_not_the_values(folder, described, tmp_path):
+    path = tmp_path / "1.json"
+    assert main(["stats", str(folder), "--seed", "1", "--out", str(path)]) == 0
+    files = described[0] / STATISTICS_FILE, path
+    one, other = (json.loads(file.read_text(encoding="utf-8"))["statistics"] for file in files)
     assert one["forces"]["conflict_fraction"]["value"] == other["forces"]["conflict_fraction"]["value"]
     assert one["forces"]["conflict_fraction"]["null"] != other["forces"]["conflict_fraction"]["null"]
     assert not (folder / STATISTICS_FILE).exists()

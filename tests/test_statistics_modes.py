@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 from constructed_pairs import ONE, TWO, carried, carried_set, row, still, trajectories
+from diptest import diptest
 
 from copolicy.dataset.statistics.neighbours import neighbour_statistics
 from copolicy.dataset.statistics.path_modes import count_modes, path_mode_statistics, resample_path
 from copolicy.dataset.statistics.resampling import Bootstrap
-from copolicy.dataset.statistics.steering_dip import decision_zone, dip_statistics, steering
+from copolicy.dataset.statistics.steering_dip import decision_zone, dip_statistics, dip_tests, steering
 
 
 def _bootstrap(data):
@@ -154,3 +155,14 @@ def test_the_dip_finds_pairs_that_split_before_the_obstacle(split, expected):
     null = estimates["steering_dip"].null
     assert null is not None
     assert null.high < 0.05
+
+
+def test_dips_and_their_p_are_those_of_the_library():
+    rng = np.random.default_rng(8)
+    sizes = [4, 5, 8, 9, 10, 11, 17, 50, 333, 72_000, 9, 4]
+    samples = [rng.standard_normal(size) + 3 * (rng.random(size) < 0.5) * (size % 2) for size in sizes]
+    samples += [np.zeros(12), np.repeat([0.0, 1.0], 10)]
+    dips, p = dip_tests(samples)
+    expected = np.array([diptest(sample)[:2] for sample in samples])
+    np.testing.assert_array_equal(dips, expected[:, 0])
+    np.testing.assert_array_equal(p, expected[:, 1].clip(0.0, 1.0))

@@ -1,8 +1,6 @@
 """The pair as a LeRobot teleoperator, with virtual joysticks."""
 
 import math
-import subprocess
-import sys
 import threading
 import time
 
@@ -53,23 +51,6 @@ def test_lerobot_makes_it_from_the_flag_of_its_commands(teleoperator):
     assert not pair.is_connected
     with pytest.raises(DeviceNotConnectedError):
         pair.get_action()
-
-
-HELP = """
-import logging, sys
-logging.disable()
-sys.argv = ["lerobot-teleoperate", "--teleop.type=copolicy_pair", "--help"]
-from lerobot.utils.import_utils import register_third_party_plugins
-register_third_party_plugins()
-from lerobot.scripts.lerobot_teleoperate import teleoperate
-teleoperate()
-"""
-
-
-def test_lerobots_own_command_accepts_the_type():
-    run = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=False)
-    assert "CopolicyPairConfig ['teleop']" in run.stdout, run.stderr[-500:]
-    assert "--teleop.join" in run.stdout
 
 
 def test_forces_come_from_the_pads_in_the_order_of_their_numbers(teleoperator, sticks):

@@ -1,21 +1,17 @@
 """`copolicy-train` on a data set that it gets from the Hub by its id, with a choice of episodes and exclusions."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from hub_user import Done, HubUser
 from local_hub import LocalHub, Repository
 from training_table import flags, mark_discarded, write_table
 
-_SCRIPT = "import sys; from copolicy.train.cli import main; sys.exit(main())"
-
 
 @pytest.fixture(scope="module")
-def hub(tmp_path_factory):
-    """A Hub with a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded."""
+def user(tmp_path_factory):
+    """Of a Hub with a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded."""
     root = write_table(tmp_path_factory.mktemp("data") / "table")
     repository = Repository(private=False)
     for tag, discarded in (("data-1.0.0", (2,)), ("v3.0", (1, 4))):
@@ -24,21 +20,13 @@ def hub(tmp_path_factory):
         repository.tags[tag] = repository.commit(files, tag)
     with LocalHub() as hub:
         hub.repositories["dataset", "lab/table"] = repository
-        yield hub
+        with HubUser(hub, tmp_path_factory.mktemp("home")) as user:
+            yield user
 
 
-def _train(hub: LocalHub, home: Path, *arguments: str) -> tuple[subprocess.CompletedProcess, Path]:
-    output = home / "run"
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("HF_")}
-    given = [flag for flag in flags(home, output, steps=1, save_freq=1) if not flag.startswith("--dataset.")]
-    done = subprocess.run(
-        [sys.executable, "-c", _SCRIPT, "--dataset.repo_id=lab/table", *given, *arguments],
-        env={**environment, **hub.environment(home)},
-        capture_output=True,
-        text=True,
-        timeout=400,
-    )
-    return done, output / "checkpoints" / "last" / "pretrained_model" / "train_config.json"
+def _train(user: HubUser, output: Path, *arguments: str) -> Done:
+    given = [flag for flag in flags(output, output, steps=1, save_freq=1) if not flag.startswith("--dataset.")]
+    return user.run("--dataset.repo_id=lab/table", *given, *arguments, module="copolicy.train.cli")
 
 
 @pytest.mark.parametrize(
@@ -52,18 +40,19 @@ def _train(hub: LocalHub, home: Path, *arguments: str) -> tuple[subprocess.Compl
         ),
     ],
 )
-def test_by_id_with_a_revision_a_choice_and_exclusions(hub, tmp_path, arguments, left_out, used):
-    done, config = _train(hub, tmp_path, *arguments)
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert left_out in done.stderr
+def test_by_id_with_a_revision_a_choice_and_exclusions(user, tmp_path, arguments, left_out, used):
+    done = _train(user, tmp_path / "run", *arguments)
+    assert done.status == 0, done.err[-3000:]
+    assert left_out in done.err
+    config = tmp_path / "run" / "checkpoints" / "last" / "pretrained_model" / "train_config.json"
     trained = json.loads(config.read_text(encoding="utf-8"))["dataset"]
     assert (trained["repo_id"], trained["root"], trained["episodes"]) == ("lab/table", None, used)
-    assert f"dataset.num_episodes={len(used)}" in done.stderr
+    assert f"dataset.num_episodes={len(used)}" in done.err
 
 
-def test_an_id_that_is_not_there_is_one_line(hub, tmp_path):
-    done, _ = _train(hub, tmp_path, "--dataset.repo_id=lab/nothing")
-    assert done.returncode == 1
-    line = done.stderr.splitlines()[-1]
+def test_an_id_that_is_not_there_is_one_line(user, tmp_path):
+    done = _train(user, tmp_path / "run", "--dataset.repo_id=lab/nothing")
+    assert done.status == 1
+    line = done.err.splitlines()[-1]
     assert line.startswith("copolicy-train: training stopped: RepositoryNotFoundError: ")
     assert "lab/nothing" in line

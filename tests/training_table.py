@@ -1,13 +1,18 @@
 """A small LeRobot data set of this task for the tests of training, and what they do with it."""
 
+import contextlib
+import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
+from accelerate.state import AcceleratorState
 from lerobot.datasets import LeRobotDataset
 from safetensors.torch import load_file
 
@@ -80,6 +85,18 @@ def lerobot_train(monkeypatch, arguments: list[str]) -> None:
 
     monkeypatch.setattr(sys, "argv", ["lerobot-train", *with_defaults(arguments)])
     script.main()
+
+
+@contextlib.contextmanager
+def new_accelerate(**variables: str) -> Iterator[None]:
+    """Accelerate as in a new process with these variables alone; otherwise the first training's precision stays."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("ACCELERATE_")}
+    AcceleratorState._reset_state(reset_partial_state=True)
+    try:
+        with patch.dict(os.environ, {**kept, **variables}, clear=True):
+            yield
+    finally:
+        AcceleratorState._reset_state(reset_partial_state=True)
 
 
 def weights(output: Path, step: int = 4) -> dict[str, torch.Tensor]:

@@ -18,6 +18,18 @@ SLOW_LOOP = 1.25
 """An episode whose 99th percentile of periods exceeds this many steps is flagged."""
 
 
+class MonotonicClock:
+    """The machine's clock that never goes back. A loop follows any clock with these two methods."""
+
+    def __call__(self) -> int:
+        """The time, ns."""
+        return time.monotonic_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """Waits; longer where the machine is busy."""
+        time.sleep(seconds)
+
+
 @dataclass(frozen=True)
 class Tick:
     """One step's time, all on the monotonic clock.

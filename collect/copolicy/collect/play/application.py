@@ -1,6 +1,5 @@
 """The loop: thirty ticks a second, and between them as many pictures as there is time for."""
 
-import time
 from collections import Counter, deque
 
 from ..inputs import Command, CommandReader, Press
@@ -210,4 +209,4 @@ class Application:
         wait = remaining_ns
         if self._window and self.phase.realtime:
             wait = min(wait, max(10**6, self._halfway_ns - self.game.clock()))
-        time.sleep(wait / 1e9)
+        self.game.clock.sleep(wait / 1e9)

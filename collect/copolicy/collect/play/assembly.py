@@ -8,6 +8,7 @@ from copolicy.dataset.exceptions import RunError
 from ..inputs import HALVES, CalibrationStore, MappingStore, Pads, user_config_folder
 from ..recording.recover import recover
 from ..session import CollectionLock, SessionFolder
+from ..ticker import MonotonicClock
 from .application import Application
 from .game import Game
 from .loading import Loading
@@ -19,17 +20,21 @@ from .sounds import Sounds
 from .window import Window
 
 
-def assemble(settings: PlaySettings, window: Window | None, loading: Loading, stack: ExitStack) -> Application:
+def assemble(
+    settings: PlaySettings, window: Window | None, loading: Loading, stack: ExitStack, clock: MonotonicClock | None
+) -> Application:
     """Opens folder, devices and players, and puts them together.
 
     Args:
         window: to play in.
         loading: what runs what takes long.
         stack: closes everything.
+        clock: what the session follows; None for the machine's.
 
     Raises:
         CopolicyError: files or devices that cannot be used, or a folder that another tool collects into.
     """
+    clock = clock or MonotonicClock()
     lock = _lock(settings)
     stack.callback(lock.close)
     recoveries = loading.run("recordings that broke off", lambda: recover(settings.out))
@@ -42,14 +47,14 @@ def assemble(settings: PlaySettings, window: Window | None, loading: Loading, st
     pilots = settings.pilots or default_pilots(sum(bool(pad.steerings) for pad in pads))
     policies = [pilot.detail for pilot in pilots if pilot.kind == "policy"]
     what = f"the policy {policies[0]}, with torch and LeRobot" if policies else "the players"
-    players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents))
+    players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents, clock))
     for player in players:
         stack.callback(player.controller.close)
     say_other_physics(players, settings.physics)
     folder = loading.run("what was played before", lambda: _folder(settings))
     sounds = Sounds(settings.mute or settings.headless)
     stack.callback(sounds.close)
-    game = Game(settings, Roster(players, pads, store, folder.journal), folder, sounds)
+    game = Game(settings, Roster(players, pads, store, folder.journal, clock), folder, sounds, clock)
     if recovered:
         game.say(f"{len(recovered)} recording(s) of a broken-off run recovered")
     if settings.headless:

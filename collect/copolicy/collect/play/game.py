@@ -1,8 +1,6 @@
 """What all phases of a session share: the players, the folder, the schedule, the clock, what the screen needs."""
 
-import time
 import uuid
-from collections.abc import Callable
 from importlib.metadata import version
 
 import numpy as np
@@ -17,7 +15,7 @@ from copolicy.tasks.table.maps import identify
 from ..recording.wall_clock import WallClockAnchor
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
-from ..ticker import Ticker
+from ..ticker import MonotonicClock, Ticker
 from .player import Player, replayed_map
 from .roster import Roster
 from .settings import PlaySettings
@@ -47,7 +45,7 @@ class Game:
         roster: Roster,
         folder: SessionFolder,
         sounds: Sounds,
-        clock: Callable[[], int] = time.monotonic_ns,
+        clock: MonotonicClock,
     ):
         self.settings = settings
         self.roster = roster

@@ -1,7 +1,8 @@
 """The two players of a session: who they are, what they hold, what they agreed to."""
 
 import logging
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -88,8 +89,16 @@ def default_pilots(pads: int) -> tuple[PilotSpec, PilotSpec]:
     return PilotSpec(kinds[0]), PilotSpec(kinds[1])
 
 
-def make_players(pair: str, specs: Sequence[PilotSpec], consents: Sequence[str]) -> tuple[Player, Player]:
+def make_players(
+    pair: str,
+    specs: Sequence[PilotSpec],
+    consents: Sequence[str],
+    clock: Callable[[], int] = time.monotonic_ns,
+) -> tuple[Player, Player]:
     """The players, with files and checkpoints loaded.
+
+    Args:
+        clock: of the session, ns.
 
     Raises:
         FileFormatError: a recording or a checkpoint cannot be used.
@@ -97,7 +106,7 @@ def make_players(pair: str, specs: Sequence[PilotSpec], consents: Sequence[str])
     """
     players = []
     for index, spec in enumerate(specs):
-        controller = _controller(spec)
+        controller = _controller(spec, clock)
         consent = consents[index] if spec.is_person else ""
         player_id = f"{pair}-{'ab'[index]}"
         players.append(Player(index, player_id, spec, controller, consent, ready=not spec.is_person))
@@ -131,13 +140,13 @@ def keyboard_half(name: int | str) -> KeyboardHalf | None:
     return HALVES.get(name) if isinstance(name, str) else None
 
 
-def _controller(spec: PilotSpec) -> Controller:
+def _controller(spec: PilotSpec, clock: Callable[[], int]) -> Controller:
     match spec.kind:
         case "scripted":
             return ScriptedController(spec.detail)
         case "replay":
             return ReplayController(Path(spec.detail))
         case "policy":
-            return PolicyController(Checkpoint(spec.detail))
+            return PolicyController(Checkpoint(spec.detail), clock)
         case kind:
-            return PersonController(kind)
+            return PersonController(kind, clock)

@@ -17,6 +17,7 @@ from .settings import PlaySettings
 from .window import Window
 
 if TYPE_CHECKING:
+    from ..ticker import MonotonicClock
     from .application import Application
     from .game import Game
 
@@ -38,11 +39,16 @@ def play(settings: PlaySettings) -> dict:
 
 
 @contextmanager
-def prepared(settings: PlaySettings, also: tuple[str, Callable[[], Any]] | None = None) -> Iterator[Application]:
+def prepared(
+    settings: PlaySettings,
+    also: tuple[str, Callable[[], Any]] | None = None,
+    clock: MonotonicClock | None = None,
+) -> Iterator[Application]:
     """Opens the window, then folder, devices and players; closes them however the block is left.
 
     Args:
         also: a further job and what it loads, to be run while the window shows that.
+        clock: what the session follows; by default the machine's.
 
     Raises:
         CopolicyError: there is no display, or see `play`.
@@ -59,7 +65,7 @@ def prepared(settings: PlaySettings, also: tuple[str, Callable[[], Any]] | None 
         assembly = loading.run("the table and its recorder", lambda: import_module(".assembly", __package__))
         if also is not None:
             loading.run(*also)
-        application = assembly.assemble(settings, window, loading, stack)
+        application = assembly.assemble(settings, window, loading, stack, clock)
         if window is not None:
             window.loaded()
         game = application.game

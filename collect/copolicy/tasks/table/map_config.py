@@ -3,7 +3,8 @@
 import hashlib
 import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from copolicy.dataset.exceptions import InvalidValueError
 
@@ -12,6 +13,8 @@ WINDOW = (1200, 600)
 
 MAX_OBSTACLES = 3
 """Slots for obstacles in an observation."""
+
+_CANONICAL = json.JSONEncoder(sort_keys=True)
 
 
 @dataclass(frozen=True)
@@ -46,17 +49,7 @@ class MapConfig:
 
     def to_json(self) -> str:
         """The map as canonical JSON, the text that is attached to a recording."""
-        return json.dumps(
-            {
-                "start": self.start,
-                "goal": self.goal,
-                "obstacles": self.obstacles,
-                "obstacle_size": self.obstacle_size,
-                "window": WINDOW,
-                "units": "px, rad; y down, theta counter-clockwise on screen",
-            },
-            sort_keys=True,
-        )
+        return self._text(self.obstacles)
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "MapConfig":
@@ -74,5 +67,16 @@ class MapConfig:
     @property
     def digest(self) -> str:
         """Eight hexadecimal digits that are equal for equal maps, whatever the order of the obstacles."""
-        canonical = replace(self, obstacles=tuple(sorted(self.obstacles)))
-        return hashlib.sha256(canonical.to_json().encode()).hexdigest()[:8]
+        return hashlib.sha256(self._text(sorted(self.obstacles)).encode()).hexdigest()[:8]
+
+    def _text(self, obstacles: Sequence[tuple[float, float]]) -> str:
+        return _CANONICAL.encode(
+            {
+                "start": self.start,
+                "goal": self.goal,
+                "obstacles": obstacles,
+                "obstacle_size": self.obstacle_size,
+                "window": WINDOW,
+                "units": "px, rad; y down, theta counter-clockwise on screen",
+            }
+        )

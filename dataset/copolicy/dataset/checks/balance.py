@@ -1,5 +1,6 @@
 """Whether the maps, and the pairs over the maps, are there equally often."""
 
+import functools
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -82,10 +83,15 @@ def _weights(name: str, counts: Counter[str]) -> dict[str, int]:
     """
     if name not in MAP_SETS:
         return dict.fromkeys(counts, 1)
-    named = [[identify(config) for config in maps] for maps in MAP_SETS.values()]
-    sets = [Counter(map_id for map_id, family in maps if family == name) for maps in named]
+    sets = [Counter(map_id for map_id, family in maps if family == name) for maps in _named_sets()]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
     return min(fitting, key=lambda weights: (len(weights), _misfit(weights, counts)), default=dict.fromkeys(counts, 1))
+
+
+@functools.cache
+def _named_sets() -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Name and family of each map of each set."""
+    return tuple(tuple(identify(config) for config in maps) for maps in MAP_SETS.values())
 
 
 def _misfit(weights: Counter[str], counts: Counter[str]) -> float:

@@ -1,7 +1,5 @@
 """Whether pairs split where they have to decide: Hartigan's dip test of the steering before the first obstacle."""
 
-from typing import cast
-
 import numpy as np
 from scipy.stats import false_discovery_control
 
@@ -11,7 +9,8 @@ from .resampling import Bootstrap
 from .trajectories import Trajectories
 
 try:
-    from diptest import diptest
+    from diptest import dipstat
+    from diptest.consts import Consts
 except ModuleNotFoundError:
     raise MissingExtraError("diptest") from None
 
@@ -110,8 +109,8 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     for name in np.unique(data.configurations):
         sample = mean[(data.configurations == name) & np.isfinite(mean)]
         if len(sample) >= MIN_EPISODES:
-            dip, p = _dip_test(sample)
-            tests[str(name)] = {"episodes": len(sample), "dip": dip, "p": p}
+            (dip,), (p,) = dip_tests([sample])
+            tests[str(name)] = {"episodes": len(sample), "dip": float(dip), "p": float(p)}
     if not tests:
         return Estimate(None, "1", definition, 0, note=f"no configuration has {MIN_EPISODES} episodes and obstacles")
     adjusted = false_discovery_control([test["p"] for test in tests.values()])
@@ -130,14 +129,36 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     return Estimate(value, "1", definition, episodes, bounds, "configurations", null, details=details)
 
 
-def _dip_test(sample: np.ndarray) -> tuple[float, float]:
-    """The dip and its p, interpolated in Hartigan's table."""
-    dip, p, *_ = cast(tuple[float, float], diptest(sample))  # without full_output it returns no dict
-    return float(dip), float(np.clip(p, 0.0, 1.0))
+def dip_tests(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The dip of each sample, and its p, interpolated in Hartigan's table: those of `diptest.diptest`, all at once.
+
+    Args:
+        samples: of at least four values each.
+    """
+    sizes = np.array([len(sample) for sample in samples])
+    dips = np.array([dipstat(sample) for sample in samples])
+    p = np.empty(len(samples))
+    for size in np.unique(sizes):
+        chosen = sizes == size
+        critical = _critical(int(size))
+        p[chosen] = 1.0 - np.interp(np.sqrt(size) * dips[chosen], critical, Consts._ALPHA)
+    return dips, np.clip(p, 0.0, 1.0)
+
+
+def _critical(size: int) -> np.ndarray:
+    """Hartigan's critical values of sqrt(n) times the dip of `size` values, between those of the sizes in the table."""
+    sizes, values = Consts._SAMPLE_SIZE, Consts._CRIT_VALS
+    above = min(int(sizes.searchsorted(size)), len(sizes) - 1)
+    below = max(0, above - 1) if size <= sizes[-1] else above
+    low = np.sqrt(sizes[below]) * values[below]
+    if below == above:
+        return low
+    fraction = float(size - sizes[below]) / (sizes[above] - sizes[below])
+    return low + fraction * (np.sqrt(sizes[above]) * values[above] - low)
 
 
 def _rejected(samples: list[np.ndarray]) -> np.ndarray:
-    return false_discovery_control([_dip_test(sample)[1] for sample in samples]) < FALSE_DISCOVERY_RATE
+    return false_discovery_control(dip_tests(samples)[1]) < FALSE_DISCOVERY_RATE
 
 
 def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarray) -> np.ndarray:

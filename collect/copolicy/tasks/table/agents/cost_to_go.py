@@ -110,6 +110,9 @@ def _fence(centre: tuple[float, float], axis: int, side: int) -> np.ndarray:
     moves = grid.moves()
     across = np.broadcast_to(grid.poses()[axis], grid.SHAPE).ravel()
     along = np.broadcast_to(grid.poses()[1 - axis], grid.SHAPE).ravel()
-    crosses = (across[moves.source] < centre[axis]) != (across[moves.target] < centre[axis])
-    middle = (along[moves.source] + along[moves.target]) / 2
-    return np.flatnonzero(crosses & ((middle - centre[1 - axis]) * side > 0))
+    near = np.abs(across - centre[axis]) <= grid.REACH * grid.CELL
+    candidates = np.flatnonzero(near[moves.source])
+    source, target = moves.source[candidates], moves.target[candidates]
+    crosses = (across[source] < centre[axis]) != (across[target] < centre[axis])
+    middle = (along[source] + along[target]) / 2
+    return candidates[crosses & ((middle - centre[1 - axis]) * side > 0)]

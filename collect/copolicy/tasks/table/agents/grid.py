@@ -24,6 +24,8 @@ _AROUND = [(rows, columns) for rows in (-1, 0, 1) for columns in (-1, 0, 1)]
 _KNIGHT = [(r, c) for r in (-2, -1, 1, 2) for c in (-2, -1, 1, 2) if abs(r) != abs(c)]
 _OFFSETS = [(0, r, c) for r, c in (*_AROUND, *_KNIGHT) if (r, c) != (0, 0)]
 _OFFSETS += [(turn, r, c) for turn in (-1, 1) for r, c in _AROUND]
+REACH = max(abs(cells) for _, *step in _OFFSETS for cells in step)
+"""Cells that a move goes at most to one side."""
 
 
 class Moves(NamedTuple):
