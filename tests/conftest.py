@@ -26,6 +26,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+_FEW_FILES = 3
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """No further process for a few named files: each would import torch and LeRobot before its first test."""
+    named = {argument.partition("::")[0] for argument in config.invocation_params.args if ".py" in argument}
+    return 0 if 0 < len(named) <= _FEW_FILES else None
+
+
 # Minutes in a few tests: first, so that no core waits for another at the end.
 _LONG_FILES = ("test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_train_distributed.py")
 
