@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..command_line.commands import add_command
 from ..command_line.extras import TABLES
 from ..exceptions import InvalidValueError
+from ..files.staging import replace_json
 from .limits import LIMITS
 from .location import locate
 from .stored_check import CHECK_FILE, check_document, content_hash
@@ -69,10 +70,8 @@ def _check(arguments: argparse.Namespace) -> dict:
 
 def _save(root: Path, document: dict[str, Any]) -> str | None:
     """Keeps the findings of the data set alone, whatever it was compared with; a folder may refuse them."""
-    from ..statistics.command import write_document
-
     try:
-        write_document(document, root / CHECK_FILE)
+        replace_json(root / CHECK_FILE, document, allow_nan=False)
     except OSError as error:
         reason = error.strerror or str(error)
         logging.warning(
