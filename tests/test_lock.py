@@ -40,6 +40,6 @@ def test_a_locked_file_keeps_its_bytes(tmp_path):
 
 def test_a_folder_in_use_is_refused_at_once_with_the_words_of_its_tool(tmp_path):
     place = tmp_path / "new" / "lock"
-    with FolderLock(place, "in use"), pytest.raises(RunError, match="^in use$"):
+    with FolderLock(place, "in use"), pytest.raises(RunError, match=r"^in use$"):
         FolderLock(place, "in use")
     FolderLock(place, "in use").close()

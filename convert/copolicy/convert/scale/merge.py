@@ -10,10 +10,10 @@ from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, STATISTICS_FILE
 from copolicy.dataset.files.staging import new_folder, replace_json, require_new
-from copolicy.dataset.lerobot_folder.documents import STATISTICS_FILE
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
+from copolicy.dataset.publication.minimal_card import minimal_card
 
 from ..lerobot.mixtures import Mixtures
 from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
@@ -54,7 +54,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
-        tables = [read_parquet(path) for path in numbered_files(partial / "meta" / "episodes").values()]
+        tables = [read_parquet(path) for path in numbered_files(partial / EPISODES_FOLDER).values()]
         rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
         card = minimal_card({row["license"] or "" for row in rows})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")

@@ -9,8 +9,8 @@ from ..command_line.extras import TABLES
 from ..command_line.flag_numbers import seed
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
+from ..files.meta_files import STATISTICS_FILE
 from ..files.staging import replace_json
-from ..lerobot_folder.documents import STATISTICS_FILE
 
 
 def add_stats_command(commands: argparse._SubParsersAction) -> None:
