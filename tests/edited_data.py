@@ -10,7 +10,8 @@ import pyarrow.parquet as pq
 from checked_data import EPISODES, make_data_set, make_recordings, set_columns
 from lerobot.datasets import LeRobotDataset
 
-from copolicy.dataset.versions.content import EpisodeContent, read_content
+from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.digests import EpisodeContent
 
 COUNT = 8
 PAIRS = ["P01", "P01", "P02", "P02", "P03", "P03", "P04", "P04"]

@@ -14,10 +14,10 @@ import pytest
 from constructed_pairs import TWO, carried_set
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
-from copolicy.cards.artefacts import CHECK_FILE, STATISTICS_FILE
 from copolicy.cards.cli import main
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
+from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
 from copolicy.dataset.statistics.human_routes import human_distance
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics

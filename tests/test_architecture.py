@@ -1,6 +1,7 @@
 """The arrows between rooms, and the two traps of one namespace over five source roots."""
 
 import ast
+import functools
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,8 @@ ARROWS = {
     "cards/copolicy/cards": {"dataset"},
 }
 """Packages, and what each may import beside itself."""
+
+ROOTS = tuple(folder.split("/", 1)[1].replace("/", ".") for folder in ARROWS)
 
 TABLE = "copolicy.tasks.table"
 
@@ -140,6 +143,85 @@ def test_nothing_imports_the_table_but_itself_and_the_importer_of_the_original_p
     found = {path.relative_to(ROOT).as_posix() for paths in by_name.values() for path in paths}
     allowed = ("collect/copolicy/tasks/table/", "convert/copolicy/convert/upstream/")
     assert {path for path in found if not path.startswith(allowed)} == set(NOT_YET_MOVED)
+
+
+@functools.cache
+def _modules() -> dict[str, Path]:
+    """Every module by its absolute name."""
+    found = {}
+    for room in ROOMS:
+        for path in (ROOT / room).rglob("*.py"):
+            parts = path.relative_to(ROOT / room).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+@functools.cache
+def _edges() -> dict[str, set[str]]:
+    """The modules that each imports: at its top, inside a function or for types alone."""
+    modules = _modules()
+    edges: dict[str, set[str]] = {}
+    for name, path in modules.items():
+        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        edges[name] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            targets: list[str] = []
+            if isinstance(node, ast.Import):
+                targets = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+                base = ".".join([*above, *([node.module] if node.module else [])])
+                targets = [f"{base}.{alias.name}" for alias in node.names]
+            for target in targets:
+                found = target if target in modules else target.rpartition(".")[0]
+                if found in modules and found != name:
+                    edges[name].add(found)
+    return edges
+
+
+def _cycles(edges: dict[str, set[str]]) -> list[set[str]]:
+    """Names that reach each other, a set for each knot."""
+    reached: dict[str, set[str]] = {}
+    for start in edges:
+        seen: set[str] = set()
+        ahead = list(edges[start])
+        while ahead:
+            if (name := ahead.pop()) not in seen:
+                seen.add(name)
+                ahead += edges.get(name, ())
+        reached[start] = seen
+    knots: list[set[str]] = []
+    for name in edges:
+        if name in reached[name] and not any(name in knot for knot in knots):
+            knots.append({other for other in reached[name] if name in reached.get(other, ())})
+    return knots
+
+
+def _sub_package(module: str) -> str:
+    """The sub-package of its room that a module is in, or the module itself where it lies directly in the room."""
+    root = next(root for root in ROOTS if module == root or module.startswith(f"{root}."))
+    return ".".join(module.split(".")[: root.count(".") + 2])
+
+
+def test_no_modules_import_each_other():
+    assert _cycles(_edges()) == []
+
+
+def test_no_sub_packages_import_each_other():
+    modules = _modules()
+    edges: dict[str, set[str]] = {}
+    for name, targets in _edges().items():
+        # Who may not know the table is a test of its own.
+        to_go = modules[name].relative_to(ROOT).as_posix() in NOT_YET_MOVED
+        found = {_sub_package(target) for target in targets if not (to_go and target.startswith(TABLE))}
+        edges.setdefault(_sub_package(name), set()).update(found - {_sub_package(name), *ROOTS})
+    packages = {_sub_package(name) for name, path in modules.items() if path.name == "__init__.py"}
+    assert [knot & packages for knot in _cycles(edges) if len(knot & packages) > 1] == []
+
+
+def test_the_walk_sees_a_cycle():
+    edges = {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}
+    assert _cycles(edges) == [{"b", "c"}]
 
 
 @pytest.mark.parametrize("room", ["dataset", "collect"])

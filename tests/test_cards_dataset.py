@@ -15,8 +15,9 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files.meta_files import WITHDRAWALS_FILE
 from copolicy.dataset.publication.minimal_card import is_minimal_card
-from copolicy.dataset.versions.withdrawals import WITHDRAWALS_FILE, withdrawals_text
+from copolicy.dataset.versions.withdrawals import withdrawals_text
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,11 @@ from checked_data import contents, make_data_set, make_recordings, set_columns
 
 from copolicy.dataset.checks.checking import RULES, check_dataset
 from copolicy.dataset.checks.limits import LIMITS, RULES_VERSION
-from copolicy.dataset.checks.stored_check import CHECK_FILE, check_document, content_hash, validity
+from copolicy.dataset.checks.stored_check import check_document, content_hash, validity
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.hub.publish import verify_release
+from copolicy.dataset.files.meta_files import CHECK_FILE
+from copolicy.dataset.transfer.publish import verify_release
 from copolicy.dataset.versions.canonical import digest
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.release import release
@@ -54,7 +55,7 @@ def test_findings_are_kept_with_rules_limits_date_and_content(root, capsys):
     assert [entry["rule"] for entry in document["findings"] if entry["severity"] == "warning"] == ["license"]
     # Neither the findings nor their renewal are part of the content.
     assert document["content_hash"] == changed == read_content(root).hash != before[1]
-    assert set(contents(root)) == {*before[0], CHECK_FILE.as_posix()}
+    assert set(contents(root)) == {*before[0], CHECK_FILE}
 
 
 def test_findings_are_those_of_the_data_alone(root, tmp_path, capsys):
@@ -148,7 +149,7 @@ def test_checking_again_is_no_change_to_a_release(root, capsys):
     record, manifest = verify_release(root)
     assert record.version == "0.1.0"
     # What goes up holds the findings, so that a manifest without them would be refused after a pull.
-    assert CHECK_FILE.as_posix() in manifest.files
+    assert CHECK_FILE in manifest.files
     assert main(["diff", f"{root}@0.1.0", str(root)]) == 0
     (root / "meta" / "stats.json").write_text("{}", encoding="utf-8")
     assert main(["check", str(root)]) == 1

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from lerobot.datasets.compute_stats import aggregate_stats, compute_episode_stats
 
-from copolicy.convert.lerobot.statistics import episode_statistics
+from copolicy.convert.column_statistics import episode_statistics
 
 
 def columns(frames: int, seed: int) -> dict[str, np.ndarray]:

@@ -18,7 +18,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
-from copolicy.dataset.hub.raw_recordings import find_raw_recordings
+from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.dataset.versions.manifest import Manifest
 from copolicy.train.cli import main as train
 

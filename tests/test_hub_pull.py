@@ -22,8 +22,9 @@ from hub_user import HubUser
 from local_hub import LocalHub
 from versioned_data_set import EPISODES, FRAMES, set_value, simulated_data_set
 
+from copolicy.dataset.files.meta_files import MANIFEST_FILE
 from copolicy.dataset.versions.content import read_content
-from copolicy.dataset.versions.manifest import MANIFEST_FILE, Manifest
+from copolicy.dataset.versions.manifest import Manifest
 from copolicy.dataset.versions.release import release
 
 

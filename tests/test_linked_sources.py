@@ -16,7 +16,7 @@ from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import CopolicyError
-from copolicy.dataset.hub.raw_recordings import find_raw_recordings
+from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.dataset.versions.manifest import Manifest
 
 

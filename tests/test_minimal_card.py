@@ -15,8 +15,8 @@ from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.hub.publish import verify_release
 from copolicy.dataset.publication.minimal_card import CONFIGS, is_minimal_card
+from copolicy.dataset.transfer.publish import verify_release
 from copolicy.dataset.versions.content import read_content
 
 EPISODES = Path("meta/episodes/chunk-000/file-000.parquet")

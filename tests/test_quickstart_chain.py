@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from copolicy.collect.file_lock import hold
 from copolicy.dataset.exceptions import OutputExistsError, RunError
+from copolicy.dataset.files.lock import lock
 from copolicy.train.quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
 
 
@@ -78,7 +78,7 @@ def test_a_folder_of_something_else_or_at_work_is_left_alone(tmp_path):
         run_chain(out, [_rules(out)])
     (out / "notes.txt").unlink()
     with (out / ".quickstart.lock").open("wb") as file:
-        assert hold(file)
+        assert lock(file)
         with pytest.raises(RunError, match="found another quickstart at work"):
             run_chain(out, [_rules(out)])
     run_chain(out, [_rules(out)])

@@ -337,7 +337,7 @@ import sys, time
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import MAP_SETS
+from copolicy.tasks.table.maps import MAP_SETS
 
 config = MAP_SETS["training"][6]
 with EpisodeRecorder(sys.argv[1], config, EpisodeMeta("killed"), WallClockAnchor.simulated(0)) as recording:

@@ -8,10 +8,10 @@ import pytest
 from playwright.sync_api import expect
 from report_page import route_document
 
-from copolicy.cards.artefacts import CHECK_FILE, STATISTICS_FILE
 from copolicy.cards.cli import main
 from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
+from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
 
 EPISODES = 5
 

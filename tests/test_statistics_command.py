@@ -11,7 +11,8 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main
 from copolicy.dataset.command_line.commands import _lines
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.statistics.command import STATISTICS_FILE, summary, write_document
+from copolicy.dataset.files.meta_files import STATISTICS_FILE
+from copolicy.dataset.statistics.command import summary, write_document
 from copolicy.dataset.statistics.reading import read_trajectories
 from copolicy.tasks.table.routes import route_class
 

@@ -4,19 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.checks.stored_check import CHECK_FILE, Validity, content_hash, validity
+from copolicy.dataset.checks.stored_check import Validity, content_hash, validity
 from copolicy.dataset.files import json_file
-from copolicy.dataset.lerobot_folder.documents import (
-    RELEASE_FILE,
-    STATISTICS_FILE,
-    CheckDocument,
-    ReleaseDocument,
-    StatisticsDocument,
-)
+from copolicy.dataset.files.meta_files import CHECK_FILE, RELEASE_FILE, STATISTICS_FILE
+from copolicy.dataset.lerobot_folder.documents import CheckDocument, ReleaseDocument, StatisticsDocument
 
 __all__ = [
-    "CHECK_FILE",
-    "STATISTICS_FILE",
     "KeptFindings",
     "estimates",
     "kept_findings",

@@ -8,6 +8,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import require_type
+from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.policies.documents import (
     EvaluationDocument,
     KeptEvaluationsDocument,
@@ -118,7 +119,7 @@ class Checkpoint:
 
 def _training_root(settings: dict[str, Any]) -> Path | None:
     root = settings.get("root")
-    return Path(root) if root and (Path(root) / "meta" / "info.json").is_file() else None
+    return Path(root) if root and (Path(root) / INFO_FILE).is_file() else None
 
 
 def _folder(path: Path) -> Path:

@@ -62,7 +62,9 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
 def _dataset(arguments: argparse.Namespace) -> dict:
     if arguments.repo_id is not None:
         checked_repo_id(arguments.repo_id)
-    from .croissant import CROISSANT_FILE, croissant_text
+    from copolicy.dataset.files.meta_files import CROISSANT_FILE
+
+    from .croissant import croissant_text
     from .dataset_card import render
     from .facts import DatasetFacts
 

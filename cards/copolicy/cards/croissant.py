@@ -18,8 +18,6 @@ from .artefacts import newest_release
 from .dataset_card import PAPER, licence
 from .facts import DatasetFacts
 
-CROISSANT_FILE = Path("meta/croissant.json")
-
 REPOSITORY = "repository"
 """Id of what the data files lie in; a reader maps it to a folder."""
 

@@ -6,7 +6,8 @@ What the metadata does not say is called not stated, so that a reader knows what
 from collections.abc import Iterator
 
 from copolicy.dataset.features import ACTION
-from copolicy.dataset.lerobot_folder.documents import RECORD_FILE, ConversionRecord
+from copolicy.dataset.files.meta_files import RECORD_FILE
+from copolicy.dataset.lerobot_folder.documents import ConversionRecord
 from copolicy.dataset.versions.withdrawals import read_withdrawals
 
 from .artefacts import newest_release, read_json

@@ -8,8 +8,8 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import FEATURES
+from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 from collections import Counter
 
-from .artefacts import CHECK_FILE, kept_findings
+from copolicy.dataset.files.meta_files import CHECK_FILE
+
+from .artefacts import kept_findings
 from .facts import DatasetFacts
 from .markdown import number, table
 

@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from .artefacts import STATISTICS_FILE, estimates, statistics_doubt, stored_statistics
+from copolicy.dataset.files.meta_files import STATISTICS_FILE
+
+from .artefacts import estimates, statistics_doubt, stored_statistics
 from .facts import DatasetFacts
 from .markdown import number, table
 from .routes import RouteStatistics, route_statistics

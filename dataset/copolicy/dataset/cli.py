@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from .checks.command import add_check_command
 from .command_line.commands import command_parser, run
 from .edit.commands import add_amend_command, add_select_command, add_split_command, add_withdraw_command
-from .hub.commands import add_publish_command, add_pull_command
 from .lerobot_folder.exclusions import add_exclude_command
 from .statistics import add_stats_command
+from .transfer.commands import add_publish_command, add_pull_command
 from .versions.commands import add_diff_command, add_release_command
 
 

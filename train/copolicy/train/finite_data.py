@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.listing import visible_files
+from copolicy.dataset.files.meta_files import EPISODES_FOLDER
 from copolicy.dataset.lerobot_folder.tables import DAMAGED, damaged, read_parquet
 
 _EPISODE, _FRAME = "episode_index", "frame_index"
@@ -128,7 +129,7 @@ def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str,
         FileFormatError: a file cannot be read.
     """
     statistics = []
-    for path in visible_files(root / "meta" / "episodes", "*.parquet"):
+    for path in visible_files(root / EPISODES_FOLDER, "*.parquet"):
         for row in read_parquet(path).to_pylist():
             if row[_EPISODE] in episodes:
                 entry: dict[str, dict[str, np.ndarray]] = {}

@@ -13,7 +13,7 @@ from time import perf_counter
 from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
 from copolicy.dataset.command_line.extras import FIGURES, HUB, TRAINING
 from copolicy.dataset.command_line.flag_numbers import seed, whole_number, workers
-from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.files.staging import replace_json
 
 from .quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
 
@@ -60,7 +60,7 @@ def _quickstart(arguments: argparse.Namespace) -> dict:
     started = perf_counter()
     run_chain(out, _chain(arguments))
     summary = _summary(arguments, perf_counter() - started)
-    replace_text(out / "summary.json", json.dumps(summary, indent=1) + "\n")
+    replace_json(out / "summary.json", summary, indent=1)
     forget_chain(out)
     return summary
 

@@ -8,15 +8,15 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import IO
 
-from copolicy.collect.file_lock import hold
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError, RunError
 from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import replace_text
 
 LOG_FILE = "quickstart.log"
@@ -58,7 +58,8 @@ def run_chain(out: Path, steps: Sequence[Step]) -> None:
     if os.path.lexists(out) and not record.is_file() and not _is_empty(out):
         raise OutputExistsError(out)
     out.mkdir(parents=True, exist_ok=True)
-    with _alone(out), (out / LOG_FILE).open("a", encoding="utf-8") as log:
+    refusal = f"{out}: expected a folder that nobody works in, found another quickstart at work"
+    with FolderLock(out / _LOCK, refusal), (out / LOG_FILE).open("a", encoding="utf-8") as log:
         finished = _common(_finished(record), [step.typed for step in steps])
         replace_text(record, json.dumps(finished) + "\n")
         _say(f"Everything that the commands say is in {out / LOG_FILE}\n")
@@ -84,14 +85,6 @@ def forget_chain(out: Path) -> None:
 def _is_empty(folder: Path) -> bool:
     # A first try that ended before its first command has left its log.
     return folder.is_dir() and all(is_hidden(entry.name) or entry.name == LOG_FILE for entry in folder.iterdir())
-
-
-@contextlib.contextmanager
-def _alone(out: Path) -> Iterator[None]:
-    with (out / _LOCK).open("wb") as file:
-        if not hold(file):
-            raise RunError(f"{out}: expected a folder that nobody works in, found another quickstart at work")
-        yield
 
 
 def _finished(record: Path) -> list[str]:

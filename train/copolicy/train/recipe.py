@@ -10,9 +10,8 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
-from copolicy.dataset.lerobot_folder.documents import RELEASE_FILE
+from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
 
 RECIPE_FILE = "recipe.json"

@@ -6,9 +6,10 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files.meta_files import CHECK_FILE
 from copolicy.dataset.files.staging import replace_text
 
-from ..artefacts import CHECK_FILE, KeptFindings, kept_findings, stored_statistics
+from ..artefacts import KeptFindings, kept_findings, stored_statistics
 
 REPORT_NAME = "report.html"
 

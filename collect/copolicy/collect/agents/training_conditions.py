@@ -7,7 +7,7 @@ from typing import Any, TypedDict
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
+from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.tasks.table.physics import Physics
 
 ASSUMED_FPS = 10

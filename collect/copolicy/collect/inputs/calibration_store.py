@@ -1,13 +1,14 @@
 """Where calibrations are kept between sessions: one file of the user, by the kind of device."""
 
 import json
-import os
 import sys
 from pathlib import Path
 
+from platformdirs import user_config_path
+
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.files.file_kinds import kind_of
-from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.files.staging import replace_json
 
 from .calibration import StickCalibration
 from .joysticks import Pad
@@ -17,12 +18,10 @@ _FILE = "calibrations.json"
 
 def user_config_folder() -> Path:
     """The folder for settings of this user, as the system has it."""
-    home = Path.home()
-    if sys.platform == "win32":
-        return Path(os.environ.get("APPDATA", home / "AppData" / "Roaming")) / "copolicy"
-    if sys.platform == "darwin":
-        return home / "Library" / "Application Support" / "copolicy"
-    return Path(os.environ.get("XDG_CONFIG_HOME") or home / ".config") / "copolicy"
+    folder = user_config_path("copolicy", appauthor=False, roaming=True)
+    # On macOS with XDG_CONFIG_HOME set, the first version did not look there.
+    first = Path.home() / "Library" / "Application Support" / "copolicy"
+    return first if sys.platform == "darwin" and first.is_dir() and not folder.is_dir() else folder
 
 
 class CalibrationStore:
@@ -69,4 +68,4 @@ class CalibrationStore:
         """
         self._by_guid[guid] = calibration
         entries = {key: one.to_json() for key, one in sorted(self._by_guid.items())}
-        replace_text(self.path, json.dumps(entries, indent=2) + "\n")
+        replace_json(self.path, entries)

@@ -7,9 +7,9 @@ from pathlib import Path
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from copolicy.dataset.exceptions import OutputExistsError
+from copolicy.dataset.files.lock import lock
+from copolicy.dataset.files.staging import sync_folder
 from copolicy.dataset.recording.topics import ENCODING, TOPICS, Topic, schema_data
-
-from ..file_lock import hold
 
 PART_SUFFIX = ".part"
 """What a recording's name ends with while it runs, and after it broke off."""
@@ -37,7 +37,7 @@ class EpisodeFile:
             self._file = self.part.open("xb")
         except FileExistsError:
             raise OutputExistsError(self.part) from None
-        hold(self._file, wait=True)  # tells `recover` that this recording is running
+        lock(self._file, wait=True)  # tells `recover` that this recording is running
         self._writer = Writer(
             self._file, chunk_size=_CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
@@ -97,14 +97,3 @@ class EpisodeFile:
     def close(self) -> None:
         """Lets go of the file as it is."""
         self._file.close()
-
-
-def sync_folder(folder: Path) -> None:
-    """Makes a renaming survive a power failure, where the system lets a folder be opened."""
-    if os.name == "nt":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -14,10 +14,10 @@ from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError, OutputExistsError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import distinct_files
+from copolicy.dataset.files.lock import let_others_read, lock
 from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.soundness import RECOVERY
 
-from ..file_lock import hold
 from .episode_file import PART_SUFFIX
 from .intact_records import read_intact_part
 from .recovered_file import RECOVERED, write_recovered
@@ -97,8 +97,9 @@ def recover_file(source: Path | str) -> Recovery:
     except OSError as error:
         raise FileFormatError(source, "a readable and writable file", error.strerror or str(error)) from None
     with file:
-        if not hold(file):
+        if not lock(file):
             return Recovery(source, "running", detail="another process is recording it")
+        let_others_read(file)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         if output.exists():
             return _earlier(source, output, digest)

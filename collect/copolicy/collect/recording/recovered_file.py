@@ -14,7 +14,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.files.staging import about
+from copolicy.dataset.files.staging import about, sync_folder
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.log import read_episode
@@ -27,7 +27,6 @@ from copolicy.tasks.table.artist.scene_solids import TableFrame
 from copolicy.tasks.table.routes import route_class
 
 from ..session.recorded import OFF_CENTRE, PRACTICE
-from .episode_file import sync_folder
 from .episode_messages import Record, event_record
 from .intact_records import IntactPart, intact_records
 from .recorder import IDENTICAL_ACTIONS

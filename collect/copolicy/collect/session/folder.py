@@ -11,11 +11,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files.lock import FolderLock
+from copolicy.dataset.files.staging import replace_json, sync_folder
 
-from ..file_lock import hold
-from ..recording.episode_file import sync_folder
 from .balance import Counts
 from .recorded import Recorded, recordings
 
@@ -26,24 +25,13 @@ _UNDONE = ".undone"
 _EPISODE = re.compile(r"episode_(\d+)\.")
 
 
-class CollectionLock:
-    """Held while a tool collects into a folder; the system lets go of it when the process ends, however it ends."""
+class CollectionLock(FolderLock):
+    """Held while a tool collects into a folder."""
 
     def __init__(self, folder: Path):
-        """
-        Raises:
-            RunError: another tool holds it.
-            OSError: the folder cannot be made or written to.
-        """
-        folder.mkdir(parents=True, exist_ok=True)
-        self._file = (folder / _LOCK).open("ab")
-        if not hold(self._file):
-            self._file.close()
-            raise RunError(f"{folder}: expected a folder that no other tool collects into, found one running")
-
-    def close(self) -> None:
-        """Lets go."""
-        self._file.close()
+        super().__init__(
+            folder / _LOCK, f"{folder}: expected a folder that no other tool collects into, found one running"
+        )
 
 
 class SessionFolder:
@@ -147,7 +135,7 @@ class SessionFolder:
         self.path.mkdir()
         self.session_id = f"{self.path.name}-{uuid.uuid4().hex[:8]}"
         header = {"session_id": self.session_id, "pair_id": pair, "settings": dict(settings)}
-        replace_text(self.path / _HEADER, json.dumps(header, indent=2) + "\n")
+        replace_json(self.path / _HEADER, header)
 
     def _read_header(self) -> dict[str, Any]:
         path = self.path / _HEADER

@@ -14,8 +14,8 @@ from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
 from copolicy.dataset.files.listing import visible_files
+from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
 from copolicy.dataset.physics_text import physics_counts, physics_of
 from copolicy.dataset.task import RECORD_HZ

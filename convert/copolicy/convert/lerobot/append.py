@@ -15,12 +15,12 @@ from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from copolicy.dataset.files.staging import about, sync_folder, sync_tree
-from copolicy.dataset.lerobot_folder.documents import RECORD_FILE
-from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
+from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import CARD_FILE, is_minimal_card, minimal_card
+from copolicy.dataset.publication.minimal_card import is_minimal_card, minimal_card
 from copolicy.dataset.recording.log import read_metadata
 
 from ..recordings import convert_recordings, find_recordings
@@ -103,7 +103,7 @@ def append_recordings(
     finish_interrupted(root)
     require_loadable(root)
     files, unfinished = find_recordings(folders)
-    known = {name for path in numbered_files(root / "meta" / "episodes").values() for name in _uuids(path)}
+    known = {name for path in numbered_files(root / EPISODES_FOLDER).values() for name in _uuids(path)}
     new = [path for path in files if _uuid(path) not in known]
     summary: dict[str, Any] = {"root": str(root), "already_there": len(files) - len(new), "episodes_added": 0}
     if not new:
@@ -143,7 +143,7 @@ def append_recordings(
 
 
 def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
-    tables = [read_parquet(path) for path in numbered_files(whole / "meta" / "episodes").values()]
+    tables = [read_parquet(path) for path in numbered_files(whole / EPISODES_FOLDER).values()]
     named = [[name for name in EPISODE_COLUMNS if name in table.column_names] for table in tables]
     rows = [row for table, names in zip(tables, named, strict=True) for row in table.select(names).to_pylist()]
     record = stored_record(whole)
@@ -171,11 +171,11 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
         data[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
         write_like(shift.frame_table(read_parquet(path)), example, _numbered(whole / "data", last))
     moved = {"data": data, **_move_videos(whole, added, info)}
-    last, example = list(numbered_files(whole / "meta" / "episodes").items())[-1]
-    for path in numbered_files(added / "meta" / "episodes").values():
+    last, example = list(numbered_files(whole / EPISODES_FOLDER).items())[-1]
+    for path in numbered_files(added / EPISODES_FOLDER).values():
         last = update_chunk_file_indices(*last, info["chunks_size"])
         table = shift.episode_table(read_parquet(path), moved, last)
-        write_like(table, example, _numbered(whole / "meta" / "episodes", last))
+        write_like(table, example, _numbered(whole / EPISODES_FOLDER, last))
     statistics = [load_stats(whole), shift.statistics(load_stats(added) or {})]
     total = info["total_episodes"] + new["total_episodes"]
     if info.get("splits") == {"train": f"0:{info['total_episodes']}"}:
@@ -199,7 +199,7 @@ def _renew_minimal_card(root: Path) -> None:
     path = root / CARD_FILE
     if path.exists() and not is_minimal_card(path):
         return
-    tables = [read_parquet(file) for file in numbered_files(root / "meta" / "episodes").values()]
+    tables = [read_parquet(file) for file in numbered_files(root / EPISODES_FOLDER).values()]
     path.unlink(missing_ok=True)  # a link
     licences = {text or "" for table in tables for text in table.column("license").to_pylist()}
     path.write_text(minimal_card(licences), encoding="utf-8")

@@ -12,9 +12,9 @@ from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, RunError
 from copolicy.dataset.features import STATE
 
+from ..column_statistics import episode_statistics
 from ..replay import replay_drift
 from .frames import frame_columns
-from .statistics import episode_statistics
 
 if TYPE_CHECKING:
     from ..video.scene_video import SceneClip

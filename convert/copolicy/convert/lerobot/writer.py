@@ -18,19 +18,19 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.files.meta_files import CARD_FILE, RECORD_FILE
 from copolicy.dataset.files.staging import new_folder
-from copolicy.dataset.lerobot_folder.documents import RECORD_FILE
 from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
 from copolicy.dataset.publication.licences import licence_identifier
-from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
+from copolicy.dataset.publication.minimal_card import minimal_card
 from copolicy.dataset.task import RECORD_HZ
 
+from ..column_statistics import episode_statistics
 from ..video.scene_video import SCENE, scene_encoder, scene_feature
 from ..video.video_files import VideoFiles
 from .frame_files import FrameFiles
 from .mixtures import Mixtures
 from .prepare import PreparedEpisode, RepeatedEpisodeError
-from .statistics import episode_statistics
 
 try:
     import pyarrow as pa

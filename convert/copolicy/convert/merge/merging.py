@@ -15,11 +15,13 @@ from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
-from copolicy.dataset.versions.content import Content, read_content
+from copolicy.dataset.publication.minimal_card import minimal_card
+from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.digests import Content
 
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures, converter_versions
@@ -118,7 +120,7 @@ def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.T
             if pa.types.is_null(known):
                 types[field.name] = field.type
             elif field.type != known and not pa.types.is_null(field.type):
-                where = source.root / "meta" / "episodes"
+                where = source.root / EPISODES_FOLDER
                 raise FileFormatError(where, f"column {field.name} of type {known}", str(field.type))
     return pa.concat_tables(
         [
@@ -144,7 +146,7 @@ def _without_nan(name: str, column: "pa.ChunkedArray") -> "pa.ChunkedArray":
 
 def _restore_episodes(root: Path, expected: "pa.Table") -> None:
     start = 0
-    for path in numbered_files(root / "meta" / "episodes").values():
+    for path in numbered_files(root / EPISODES_FOLDER).values():
         merged = read_parquet(path)
         rows = expected.slice(start, merged.num_rows)
         for name in rows.column_names:

@@ -6,7 +6,7 @@ from pathlib import Path
 from copolicy.dataset.edit.subset.stored_set import StoredSet
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
+from copolicy.dataset.files.meta_files import EPISODES_FOLDER, INFO_FILE
 
 try:
     from lerobot.datasets.feature_utils import features_equal_for_merge
@@ -24,7 +24,7 @@ def read_source(root: Path) -> StoredSet:
     there = {*source.episodes.column_names, *LATER_COLUMNS}
     missing = [name for name in EPISODE_COLUMNS if name not in there]
     if missing:
-        raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", f"no {missing[0]}")
+        raise FileFormatError(root / EPISODES_FOLDER, "the episode columns of copolicy", f"no {missing[0]}")
     return source
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, read_info
+from copolicy.dataset.files.meta_files import EPISODES_FOLDER, INFO_FILE, STATS_FILE, TASKS_FILE
+from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 from ..lerobot.joined_sets import join_data_sets
@@ -32,14 +33,14 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
         FileFormatError: a part is not complete. LeRobot would look for it on the Hub.
     """
     for root in roots:
-        for name in (INFO_FILE, STATS_FILE, TASKS_FILE, "meta/episodes", "data"):
+        for name in (INFO_FILE, STATS_FILE, TASKS_FILE, EPISODES_FOLDER, "data"):
             if not (root / name).exists():
                 raise FileFormatError(root, f"a complete data set with {name}", "none; delete the shard's folder")
     join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
     info = read_info(target)
     info["features"] = read_info(roots[0])["features"]
     (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
-    example = next(iter(numbered_files(roots[0] / "meta" / "episodes").values()))
-    for path in numbered_files(target / "meta" / "episodes").values():
+    example = next(iter(numbered_files(roots[0] / EPISODES_FOLDER).values()))
+    for path in numbered_files(target / EPISODES_FOLDER).values():
         write_like(read_parquet(path), example, path)
     return info

@@ -3,15 +3,14 @@
 import argparse
 import shutil
 from collections.abc import Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from copolicy.collect.file_lock import hold
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.flag_numbers import whole_number
-from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import require_new
 
 from ..lerobot.prepare import Conversion
@@ -152,7 +151,8 @@ def convert_in_shards(
         tuple(unfinished),
     )  # fmt: skip
     plan.require_own()
-    with _locked(folder):
+    refusal = f"{folder}: expected shards that nobody works on, found another call at work"
+    with FolderLock(folder / LOCK_FILE, refusal):
         finished = plan.prepare()
         if scale.executor == "slurm":
             jobs = submit_slurm(plan, scale.workers, SlurmOptions(**scale.slurm))
@@ -170,16 +170,6 @@ def convert_in_shards(
         return {**summary, "kept": str(folder)}
     shutil.rmtree(folder)
     return summary
-
-
-@contextmanager
-def _locked(folder: Path):
-    """Keeps a second call out of a folder of shards; the system forgets a lock whose process was killed."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK_FILE).open("wb") as file:
-        if not hold(file):
-            raise RunError(f"{folder}: expected shards that nobody works on, found another call at work")
-        yield
 
 
 def _option(text: str) -> tuple[str, str]:

@@ -1,6 +1,5 @@
 """All shards to the one data set, with what can only be said of all episodes together."""
 
-import json
 from collections import Counter
 from importlib.metadata import version
 from pathlib import Path
@@ -11,10 +10,10 @@ from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.files.staging import new_folder, require_new
-from copolicy.dataset.lerobot_folder.documents import STATISTICS_FILE
+from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, STATISTICS_FILE
+from copolicy.dataset.files.staging import new_folder, replace_json, require_new
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import CARD_FILE, minimal_card
+from copolicy.dataset.publication.minimal_card import minimal_card
 
 from ..lerobot.mixtures import Mixtures
 from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
@@ -55,12 +54,11 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
-        tables = [read_parquet(path) for path in numbered_files(partial / "meta" / "episodes").values()]
+        tables = [read_parquet(path) for path in numbered_files(partial / EPISODES_FOLDER).values()]
         rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
         card = minimal_card({row["license"] or "" for row in rows})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
-    document = json.dumps([finding.to_dict() for finding in findings], indent=1)
-    (plan.folder / FINDINGS_FILE).write_text(document + "\n", encoding="utf-8")
+    replace_json(plan.folder / FINDINGS_FILE, [finding.to_dict() for finding in findings], indent=1)
     conversion = plan.conversion
     written = WrittenDataset(
         plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
@@ -109,9 +107,8 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
 
 
 def _write_statistics(root: Path) -> None:
-    from copolicy.dataset.statistics.command import write_document
     from copolicy.dataset.statistics.compute import compute_statistics
     from copolicy.dataset.statistics.reading import read_trajectories
 
     data, left_out = read_trajectories(root)
-    write_document(compute_statistics(data, left_out=left_out), root / STATISTICS_FILE)
+    replace_json(root / STATISTICS_FILE, compute_statistics(data, left_out=left_out), allow_nan=False)

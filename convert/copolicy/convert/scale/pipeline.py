@@ -1,8 +1,7 @@
 """The two steps as datatrove runs them."""
 
-import json
-
 from copolicy.dataset.exceptions import MissingExtraError
+from copolicy.dataset.files.staging import replace_json
 
 from .plan import ShardPlan
 
@@ -46,4 +45,4 @@ class MergeShards(PipelineStep):
         from .merge import merge_shards
 
         summary = merge_shards(self.plan)
-        (self.plan.folder / SUMMARY_FILE).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        replace_json(self.plan.folder / SUMMARY_FILE, summary)

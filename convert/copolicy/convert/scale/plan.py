@@ -13,6 +13,7 @@ from typing import Any, NotRequired, TypedDict
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.files.staging import replace_json
 
 from ..lerobot.prepare import Conversion
 
@@ -141,7 +142,7 @@ class ShardPlan:
             Number of shards that are finished already.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        (self.folder / OPTIONS_FILE).write_text(json.dumps(self.options, indent=2) + "\n", encoding="utf-8")
+        replace_json(self.folder / OPTIONS_FILE, self.options)
         shutil.rmtree(self.merge_logs / "completions", ignore_errors=True)
         finished = 0
         for path in sorted((self.folder / "shards").glob("[0-9]*")):

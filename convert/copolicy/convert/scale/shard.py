@@ -1,6 +1,5 @@
 """One shard: its recordings read, checked and converted to a data set of its own."""
 
-import json
 import shutil
 from dataclasses import asdict
 from importlib.metadata import version
@@ -8,7 +7,7 @@ from importlib.metadata import version
 from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
 from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
 from copolicy.dataset.episode import Episode
-from copolicy.dataset.files.staging import new_folder
+from copolicy.dataset.files.staging import new_folder, replace_json, replace_text
 from copolicy.dataset.recording.log import read_episode
 
 from ..lerobot.prepare import DamagedEpisodeError, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
@@ -54,7 +53,7 @@ def convert_shard(plan: ShardPlan, rank: int) -> int:
             "left_out": asdict(left_out),
             **_findings(plan, prepared, episodes),
         }
-        (partial / RECORD_FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        replace_json(partial / RECORD_FILE, document, indent=1)
     return len(prepared)
 
 
@@ -77,8 +76,7 @@ def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | 
     path = plan.damage_list(rank)
     path.unlink(missing_ok=True)
     if damaged and not plan.skip_damaged:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("".join(f"{message}\n" for message in damaged), encoding="utf-8")
+        replace_text(path, "".join(f"{message}\n" for message in damaged))
         raise DamagedEpisodeError(damaged[0])
 
 

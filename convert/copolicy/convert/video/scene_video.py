@@ -15,7 +15,7 @@ import numpy as np
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.features import SCENE_IMAGE, SCENE_SIDES
 
-from ..lerobot.statistics import QUANTILES
+from ..column_statistics import QUANTILES
 
 try:
     import av

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..exceptions import CopolicyError
-from ..versions.manifest import MANIFEST_FILE, Manifest
+from ..files.meta_files import CHECK_FILE, MANIFEST_FILE
+from ..versions.manifest import Manifest
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .rule import Rule, each
-from .stored_check import CHECK_FILE
 
 
 def _reading(table: EpisodeTable) -> Iterator[Finding]:
@@ -47,7 +47,7 @@ def _manifest(table: EpisodeTable) -> Iterator[Finding]:
         return
     try:
         # The findings are written by this very command, after every release as well.
-        differences = Manifest.read(path).differences(Manifest.of_folder(table.root), without={CHECK_FILE.as_posix()})
+        differences = Manifest.read(path).differences(Manifest.of_folder(table.root), without={CHECK_FILE})
     except CopolicyError as error:
         yield Finding("", "check_sum", None, None, "error", str(error).replace(str(path), MANIFEST_FILE))
         return

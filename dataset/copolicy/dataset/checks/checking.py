@@ -1,7 +1,6 @@
 """Runs every rule over a data set."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from ..exceptions import FileFormatError
 from ..files.file_kinds import kind_of
 from ..files.listing import broken_links, distinct_files
+from ..files.meta_files import INFO_FILE
 from . import (
     balance,
     check_sums,
@@ -28,6 +28,7 @@ from . import (
 from .episode_table import EpisodeTable
 from .finding import SEVERITIES, Finding
 from .read_recordings import read_recordings
+from .result import CheckResult
 from .rule import Rule
 
 RULES: tuple[Rule, ...] = (
@@ -56,30 +57,6 @@ DATA_SET_RULES: tuple[Rule, ...] = tuple(rule for rule in RULES if rule not in R
 """The others, for the data set that the recordings became: both together leave no rule out."""
 
 
-@dataclass(frozen=True)
-class CheckResult:
-    """What was found.
-
-    Attributes:
-        findings: worst first, then in the order of the rules.
-        applied: names of the rules that were applied.
-        not_applied: the others, each with the reason.
-    """
-
-    table: EpisodeTable
-    findings: tuple[Finding, ...]
-    applied: tuple[str, ...]
-    not_applied: dict[str, str]
-
-    def count(self, severity: str) -> int:
-        """Findings of a severity."""
-        return sum(finding.severity == severity for finding in self.findings)
-
-    def failed(self, strict: bool = False) -> bool:
-        """Whether the data should not be used: an error, with `strict` also a warning."""
-        return bool(self.count("error") or (strict and self.count("warning")))
-
-
 def read_table(root: Path) -> EpisodeTable:
     """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
 
@@ -87,7 +64,7 @@ def read_table(root: Path) -> EpisodeTable:
         FileFormatError: neither.
         MissingExtraError: a LeRobot data set without pyarrow.
     """
-    if (root / "meta" / "info.json").is_file():
+    if (root / INFO_FILE).is_file():
         from .read_lerobot import read_lerobot
 
         return read_lerobot(root)

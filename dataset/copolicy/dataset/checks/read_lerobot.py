@@ -9,8 +9,9 @@ from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files.listing import visible_files
+from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..lerobot_folder.folder import POSITIONS, other_task
-from ..lerobot_folder.info import INFO_FILE, read_info, require_episodes
+from ..lerobot_folder.info import read_info, require_episodes
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
 from .episode_table import EpisodeTable
 from .finding import Finding
@@ -28,11 +29,9 @@ def read_lerobot(root: Path) -> EpisodeTable:
     info = read_info(root)
     require_episodes(root, info)
     damage: list[Finding] = []
-    meta = _concatenated(root, "meta/episodes", damage)[0]
+    meta = _concatenated(root, EPISODES_FOLDER, damage)[0]
     if meta is None:
-        raise FileFormatError(
-            root / "meta" / "episodes", "a table with episode_index and length", "none that can be read"
-        )
+        raise FileFormatError(root / EPISODES_FOLDER, "a table with episode_index and length", "none that can be read")
     columns = _episode_columns(root, meta, damage)
     order = np.argsort(columns["episode_index"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
@@ -71,7 +70,7 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
     Raises:
         FileFormatError: `episode_index` or `length` is missing, or is none in some row.
     """
-    path = root / "meta" / "episodes"
+    path = root / EPISODES_FOLDER
     columns: dict[str, np.ndarray] = {}
     for name in (*POSITIONS, *EPISODE_COLUMNS):
         if name not in meta.column_names:

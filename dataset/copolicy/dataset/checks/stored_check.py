@@ -10,17 +10,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from ..exceptions import CopolicyError
 from .finding import SEVERITIES
 from .limits import LIMITS, RULES_VERSION
-
-if TYPE_CHECKING:
-    from .checking import CheckResult
-
-CHECK_FILE = Path("meta/copolicy_check.json")
-"""Where the findings lie in a data set."""
+from .result import CheckResult
 
 SCHEMA = "copolicy-check-1"
 
@@ -42,7 +37,7 @@ class Validity:
 
 
 def check_document(
-    result: "CheckResult", content: str | None, strict: bool = False, date: datetime.datetime | None = None
+    result: CheckResult, content: str | None, strict: bool = False, date: datetime.datetime | None = None
 ) -> dict[str, Any]:
     """What `copolicy-dataset check` prints as JSON and keeps.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from ..episode import EPISODE_COLUMNS, Source
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
-from ..lerobot_folder.documents import RECORD_FILE
+from ..files.meta_files import RECORD_FILE
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..publication.licences import checked_licence
 from .selection import Selection

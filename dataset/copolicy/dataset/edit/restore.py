@@ -22,7 +22,7 @@ from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION
 from ..files.listing import visible_files
-from ..lerobot_folder.documents import RECORD_FILE
+from ..files.meta_files import RECORD_FILE
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
 from ..recording.log import read_episode

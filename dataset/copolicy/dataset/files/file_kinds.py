@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..exceptions import CopolicyError
 from .listing import visible_files
+from .meta_files import INFO_FILE
 
 _HEAD = 512  # bytes that tell what a file is
 _MAGIC: tuple[tuple[bytes, str], ...] = (
@@ -94,7 +95,7 @@ def _text_kind(head: bytes) -> str:
 
 
 def _folder_kind(path: Path) -> str:
-    if (path / "meta" / "info.json").is_file():
+    if (path / INFO_FILE).is_file():
         return "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)"
     if any((path / name).is_file() for name in (".zgroup", ".zarray", "zarr.json")):
         return "a Zarr store (copolicy-convert upstream takes the original program's)"
@@ -110,7 +111,7 @@ def _folder_kind(path: Path) -> str:
         return "a folder of recordings that broke off (copolicy-collect recover takes it)"
     if any(file.match("trajectories/*.pkl") or file.stem == file.parent.name for file in files):
         return "a folder of the original program's files (copolicy-convert upstream takes it)"
-    if any(file.match("meta/info.json") for file in files):
+    if any(file.match(INFO_FILE) for file in files):
         return "a folder with LeRobot data sets in it (name one of them)"
     endings = sorted({file.suffix for file in files})
     return f"a folder of other files ({', '.join(endings)})" if endings else "a folder of other files"

@@ -1,12 +1,14 @@
 """A folder or file that appears complete or not at all, also where the power fails."""
 
 import errno
+import json
 import os
 import secrets
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from ..exceptions import OutputExistsError
 
@@ -105,6 +107,11 @@ def replace_text(path: Path, text: str) -> None:
     """Writes a text file in UTF-8, whole or not at all."""
     with replacement(path) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def replace_json(path: Path, value: Any, indent: int = 2, allow_nan: bool = True) -> None:
+    """The same for a value as JSON."""
+    replace_text(path, json.dumps(value, indent=indent, allow_nan=allow_nan) + "\n")
 
 
 @contextmanager

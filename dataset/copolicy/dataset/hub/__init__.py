@@ -1,1 +1,1 @@
-"""A released data set on its way to the Hub and back, whole."""
+"""The Hub as a client sees it: repositories, revisions, downloads, and what its errors mean."""

@@ -4,8 +4,8 @@ import shutil
 from pathlib import Path
 
 from ..exceptions import RunError
+from ..publication.data_version import newest
 from ..publication.repo_id import checked_repo_id
-from ..versions.data_version import newest
 from .client import hub_api, hub_errors, snapshot_download
 from .repository import read_repository
 

@@ -1,16 +1,6 @@
-"""Names and types of the JSON documents that commands leave in the `meta/` folder of a data set."""
+"""Types of the JSON documents that commands leave in the `meta/` folder of a data set."""
 
-from pathlib import Path
 from typing import Any, NotRequired, TypedDict
-
-RECORD_FILE = Path("meta/copolicy.json")
-"""How a data set was made: converter, versions, notes by episode; and what was done to it since."""
-
-RELEASE_FILE = "meta/copolicy_release.json"
-"""The newest release, made by `copolicy-dataset release`."""
-
-STATISTICS_FILE = Path("meta/copolicy_stats.json")
-"""Multimodality statistics of `copolicy-dataset stats`."""
 
 Number = float | int | None
 

@@ -11,7 +11,8 @@ from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, FEATURES, STATE
 from ..files.listing import visible_files
-from .info import INFO_FILE, read_info, require_episodes, stripped_hint
+from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
+from .info import read_info, require_episodes, stripped_hint
 from .tables import column_types, damaged, episode_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
@@ -42,7 +43,7 @@ class LeRobotFolder:
         info = read_info(root)
         require_episodes(root, info)
         table = read_episodes(root)
-        path = root / "meta" / "episodes"
+        path = root / EPISODES_FOLDER
         for name in POSITIONS:
             if name in table.column_names:
                 values = episode_values(table, name, "int", path)
@@ -84,7 +85,7 @@ class LeRobotFolder:
         Raises:
             FileFormatError: a column is missing or holds something else.
         """
-        path = self.root / "meta" / "episodes"
+        path = self.root / EPISODES_FOLDER
         missing = [name for name in columns if name not in self.episodes.column_names and name not in LATER_COLUMNS]
         if missing:
             hint = stripped_hint(self.info, self.root) if "episode_uuid" in missing else ""
@@ -128,7 +129,7 @@ def read_episodes(root: Path) -> pa.Table:
     Raises:
         FileFormatError: no file, one that is no complete Parquet file, or files that do not fit together.
     """
-    folder = root / "meta" / "episodes"
+    folder = root / EPISODES_FOLDER
     files = visible_files(folder, "*.parquet")
     if not files:
         raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")

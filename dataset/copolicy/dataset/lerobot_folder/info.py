@@ -9,10 +9,8 @@ from ..exceptions import FileFormatError
 from ..files.file_kinds import kind_of
 from ..files.json_file import read_json
 from ..files.listing import visible_files
+from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 
-INFO_FILE = Path("meta/info.json")
-STATS_FILE = Path("meta/stats.json")
-TASKS_FILE = Path("meta/tasks.parquet")
 ROBOT_TYPE = "copolicy_table"
 """The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
 
@@ -81,7 +79,7 @@ def require_episodes(root: Path, info: dict[str, Any]) -> None:
     Raises:
         FileFormatError: a data set that says of itself that it has no episode, and has none.
     """
-    if info["total_episodes"] == 0 and not visible_files(root / "meta" / "episodes", "*.parquet"):
+    if info["total_episodes"] == 0 and not visible_files(root / EPISODES_FOLDER, "*.parquet"):
         raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..exceptions import CopolicyError, FileFormatError
 from ..files.json_file import read_json
 from ..files.listing import visible_files
+from ..files.meta_files import EPISODES_FOLDER, STATS_FILE, TASKS_FILE
 from .folder import POSITIONS, LeRobotFolder
-from .info import STATS_FILE, TASKS_FILE
 from .references import (
     data_path,
     read_tasks,
@@ -58,12 +58,12 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
     """
     folder = LeRobotFolder.open(root)
     info = folder.info
-    for name, expected in (("meta/episodes", info["total_episodes"]), ("data", info["total_frames"])):
+    for name, expected in ((EPISODES_FOLDER, info["total_episodes"]), ("data", info["total_frames"])):
         rows = sum(row_count(path) for path in visible_files(root / name, "*.parquet"))
         if rows != expected:
             raise FileFormatError(root / name, f"{expected} rows, as meta/info.json says", f"{rows}")
     for name in POSITIONS:
-        episode_values(folder.episodes, name, "int", root / "meta" / "episodes")
+        episode_values(folder.episodes, name, "int", root / EPISODES_FOLDER)
     _require_spans(folder)
     episodes_of_files: dict[str, frozenset[int]] = {}
     task_numbers: set[int] = set()
@@ -106,7 +106,7 @@ def _require_spans(folder: LeRobotFolder) -> None:
         episode = int(wrong[0])
         expected = f"episodes that follow each other, episode {episode} with {lengths[episode]} frames"
         found = f"dataset_from_index {first[episode]} and dataset_to_index {end[episode]}"
-        raise FileFormatError(folder.root / "meta" / "episodes", expected, found)
+        raise FileFormatError(folder.root / EPISODES_FOLDER, expected, found)
 
 
 def _require_features(path: Path, features: Mapping[str, Any]) -> None:
@@ -165,7 +165,7 @@ def task_problems(
     except CopolicyError as error:
         yield Problem(None, _below(root, error))
         return
-    name = TASKS_FILE.as_posix()
+    name = TASKS_FILE
     if list(tasks) != list(range(len(tasks))) or not all(text.strip() for text in tasks.values()):
         yield Problem(None, f"{name} does not number its sentences 0, 1, ...: {list(tasks)[:5]}")
     if not tasks_are_indexed(root / TASKS_FILE):
@@ -187,7 +187,7 @@ def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True
     Args:
         finite: NaN, infinite and empty numbers are wrong, too.
     """
-    name = STATS_FILE.as_posix()
+    name = STATS_FILE
     try:
         stored = read_statistics(root)
     except CopolicyError as error:
@@ -209,7 +209,7 @@ def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True
 
 def episode_statistics_problems(root: Path) -> Iterator[Problem]:
     """Columns `stats/...` of meta/episodes that hold something else than lists of numbers, which joining reads."""
-    for path in visible_files(root / "meta" / "episodes", "*.parquet"):
+    for path in visible_files(root / EPISODES_FOLDER, "*.parquet"):
         names = [name for name, kind in column_types(path).items() if name.startswith("stats/") and _flat(kind)]
         table = read_parquet(path, names)
         for name in names:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import FileFormatError
-from .info import TASKS_FILE
+from ..files.meta_files import EPISODES_FOLDER, TASKS_FILE
 from .tables import column_types, episode_values, pq, read_parquet
 
 DATA_TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
@@ -24,7 +24,7 @@ def read_tasks(root: Path) -> dict[int, str]:
     """
     path = root / TASKS_FILE
     if not path.is_file():
-        raise FileFormatError(root, f"a LeRobot v3 data set with {TASKS_FILE.as_posix()}", "none")
+        raise FileFormatError(root, f"a LeRobot v3 data set with {TASKS_FILE}", "none")
     name = next((name for name in column_types(path) if name in _TASK_NAMES), None)
     if name is None:
         raise FileFormatError(path, "columns task_index and task", f"{', '.join(column_types(path)) or 'none'}")
@@ -64,7 +64,7 @@ def data_file(root: Path, info: Mapping[str, Any], row: Mapping[str, Any]) -> Pa
     try:
         return root / data_path(info, row)
     except ValueError as error:
-        raise FileFormatError(root / "meta" / "episodes", "where the frames of an episode are", str(error)) from None
+        raise FileFormatError(root / EPISODES_FOLDER, "where the frames of an episode are", str(error)) from None
 
 
 def video_path(info: Mapping[str, Any], row: Mapping[str, Any], key: str) -> str:
@@ -79,7 +79,7 @@ def video_span(root: Path, info: Mapping[str, Any], row: Mapping[str, Any], key:
     Raises:
         FileFormatError: the row does not say, or there is no such file.
     """
-    episodes = root / "meta" / "episodes"
+    episodes = root / EPISODES_FOLDER
     try:
         path = root / video_path(info, row, key)
     except ValueError as error:

@@ -8,8 +8,6 @@ from pathlib import Path
 
 from .licences import licence_identifier
 
-CARD_FILE = "README.md"
-
 CONFIGS = (("default", "data/*/*.parquet"), ("episodes", "meta/episodes/*/*.parquet"))
 """Name and files of each table: the frames, and who, what and how of each episode."""
 

@@ -3,8 +3,8 @@
 Each family has a file; `compute.py` puts them together and `command.py` is `copolicy-dataset stats`.
 """
 
-from .command import STATISTICS_FILE, add_stats_command
+from .command import add_stats_command
 from .estimate import Estimate, Null
 from .trajectories import EpisodeRow, Trajectories
 
-__all__ = ["STATISTICS_FILE", "EpisodeRow", "Estimate", "Null", "Trajectories", "add_stats_command"]
+__all__ = ["EpisodeRow", "Estimate", "Null", "Trajectories", "add_stats_command"]

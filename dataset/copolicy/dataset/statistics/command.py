@@ -1,7 +1,6 @@
 """`copolicy-dataset stats`: how multimodal a data set is, and how sure that is."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,8 @@ from ..command_line.extras import TABLES
 from ..command_line.flag_numbers import seed
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
-from ..files.staging import replace_text
-from ..lerobot_folder.documents import STATISTICS_FILE
+from ..files.meta_files import STATISTICS_FILE
+from ..files.staging import replace_json
 
 
 def add_stats_command(commands: argparse._SubParsersAction) -> None:
@@ -45,13 +44,8 @@ def _stats(arguments: argparse.Namespace) -> dict:
         raise FileFormatError(target, "a file to write", "a folder")
     data, left_out = read_trajectories(arguments.path, arguments.source)
     document = compute_statistics(data, arguments.seed, left_out)
-    write_document(document, target)
+    replace_json(target, document, allow_nan=False)
     return {"written": str(target), **(document if arguments.json else summary(document))}
-
-
-def write_document(document: dict[str, Any], path: Path) -> None:
-    """Writes JSON so that a reader sees the old file or the whole new one."""
-    replace_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
 def summary(document: dict[str, Any]) -> dict[str, Any]:

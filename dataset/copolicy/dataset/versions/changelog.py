@@ -5,8 +5,6 @@ from collections.abc import Iterable
 
 from .difference import Change
 
-CHANGELOG_FILE = "CHANGELOG.md"
-
 _HEAD = """# Changelog
 What changed in this data set, in the form of [Keep a Changelog](https://keepachangelog.com/en/1.1.0/).
 A version is `major.minor.patch`: major when features, rate or existing frames changed or episodes went, minor when

@@ -14,101 +14,22 @@ figures, `meta/copolicy.json`). A manifest covers those.
 
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 from ..episode import EPISODE_COLUMNS
 from ..exceptions import FileFormatError
+from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.references import read_tasks, video_span
 from .canonical import digest
+from .digests import Content, EpisodeContent
 from .frames import frame_digests
 from .videos import video_digest
-
-FORMAT = "copolicy-content-1"
-"""Version of the algorithm; another one gives another prefix."""
 
 _LAYOUT = ("data/", "meta/episodes/", "videos/", "stats/")
 _POSITION = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}
 _DIGITS = 16  # of a column's digest; it is compared, never trusted
-
-
-@dataclass(frozen=True)
-class EpisodeContent:
-    """One episode.
-
-    Attributes:
-        digest: sha256 over everything in it.
-        frames: its length.
-        features: digest of each feature's values, shortened.
-        columns: digest of each episode column, shortened.
-    """
-
-    episode_uuid: str
-    digest: str
-    frames: int
-    features: dict[str, str]
-    columns: dict[str, str]
-
-
-class EpisodeFields(TypedDict):
-    """An `EpisodeContent` in JSON."""
-
-    episode_uuid: str
-    digest: str
-    frames: int
-    features: dict[str, str]
-    columns: dict[str, str]
-
-
-class ContentFields(TypedDict):
-    """A `Content` in JSON."""
-
-    fps: float | int
-    robot_type: str | None
-    features: dict[str, Any]
-    tasks: list[str]
-    episodes: list[EpisodeFields]
-
-
-@dataclass(frozen=True)
-class Content:
-    """Everything that two data sets are compared by."""
-
-    fps: float
-    robot_type: str | None
-    features: dict[str, Any]
-    tasks: list[str]
-    episodes: tuple[EpisodeContent, ...]
-
-    @property
-    def hash(self) -> str:
-        """The content hash with its prefix."""
-        fields = {
-            "format": FORMAT,
-            "fps": float(self.fps),
-            "robot_type": self.robot_type,
-            "features": self.features,
-            "tasks": self.tasks,
-            "episodes": [episode.digest for episode in self.episodes],
-        }
-        return f"{FORMAT}:sha256:{digest(fields)}"
-
-    def to_json(self) -> dict[str, Any]:
-        """For the record of a release."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, fields: ContentFields) -> "Content":
-        """The inverse of `to_json`."""
-        episodes = tuple(
-            EpisodeContent(
-                episode["episode_uuid"], episode["digest"], episode["frames"], episode["features"], episode["columns"]
-            )
-            for episode in fields["episodes"]
-        )
-        return cls(fields["fps"], fields["robot_type"], fields["features"], fields["tasks"], episodes)
 
 
 def read_content(root: Path) -> Content:
@@ -155,7 +76,7 @@ def _read_episodes(folder: LeRobotFolder) -> list[dict[str, Any]]:
     uuid, episodes = uuids.most_common(1)[0]
     if episodes > 1 or "" in uuids:
         found = f"{episodes} with {uuid!r}" if episodes > 1 else "one with none"
-        raise FileFormatError(root / "meta" / "episodes", "an episode_uuid of its own for each episode", found)
+        raise FileFormatError(root / EPISODES_FOLDER, "an episode_uuid of its own for each episode", found)
     # A file of a merge may lack a column that another has; LeRobot reads it as null.
     return [{name: _known(name, value) for name, value in row.items()} for row in folder.episodes.to_pylist()]
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .content import Content, EpisodeContent
-from .data_version import BUMPS, Bump
+from ..publication.data_version import BUMPS, Bump
+from .digests import Content, EpisodeContent
 from .withdrawals import is_anonymous
 
 EXCLUSION = "discarded"

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..exceptions import FileFormatError
 from ..files.listing import visible_files
+from ..files.meta_files import INFO_FILE, TASKS_FILE
 from ..lerobot_folder.tables import column_types, feature_values, read_parquet
 from .canonical import encode
 
@@ -78,7 +79,7 @@ def _encodable(
         numbers = _numbers(files, name, "int64", [1])[:, 0].tolist()
         unknown = set(numbers) - set(tasks)
         if unknown:
-            raise FileFormatError(root / "meta" / "tasks.parquet", f"task {min(unknown)}", "no such number")
+            raise FileFormatError(root / TASKS_FILE, f"task {min(unknown)}", "no such number")
         return [tasks[number] for number in numbers]
     if feature["dtype"] == "string":
         return _values(files, name)
@@ -89,7 +90,7 @@ def _encodable(
         np.dtype(feature["dtype"])
     except TypeError:
         found = f"the dtype {feature['dtype']!r} of {name}"
-        raise FileFormatError(root / "meta" / "info.json", "features of known types", found) from None
+        raise FileFormatError(root / INFO_FILE, "features of known types", found) from None
     numbers = _numbers(files, name, feature["dtype"], feature["shape"])
     if numbers.dtype.kind == "f":
         numbers[np.isnan(numbers)] = np.nan

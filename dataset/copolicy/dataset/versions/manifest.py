@@ -10,12 +10,12 @@ from typing import TypedDict
 from ..exceptions import FileFormatError
 from ..files.json_file import parse_json, read_json
 from ..files.listing import is_hidden, visible_files
+from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER
 from .canonical import digest
 
-MANIFEST_FILE = "meta/manifest.json"
 _SCHEMA = "copolicy-manifest-1"
 _WHAT = f"a manifest ({_SCHEMA})"
-_NO_DATA = ("images", "raw")
+_NO_DATA = ("images", RAW_FOLDER)
 
 
 @dataclass(frozen=True)

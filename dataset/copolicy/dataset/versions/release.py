@@ -3,16 +3,17 @@
 import datetime
 from pathlib import Path
 
-from ..checks.stored_check import CHECK_FILE
 from ..exceptions import InvalidValueError, RunError
+from ..files.meta_files import CHANGELOG_FILE, CHECK_FILE, EARLIER_FOLDER, MANIFEST_FILE, RELEASE_FILE
 from ..files.staging import replacements
 from ..files.text_files import read_older_text
-from .changelog import CHANGELOG_FILE, with_release
-from .content import Content, read_content
-from .data_version import BUMPS, Bump, DataVersion
+from ..publication.data_version import BUMPS, Bump, DataVersion
+from .changelog import with_release
+from .content import read_content
 from .difference import Change, compare, withdrawal_text
-from .manifest import MANIFEST_FILE, FileEntry, Manifest, file_entry
-from .release_record import EARLIER_FOLDER, RELEASE_FILE, ReleaseRecord, read_release
+from .digests import Content
+from .manifest import FileEntry, Manifest, file_entry
+from .release_record import ReleaseRecord, read_release
 from .withdrawals import read_withdrawals
 
 
@@ -74,7 +75,7 @@ def _never_released(count: int) -> tuple[Change, ...]:
 def _own_files(manifest: Manifest) -> set[str]:
     """What a release writes, which changes by releasing; and the findings, which change by looking."""
     earlier = {name for name in manifest.files if name.startswith(EARLIER_FOLDER + "/")}
-    return {CHANGELOG_FILE, RELEASE_FILE, CHECK_FILE.as_posix(), *earlier}
+    return {CHANGELOG_FILE, RELEASE_FILE, CHECK_FILE, *earlier}
 
 
 def _write(

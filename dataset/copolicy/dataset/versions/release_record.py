@@ -8,13 +8,10 @@ from typing import Any, NotRequired, TypedDict
 from ..exceptions import FileFormatError, UnknownNameError
 from ..files.json_file import read_json
 from ..files.listing import visible_files
-from ..lerobot_folder.documents import RELEASE_FILE
-from .content import Content, ContentFields
-from .data_version import DataVersion
+from ..files.meta_files import EARLIER_FOLDER, RELEASE_FILE
+from ..publication.data_version import DataVersion
+from .digests import Content, ContentFields
 from .withdrawals import is_anonymous
-
-EARLIER_FOLDER = "meta/copolicy_releases"
-"""The records of the releases before it, `x.y.z.json`."""
 
 _SCHEMA = "copolicy-release-1"
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import FileFormatError
-from .content import Content, read_content
-from .data_version import TAG_PREFIX
+from ..publication.data_version import TAG_PREFIX
+from .content import read_content
+from .digests import Content
 from .release_record import read_release
 from .statistics import read_statistics
 
@@ -49,8 +50,8 @@ def read_side(text: str) -> Side:
         record = read_release(Path(name), revision)
         return Side(text, record.content, None, record.content_hash)
     if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
+        from ..files.meta_files import RAW_FOLDER
         from ..hub.download import download, resolve
-        from ..hub.raw_recordings import RAW_FOLDER
 
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder) / "data_set"

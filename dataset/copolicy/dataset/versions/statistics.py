@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..files.json_file import read_json
-from ..lerobot_folder.documents import STATISTICS_FILE
+from ..files.meta_files import STATISTICS_FILE
 
 
 def read_statistics(root: Path) -> dict[str, Any] | None:

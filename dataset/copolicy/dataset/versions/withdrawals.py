@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from ..files.json_file import read_json
-from .content import Content, EpisodeContent
+from ..files.meta_files import WITHDRAWALS_FILE
+from .digests import Content, EpisodeContent
 
-WITHDRAWALS_FILE = Path("meta/copolicy_withdrawals.json")
 _SCHEMA = "copolicy-withdrawals-1"
 _ANONYMOUS = re.compile(r"withdrawn-\d+")
 

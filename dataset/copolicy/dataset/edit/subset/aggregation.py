@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...exceptions import FileFormatError
-from ...lerobot_folder.info import STATS_FILE
+from ...files.meta_files import EPISODES_FOLDER, STATS_FILE
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -41,7 +41,7 @@ def aggregated_statistics(episodes: "pa.Table") -> Statistics:
                 stacked = {kind: np.array([values[row] for row in present]) for kind, values in kinds.items()}
                 result[feature] = _aggregated(stacked)
             except (TypeError, ValueError):
-                raise FileFormatError("meta/episodes", f"statistics of {feature} of one shape", "others") from None
+                raise FileFormatError(EPISODES_FOLDER, f"statistics of {feature} of one shape", "others") from None
     return result
 
 

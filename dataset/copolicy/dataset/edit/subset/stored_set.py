@@ -10,12 +10,14 @@ from typing import Any
 from ...episode import EPISODE_COLUMNS
 from ...exceptions import FileFormatError, MissingExtraError
 from ...files.json_file import read_json
-from ...lerobot_folder.documents import RECORD_FILE, ConversionRecord
+from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
+from ...lerobot_folder.documents import ConversionRecord
 from ...lerobot_folder.episode_rows import episode_tables
-from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE, stripped_hint
+from ...lerobot_folder.info import stripped_hint
 from ...lerobot_folder.loading import require_loadable
-from ...publication.minimal_card import CARD_FILE, is_minimal_card
-from ...versions.content import Content, read_content
+from ...publication.minimal_card import is_minimal_card
+from ...versions.content import read_content
+from ...versions.digests import Content
 from ...versions.manifest import data_set_files
 
 try:
@@ -25,7 +27,7 @@ except ModuleNotFoundError:
 
 _ELSEWHERE = ("data/", "meta/", "videos/", "stats/")  # columns of meta/episodes that say where an episode lies
 _PLACES = ("episode_index", "length", "dataset_from_index", "dataset_to_index", "data/chunk_index", "data/file_index")
-_WRITTEN = {path.as_posix() for path in (INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE)}
+_WRITTEN = {INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE}
 _WRITTEN_FOLDERS = ("data/", "meta/episodes/", "videos/")
 _LICENCES = ("LICENSE", "LICENCE", "COPYING", "NOTICE")
 
@@ -60,11 +62,11 @@ class StoredSet:
         try:
             episodes = pa.concat_tables(list(tables.values()), promote_options="permissive").sort_by("episode_index")
         except (pa.ArrowException, KeyError) as error:
-            raise FileFormatError(root / "meta" / "episodes", "files with the same columns", str(error)) from None
+            raise FileFormatError(root / EPISODES_FOLDER, "files with the same columns", str(error)) from None
         missing = [name for name in EPISODE_COLUMNS if name not in episodes.column_names]
         if "episode_uuid" in missing or len(missing) > len(EPISODE_COLUMNS) // 2:
             found = f"none named {', '.join(missing[:3])}, ...{stripped_hint(info, root)}"
-            raise FileFormatError(root / "meta" / "episodes", "the episode columns of copolicy", found)
+            raise FileFormatError(root / EPISODES_FOLDER, "the episode columns of copolicy", found)
         folder.rows([name for name in EPISODE_COLUMNS if name not in missing])
         content = read_content(root)
         return cls(root, info, episodes, content, stored_record(root))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ...exceptions import FileFormatError, MissingExtraError, RunError
-from ...lerobot_folder.info import INFO_FILE, TASKS_FILE
+from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
 from ...lerobot_folder.tables import read_parquet
-from ...publication.minimal_card import CARD_FILE, minimal_card
+from ...publication.minimal_card import minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
 from .numbered_files import Place, next_place, numbered
@@ -61,7 +61,7 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     for name, values in columns.items():
         rows = _replaced(rows, name, list(values))
     rows = _moved_statistics(rows, {"episode_index": range(len(numbers)), "index": starts.tolist()})
-    path = numbered(folder / "meta" / "episodes", (0, 0))
+    path = numbered(folder / EPISODES_FOLDER, (0, 0))
     path.parent.mkdir(parents=True)
     pq.write_table(_plain(rows), path, compression="snappy", use_dictionary=True)
     write_statistics(aggregated_statistics(rows), folder)
@@ -188,7 +188,7 @@ def _verified(source: StoredSet, numbers: Sequence[int], folder: Path) -> str:
 def _replaced(table: "pa.Table", name: str, values: Any) -> "pa.Table":
     position = table.schema.get_field_index(name)
     if position < 0:
-        raise FileFormatError("meta/episodes", f"the column {name}", "none")
+        raise FileFormatError(EPISODES_FOLDER, f"the column {name}", "none")
     field = table.schema.field(position)
     return table.set_column(position, field, pa.array(values, field.type))
 

@@ -7,17 +7,29 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...checks.stored_check import CHECK_FILE
 from ...exceptions import CopolicyError
-from ...hub.raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
-from ...lerobot_folder.documents import RECORD_FILE, RELEASE_FILE, STATISTICS_FILE
-from ...lerobot_folder.info import INFO_FILE, STATS_FILE, TASKS_FILE
-from ...publication.minimal_card import CARD_FILE
-from ...versions.changelog import CHANGELOG_FILE
-from ...versions.content import EpisodeContent
-from ...versions.manifest import MANIFEST_FILE, Manifest
-from ...versions.release_record import EARLIER_FOLDER, ReleaseRecord
-from ...versions.withdrawals import WITHDRAWALS_FILE, anonymised, read_withdrawals, withdrawals_text
+from ...files.meta_files import (
+    CARD_FILE,
+    CHANGELOG_FILE,
+    CHECK_FILE,
+    CROISSANT_FILE,
+    EARLIER_FOLDER,
+    EPISODES_FOLDER,
+    INFO_FILE,
+    MANIFEST_FILE,
+    RAW_FOLDER,
+    RAW_MANIFEST_FILE,
+    RECORD_FILE,
+    RELEASE_FILE,
+    STATISTICS_FILE,
+    STATS_FILE,
+    TASKS_FILE,
+    WITHDRAWALS_FILE,
+)
+from ...versions.digests import EpisodeContent
+from ...versions.manifest import Manifest
+from ...versions.release_record import ReleaseRecord
+from ...versions.withdrawals import anonymised, read_withdrawals, withdrawals_text
 from ..amend import today
 from ..subset.replace_folder import delete_folder, is_unfinished, replaced_folder
 from ..subset.stored_set import StoredSet, without_episodes, write_record
@@ -30,16 +42,20 @@ PEOPLE = ("pair_id", "player_0_id", "player_1_id", "session_id")
 MADE_ANEW = {
     CARD_FILE: "copolicy-cards dataset",
     "figures": "copolicy-cards dataset",
-    "meta/croissant.json": "copolicy-cards dataset --croissant",
+    CROISSANT_FILE: "copolicy-cards dataset --croissant",
     "report.html": "copolicy-cards report",
-    CHECK_FILE.as_posix(): "copolicy-dataset check",
-    STATISTICS_FILE.as_posix(): "copolicy-dataset stats",
+    CHECK_FILE: "copolicy-dataset check",
+    STATISTICS_FILE: "copolicy-dataset stats",
     MANIFEST_FILE: "copolicy-dataset release",
 }
 """Files that count, draw or name every episode, and the command that makes each anew."""
 
-_REWRITTEN = {"data", "videos", "images", ".cache", "meta/episodes"} | {
-    path.as_posix() for path in (INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE, WITHDRAWALS_FILE)
+_REWRITTEN = {"data", "videos", "images", ".cache", EPISODES_FOLDER} | {
+    INFO_FILE,
+    STATS_FILE,
+    TASKS_FILE,
+    RECORD_FILE,
+    WITHDRAWALS_FILE,
 }
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from ...exceptions import FileFormatError, InvalidValueError, RunError
 from ...files.json_file import read_json
+from ...files.meta_files import INFO_FILE
 from ...lerobot_folder.folder import LeRobotFolder
-from ...lerobot_folder.info import INFO_FILE, stripped_hint
+from ...lerobot_folder.info import stripped_hint
 from ..selection import consents_of
 from ..subset.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
 from ..subset.stored_set import StoredSet

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
 from ..files.listing import visible_files
-from ..files.staging import about, require_new
+from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER, RAW_MANIFEST_FILE
+from ..files.staging import about, require_new, sync_folder, sync_tree
+from ..hub.download import download, forget_progress, resolve
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
-from ..versions.manifest import MANIFEST_FILE, Manifest, file_entry
+from ..versions.manifest import Manifest, file_entry
 from ..versions.release_record import ReleaseRecord, read_release
-from .download import download, forget_progress, resolve
-from .raw_recordings import RAW_FOLDER, RAW_MANIFEST_FILE
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,9 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
             (partial / ".gitattributes").unlink(missing_ok=True)
             record, files = _verify(partial, f"{repo_id}@{revision}")
             require_new(root)
+            sync_tree(partial)
             partial.rename(root)
+            sync_folder(root.parent)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             raise

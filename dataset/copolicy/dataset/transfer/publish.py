@@ -10,21 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from ..checks.checking import check_dataset
-from ..checks.stored_check import CHECK_FILE
 from ..exceptions import FileFormatError, RunError
 from ..files.json_file import parse_json
+from ..files.meta_files import CARD_FILE, CHECK_FILE, MANIFEST_FILE, RAW_MANIFEST_FILE, RELEASE_FILE
 from ..files.staging import replace_text
+from ..hub.client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
+from ..hub.repository import BRANCH, Repository, read_file, read_repository
 from ..lerobot_folder.exclusions import excluded_episodes
 from ..lerobot_folder.info import read_info
-from ..publication.minimal_card import CARD_FILE, is_minimal_card
+from ..publication.data_version import newest
+from ..publication.minimal_card import is_minimal_card
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
-from ..versions.data_version import newest
-from ..versions.manifest import MANIFEST_FILE, Manifest
-from ..versions.release_record import RELEASE_FILE, ReleaseRecord, read_release
-from .client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
-from .raw_recordings import RAW_MANIFEST_FILE, RawRecordings, find_raw_recordings, still_wanted
-from .repository import BRANCH, Repository, read_file, read_repository
+from ..versions.manifest import Manifest
+from ..versions.release_record import ReleaseRecord, read_release
+from .raw_recordings import RawRecordings, find_raw_recordings, still_wanted
 
 _CHECKED = ("data/", "meta/", "videos/")
 
@@ -129,9 +129,7 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
     released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
     differences = released.differences(present)
-    changed = [
-        line for line in released.differences(present, without={CHECK_FILE.as_posix()}) if line.startswith(_CHECKED)
-    ]
+    changed = [line for line in released.differences(present, without={CHECK_FILE}) if line.startswith(_CHECKED)]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"

@@ -5,11 +5,9 @@ from pathlib import Path
 
 from ..exceptions import FileFormatError, RunError
 from ..files.listing import distinct_files
+from ..files.meta_files import RAW_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
 from ..versions.manifest import FileEntry, Manifest, file_entry
-
-RAW_FOLDER = "raw"
-RAW_MANIFEST_FILE = f"{RAW_FOLDER}/manifest.json"
 
 
 @dataclass(frozen=True)
