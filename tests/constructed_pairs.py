@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.features import FEATURES, environment_state
 from copolicy.dataset.statistics import EpisodeRow, Trajectories
+from copolicy.tasks.table.features import FEATURES, environment_state
 from copolicy.tasks.table.map_config import MapConfig
 
 ONE = MapConfig((240, 300, math.pi), (960, 300), ((600, 300),))

@@ -35,7 +35,7 @@ def record_rest(path: Path) -> None:
     with EpisodeRecorder(path, config, meta) as recorder:
         for _ in range(15):
             world.step(np.zeros(4))
-            recorder.step(np.zeros(4), world.pose, world.velocity, world.reward())
+            recorder.step(np.zeros(4), world.recorded, world.reward())
         recorder.finish(False, "timeout")
 
 

@@ -5,7 +5,8 @@ from typing import Any
 import torch
 from lerobot.configs import FeatureType, PolicyFeature
 
-from copolicy.dataset.features import ACTION, BOUNDS, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import BOUNDS, FEATURES
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.convert.dynamics import integrate, step_angular, step_linear, undo_angular, undo_linear
-from copolicy.convert.replay import replay_drift
+from copolicy.convert.lerobot.prepare import replay_drift
 from copolicy.dataset.episode import Episode, EpisodeMeta
+from copolicy.tasks.table.dynamics import integrate, step_angular, step_linear, undo_angular, undo_linear
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
@@ -74,10 +74,10 @@ def test_replay_drift_tells_by_how_much_a_path_leaves_its_actions():
         states.append(world.observation)
     states = np.array(states)
     meta = EpisodeMeta("one")
-    assert replay_drift(Episode(states[:-1], actions, states[-1], meta, config), Physics()) < 1e-9
+    assert replay_drift(Episode(states[:-1], actions, states[-1], meta, config)) < 1e-9
     moved = states.copy()
     moved[30, 1] += 0.25
-    drift = replay_drift(Episode(moved[:-1], actions, moved[-1], meta, config), Physics())
+    drift = replay_drift(Episode(moved[:-1], actions, moved[-1], meta, config))
     assert drift == pytest.approx(0.25, abs=1e-9)
     at_10_hz = Episode(states[:-1], actions, states[-1], meta, config, fps=10)
-    assert math.isnan(replay_drift(at_10_hz, Physics()))
+    assert math.isnan(replay_drift(at_10_hz))

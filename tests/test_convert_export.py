@@ -17,9 +17,10 @@ from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
 from copolicy.convert.upstream.zarr_store import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.features import BOUNDS, GYM_ID, OBSERVATION_KEYS, STATE
+from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS, STATE
 from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.features import BOUNDS
 from copolicy.tasks.table.physics import Physics
 
 

@@ -4,7 +4,7 @@ import pytest
 from copolicy.convert.lerobot.frames import frame_columns
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import FEATURES, environment_state
+from copolicy.tasks.table.features import FEATURES, environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 

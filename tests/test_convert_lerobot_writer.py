@@ -14,8 +14,8 @@ from copolicy.convert.lerobot.prepare import Conversion, prepare_episode
 from copolicy.convert.lerobot.writer import write_dataset
 from copolicy.dataset.episode import EPISODE_COLUMNS, Episode, EpisodeMeta
 from copolicy.dataset.exceptions import OutputExistsError, RunError
-from copolicy.dataset.features import FEATURES, TASK
-from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
+from copolicy.dataset.lerobot_folder.info import robot_type
+from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 
@@ -55,7 +55,9 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sets")
     episodes = prepared(5)
     write(episodes, folder / "ours")
-    theirs = LeRobotDataset.create("me/table", 10, FEATURES, folder / "theirs", robot_type=ROBOT_TYPE, use_videos=False)
+    theirs = LeRobotDataset.create(
+        "me/table", 10, FEATURES, folder / "theirs", robot_type=robot_type("table"), use_videos=False
+    )
     for episode in episodes:
         shaped = {name: column.reshape(-1, *FEATURES[name]["shape"]) for name, column in episode.columns.items()}
         for frame in range(episode.frames):

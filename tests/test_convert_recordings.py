@@ -25,7 +25,7 @@ def record(path: Path, index: int, discarded: bool = False, **columns) -> Path:
     with EpisodeRecorder(path, config, meta) as recorder:
         for action in np.random.default_rng(index).uniform(-1, 1, (31, 4)):
             world.step(action)
-            recorder.step(action, world.pose, world.velocity, world.reward())
+            recorder.step(action, world.recorded, world.reward())
         recorder.finish(index == 0, "goal" if index == 0 else "timeout", discarded=discarded)
     return path
 

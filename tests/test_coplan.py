@@ -10,12 +10,13 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan.rollouts import coplan
 from copolicy.evaluate.planner import Planner
 from copolicy.evaluate.summary import success_rate
 from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld

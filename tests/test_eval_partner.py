@@ -12,7 +12,7 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.cards.cli import main as cards
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.partner_study.configurations import study_configurations
 from copolicy.evaluate.partner_study.outcome import PartnerOutcome
@@ -21,6 +21,7 @@ from copolicy.evaluate.partner_study.study import carry_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
 from copolicy.tasks.table.agents import Habits, ScriptedPilot
 from copolicy.tasks.table.agents.partners import PARTNERS, simulated_partner
+from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.dataset.interaction import identical, interaction_force
+from copolicy.dataset.interaction import identical
+from copolicy.tasks.table.interaction import interaction_force
 
 
 def test_pulling_apart_is_positive_whatever_the_orientation():

@@ -17,11 +17,12 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.features import state_vector
 from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.recording.episode_records import decode_physics
+from copolicy.dataset.recording.episode_records import decode_settings
 from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerAction, TableState
+from copolicy.dataset.task import get_task
+from copolicy.tasks.table.features import state_vector
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
@@ -43,10 +44,10 @@ def record(path, steps, seed=0):
         actions[0] = (-0.0, 5e-324, 1.0, -1.0)  # values that a format may lose
         velocities[0] = (-0.0, 0.0, 1e300)
     with EpisodeRecorder(
-        path, MAP, META, WallClockAnchor.simulated(10**18), pose=tuple(poses[0]), velocity=tuple(velocities[0])
+        path, MAP, META, WallClockAnchor.simulated(10**18), state=(*poses[0], *velocities[0])
     ) as recorder:
         for step in range(steps):
-            recorder.step(actions[step], tuple(poses[step + 1]), tuple(velocities[step + 1]), 0.5)
+            recorder.step(actions[step], (*poses[step + 1], *velocities[step + 1]), 0.5)
         recorder.finish(True, "goal", achieved_hz=29.97, late_ticks=3, quality_flags="slow,short")
     states = np.array([state_vector(tuple(p), tuple(v)) for p, v in zip(poses, velocities, strict=True)])
     return states, actions
@@ -337,14 +338,14 @@ def test_memory_is_bounded_by_the_numbers_not_by_the_file(tmp_path):
 def test_the_physics_of_a_recording_come_back(tmp_path):
     physics = Physics(angular_acceleration_limit=math.pi / 8, step_limit=77)
     path = tmp_path / "episode.mcap"
-    with EpisodeRecorder(path, MAP_SETS["training"][0], EpisodeMeta("eighth"), physics=physics) as recorder:
+    with EpisodeRecorder(path, MAP_SETS["training"][0], EpisodeMeta("eighth"), settings=physics) as recorder:
         recorder.finish(False, "operator_discard")
     assert read_episode(path).physics == physics
 
 
 def test_a_recording_without_its_physics_is_refused():
     with pytest.raises(InvalidValueError) as error:
-        decode_physics({"physics": {"angular_acceleration_limit": "fast"}})
+        decode_settings({"physics": {"angular_acceleration_limit": "fast"}}, get_task())
     assert str(error.value) == (
         "metadata record 'physics', entry 'angular_acceleration_limit': expected a number, found 'fast'"
     )

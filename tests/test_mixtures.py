@@ -25,9 +25,9 @@ from copolicy.convert.export.source import ExportSource
 from copolicy.convert.upstream.zarr_store import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
-from copolicy.dataset.features import theta_of
 from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
@@ -259,7 +259,7 @@ def record(path: Path, config: MapConfig, **columns) -> None:
     with EpisodeRecorder(path, config, EpisodeMeta(path.stem, **columns)) as recorder:
         for action in np.random.default_rng(len(path.stem)).uniform(-1, 1, (10, 4)):
             world.step(action)
-            recorder.step(action, world.pose, world.velocity, world.reward())
+            recorder.step(action, world.recorded, world.reward())
         recorder.finish(False, "operator_discard", discarded=False)
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import state_vector, theta_of
-from copolicy.dataset.interaction import interaction_force
 from copolicy.tasks.table.agents import PAIRS, Habits, ScriptedPilot, grid, simulated_pair
 from copolicy.tasks.table.agents.clearance import square_clearance, wall_clearance
 from copolicy.tasks.table.agents.cost_to_go import routes
 from copolicy.tasks.table.agents.partner_force import PartnerForce
+from copolicy.tasks.table.features import state_vector, theta_of
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS, map_set
 from copolicy.tasks.table.routes import route_class

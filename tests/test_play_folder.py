@@ -34,7 +34,7 @@ def _record(folder, pair="P01", seating=0, map_index=0, discarded=False, flags="
     world, path = TableWorld(config), folder.next_path()
     with EpisodeRecorder(path, config, meta, WallClockAnchor.simulated(0)) as recorder:
         world.step((0, 0, 0, 0))
-        recorder.step((0, 0, 0, 0), world.pose, world.velocity, 0.0)
+        recorder.step((0, 0, 0, 0), world.recorded, 0.0)
         recorder.finish(reason == "goal", reason, discarded=discarded, quality_flags=flags)
     return path
 

@@ -178,7 +178,7 @@ def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_p
     with EpisodeRecorder(path, config, EpisodeMeta("u"), WallClockAnchor.simulated(0)) as recorder:
         for _ in range(120):
             world.step((0, 0, 1, 0))
-            recorder.step((0, 0, 1, 0), world.pose, world.velocity, 0.0)
+            recorder.step((0, 0, 1, 0), world.recorded, 0.0)
         recorder.finish(True, "goal")
     out = tmp_path / "out"
     flags = ["--pair", "H1", "--out", str(out), "--headless", "--episodes", "1", "--countdown", "0.5", "--json"]

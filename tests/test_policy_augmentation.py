@@ -5,14 +5,8 @@ import math
 import numpy as np
 import torch
 
-from copolicy.dataset.features import (
-    ACTION,
-    ENVIRONMENT_STATE,
-    HUMAN_ACTION,
-    STATE,
-    environment_state,
-    map_of,
-)
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import environment_state, map_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld

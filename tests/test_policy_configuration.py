@@ -10,7 +10,8 @@ from lerobot.configs import FeatureType, NormalizationMode, PolicyFeature, PreTr
 from lerobot.policies import make_pre_post_processors
 
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import FEATURES
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.learning_rate import WarmupCosineSchedulerConfig
 

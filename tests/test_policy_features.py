@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from copolicy.dataset.features import (
-    BOUNDS,
-    ENVIRONMENT_STATE,
-    HUMAN_ACTION,
-    STATE,
-    environment_state,
-    state_vector,
-)
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import BOUNDS, environment_state, state_vector
 from copolicy.tasks.table.map_config import MapConfig
 from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
 from lerobot_policy_copolicy.copolicy.range_scan import RANGE, RAYS, RangeScan

@@ -44,7 +44,7 @@ def carry(recording, steps, action=ACTION):
     world = TableWorld(MAP)
     for _ in range(steps):
         world.step(action)
-        recording.step(action, world.pose, world.velocity, world.reward())
+        recording.step(action, world.recorded, world.reward())
     return world
 
 
@@ -213,7 +213,7 @@ def test_a_real_time_recording_keeps_the_clock_of_its_session(tmp_path):
         for step, began in enumerate((7_000, 40_000_000)):
             inputs = (PlayerInput(axes=[0.1, -0.9], buttons=[False, True], age_ns=12), None)
             timing = LoopTiming(scheduled_ns=began - 1, start_ns=began, late_ns=1, work_ns=900)
-            recording.step(ACTION, MAP.start, (0, 0, 0), 0.0, monotonic_ns=began, inputs=inputs, timing=timing)
+            recording.step(ACTION, (*MAP.start, 0, 0, 0), 0.0, monotonic_ns=began, inputs=inputs, timing=timing)
             if step == 0:
                 recording.event("pause", "focus lost", monotonic_ns=20_000)
         recording.finish(True, "goal", achieved_hz=25.0, late_ticks=1, notes="a note")
@@ -300,16 +300,20 @@ def test_a_block_left_without_finish_is_complete_up_to_its_last_state(tmp_path, 
         (
             {"action": (0.0, 1.5, 0.0, 0.0)},
             InvalidValueError,
-            "action: expected forces in [-1, 1], found (0.0, 1.5, 0.0, 0.0)",
+            "action: expected numbers in [-1, 1], found (0.0, 1.5, 0.0, 0.0)",
         ),
-        ({"action": (math.nan, 0.0, 0.0, 0.0)}, InvalidValueError, "action: expected forces in [-1, 1], found (nan"),
-        ({"pose": (1.0, math.inf, 0.0)}, InvalidValueError, "state: expected finite numbers, found (1.0, inf"),
+        ({"action": (math.nan, 0.0, 0.0, 0.0)}, InvalidValueError, "action: expected numbers in [-1, 1], found (nan"),
+        (
+            {"state": (1.0, math.inf, 0.0, 0.0, 0.0, 0.0)},
+            InvalidValueError,
+            "state: expected finite numbers, found (1.0, inf",
+        ),
         ({"inputs": (object(), None)}, AttributeError, "'object' object has no attribute 'step'"),
     ],
 )
 def test_a_bad_step_leaves_no_trace(tmp_path, arguments, error, text):
     path = tmp_path / "episode.mcap"
-    good = {"action": ACTION, "pose": MAP.start, "velocity": (0.0, 0.0, 0.0), "reward": 0.0}
+    good = {"action": ACTION, "state": (*MAP.start, 0.0, 0.0, 0.0), "reward": 0.0}
     with recorder(path) as recording:
         recording.step(**good)
         with pytest.raises(error, match=re.escape(text)):
@@ -328,7 +332,7 @@ def test_one_end_and_nothing_after_it(tmp_path):
         with pytest.raises(RunError, match="expected one end of the recording, found another"):
             recording.finish(True, "goal")
         with pytest.raises(RunError, match="expected no step after the end of the recording, found one"):
-            recording.step(ACTION, MAP.start, (0, 0, 0), 0.0)
+            recording.step(ACTION, (*MAP.start, 0, 0, 0), 0.0)
     assert len(read_episode(path).actions) == 0
 
 
@@ -338,11 +342,12 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table import MAP_SETS
 
 config = MAP_SETS["training"][6]
 with EpisodeRecorder(sys.argv[1], config, EpisodeMeta("killed"), WallClockAnchor.simulated(0)) as recording:
     for step in range(100):
-        recording.step((0.1, 0.2, 0.3, 0.4), config.start, (0.0, 0.0, float(step)), 0.0)
+        recording.step((0.1, 0.2, 0.3, 0.4), (*config.start, 0.0, 0.0, float(step)), 0.0)
     print("recorded", flush=True)
     time.sleep(60)
 """

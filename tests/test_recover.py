@@ -48,7 +48,7 @@ def finished(path, steps=95):
             inputs = (PlayerInput(axes=[0.1, 0.2]), PlayerInput(axes=[0.3]))
             began = step * 10**9 // 30
             timing = LoopTiming(scheduled_ns=began, start_ns=began + (20_000_000 if step == 9 else 0))
-            recording.step(action, world.pose, world.velocity, world.reward(), inputs=inputs, timing=timing)
+            recording.step(action, world.recorded, world.reward(), inputs=inputs, timing=timing)
             if step == 60:
                 recording.event("pause", "focus lost")
         recording.finish(True, "goal")
@@ -179,7 +179,7 @@ def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
     recording.event("stick_off_centre", "human: pushes with 0.15 at rest")
     for _ in range(40):
         world.step((1.0, 0.0, 1.0, 0.0))
-        recording.step((1.0, 0.0, 1.0, 0.0), world.pose, world.velocity, world.reward())
+        recording.step((1.0, 0.0, 1.0, 0.0), world.recorded, world.reward())
     recording.event("pause", "focus lost")
     recording.event("note", "the phone rang")
     recording.event("outcome", "timeout")
@@ -202,7 +202,7 @@ def test_an_episode_of_one_device_is_flagged_after_a_crash_too(tmp_path):
     with EpisodeRecorder(path, MAP, meta, WallClockAnchor.simulated(10**18)) as recording:
         for step in range(40):
             world.step((0.02 * step, 0.5) * 2)
-            recording.step((0.02 * step, 0.5) * 2, world.pose, world.velocity, world.reward())
+            recording.step((0.02 * step, 0.5) * 2, world.recorded, world.reward())
         recording.event("pause", "player")
         part = tmp_path / "copy.mcap.part"
         part.write_bytes((tmp_path / "episode.mcap.part").read_bytes())
@@ -337,11 +337,12 @@ import sys, time
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table import MAP_SETS
 
 config = MAP_SETS["training"][6]
 with EpisodeRecorder(sys.argv[1], config, EpisodeMeta("running")) as recording:
     for step in range(100):
-        recording.step((0.1, 0.2, 0.3, 0.4), config.start, (0.0, 0.0, float(step)), 0.0)
+        recording.step((0.1, 0.2, 0.3, 0.4), (*config.start, 0.0, 0.0, float(step)), 0.0)
     print("recorded", flush=True)
     sys.stdin.readline()
     recording.finish(True, "goal")

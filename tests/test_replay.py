@@ -23,7 +23,7 @@ from copolicy.collect.replay.view import SIZE, ReplayView, Shown
 from copolicy.collect.replay.viewer import Viewer
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, OutputExistsError
-from copolicy.dataset.interaction import interaction_force
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 

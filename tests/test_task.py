@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.features import BOUNDS, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, STATE, state_vector
-from copolicy.dataset.task import ACTION_NAMES, STATE_NAMES, Vector, get_task, installed_tasks
+from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
+from copolicy.dataset.task import Vector, get_task, installed_tasks
+from copolicy.tasks.table.features import ACTION_NAMES, BOUNDS, ENVIRONMENT_NAMES, STATE_NAMES, state_vector
 
 
 def test_the_table_is_installed_as_any_task_is():

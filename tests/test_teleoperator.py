@@ -14,7 +14,7 @@ import lerobot_policy_copolicy  # noqa: F401  registers the teleoperator
 from copolicy.collect.inputs import CalibrationStore, StickCalibration
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import ACTION_NAMES
+from copolicy.tasks.table.features import ACTION_NAMES
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import Outcome
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.outline import CIRCLE_CENTRE, TRIANGLE, image_size, on_screen

@@ -16,7 +16,8 @@ from accelerate.state import AcceleratorState
 from lerobot.datasets import LeRobotDataset
 from safetensors.torch import load_file
 
-from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.features import ACTION
+from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.train.cli import with_defaults
 
 LENGTHS = (14, 5, 20, 11, 17, 8)

@@ -27,8 +27,8 @@ from copolicy.convert.lerobot.frames import frame_columns
 from copolicy.convert.lerobot.prepare import Conversion
 from copolicy.convert.recordings import convert_recordings
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.features import FEATURES, TASK
 from copolicy.dataset.recording.log import read_episode
+from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 
@@ -45,7 +45,7 @@ def record(folder: Path, episodes: int, steps: int) -> None:
         with EpisodeRecorder(folder / f"episode_{index:04d}.mcap", config, meta) as recorder:
             for action in actions:
                 world.step(action)
-                recorder.step(action, world.pose, world.velocity, world.reward())
+                recorder.step(action, world.recorded, world.reward())
             recorder.finish(False, "unknown")
 
 

@@ -19,7 +19,7 @@ import torch
 from lerobot.datasets import EpisodeAwareSampler, LeRobotDataset
 from torch.utils.data import DataLoader
 
-from copolicy.dataset.features import FEATURES, TASK
+from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.train.epoch_order import WholeEpochSampler
 from copolicy.train.memory_dataset import MemoryDataset
 

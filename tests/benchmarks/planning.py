@@ -26,7 +26,8 @@ import numpy as np
 import torch
 from lerobot.configs import FeatureType, PolicyFeature
 
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, environment_state
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import FEATURES, environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy

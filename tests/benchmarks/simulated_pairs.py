@@ -23,7 +23,6 @@ from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.dataset import clock
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
-from copolicy.dataset.features import theta_of
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.statistics.estimate import Estimate
 from copolicy.dataset.statistics.human_routes import human_distance
@@ -33,6 +32,7 @@ from copolicy.dataset.statistics.trajectories import EpisodeRow, Trajectories
 from copolicy.dataset.task import RECORD_HZ
 from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.agents.clearance import square_clearance
+from copolicy.tasks.table.features import theta_of
 
 FPS = 10
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75)

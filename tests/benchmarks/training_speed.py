@@ -19,7 +19,8 @@ import torch
 from lerobot.configs import FeatureType, PolicyFeature
 from torch.utils.flop_counter import FlopCounterMode
 
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import FEATURES
 from copolicy.train.frame_table import FrameTable
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy

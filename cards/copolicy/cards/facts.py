@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.features import FEATURES
+from copolicy.dataset.features import features_of
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 
@@ -35,7 +35,7 @@ class DatasetFacts:
             FileFormatError: no LeRobot v3 data set, one without the episode columns, or one that contradicts itself.
         """
         folder = LeRobotFolder.open(root)
-        folder.require_task(tuple(FEATURES))
+        folder.require_task(tuple(features_of(folder.task.spec)))
         episodes = tuple(folder.rows())
         count, frames = folder.info["total_episodes"], folder.info["total_frames"]
         if len(episodes) != count or sum(folder.lengths) != frames:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, STATE, map_of, theta_of
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE
 from copolicy.dataset.files.listing import visible_files
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.lerobot_folder.tables import feature_values, pa, read_parquet
+from copolicy.tasks.table.features import FEATURES, map_of, theta_of
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 

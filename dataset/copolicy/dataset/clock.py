@@ -1,8 +1,8 @@
 """One clock: the rules that tie states and actions to time, for recording, data sets and execution alike.
 
-At step k of the 30 Hz recording the state s_k is read, the action u_k is chosen in it, (s_k, u_k) is stored and
-the world advances to s_{k+1}. A data set at `fps` keeps every `stride`-th state; its action is what, held until
-the next frame, best reproduces the motion. Execution holds each action for `stride` steps.
+At step k of the recording, at the rate of the task, the state s_k is read, the action u_k is chosen in it, (s_k, u_k)
+is stored and the world advances to s_{k+1}. A data set at `fps` keeps every `stride`-th state; its action is what,
+held until the next frame, best reproduces the motion. Execution holds each action for `stride` steps.
 """
 
 from typing import Literal, get_args
@@ -16,16 +16,16 @@ Hold = Literal["mean", "first"]
 """How the actions between two frames become one: their mean (reproduces the motion), or the first of them."""
 
 
-def stride(fps: int) -> int:
+def stride(fps: int, record_hz: int = RECORD_HZ) -> int:
     """Recorded steps in a frame.
 
     Raises:
         InvalidValueError: `fps` does not divide the recording rate.
     """
-    if fps < 1 or RECORD_HZ % fps:
-        divisors = [d for d in range(1, RECORD_HZ + 1) if RECORD_HZ % d == 0]
-        raise InvalidValueError("fps", f"a divisor of {RECORD_HZ} {divisors}", fps)
-    return RECORD_HZ // fps
+    if fps < 1 or record_hz % fps:
+        divisors = [d for d in range(1, record_hz + 1) if record_hz % d == 0]
+        raise InvalidValueError("fps", f"a divisor of {record_hz} {divisors}", fps)
+    return record_hz // fps
 
 
 def frames(steps: int, fps: int) -> int:
@@ -33,18 +33,18 @@ def frames(steps: int, fps: int) -> int:
     return -(-steps // stride(fps))
 
 
-def frame_states(states: np.ndarray, fps: int) -> np.ndarray:
+def frame_states(states: np.ndarray, fps: int, record_hz: int = RECORD_HZ) -> np.ndarray:
     """States of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`."""
-    return states[:: stride(fps)]
+    return states[:: stride(fps, record_hz)]
 
 
-def frame_actions(actions: np.ndarray, fps: int, hold: Hold = "mean") -> np.ndarray:
+def frame_actions(actions: np.ndarray, fps: int, hold: Hold = "mean", record_hz: int = RECORD_HZ) -> np.ndarray:
     """Actions of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`.
 
     The dynamics are linear in the force but for a clip, so the mean of the held steps gives the velocity that was
     recorded; the last frame may hold fewer steps.
     """
-    step = stride(fps)
+    step = stride(fps, record_hz)
     if hold not in get_args(Hold):
         raise InvalidValueError("hold", f"one of {get_args(Hold)}", hold)
     if hold == "first" or step == 1:

@@ -1,20 +1,22 @@
-"""One recorded episode: what happened, on which map, and who did it with whom."""
+"""One recorded episode: what happened, in which scenario, and who did it with whom."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
 
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-
 from .exceptions import InvalidValueError, ShapeError
+from .task import TaskSpec, get_task
 
 Source = Literal["human", "simulated", "upstream"]
-TerminationReason = Literal[
-    "goal", "collision_obstacle", "collision_wall", "timeout", "operator_discard", "device_lost", "focus_lost",
-    "crash_recovered", "unknown",
-]  # fmt: skip
+
+OTHER_REASONS = ("operator_discard", "device_lost", "focus_lost", "crash_recovered", "unknown")
+"""How an episode can end beside the reasons of its task."""
+
+
+def termination_reasons(spec: TaskSpec) -> tuple[str, ...]:
+    """What the column `termination_reason` of an episode of a task can hold."""
+    return (*spec.reasons, *OTHER_REASONS)
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class EpisodeMeta:
     seed: int = -1
     source: Source = "simulated"
     success: bool = False
-    termination_reason: TerminationReason = "unknown"
+    termination_reason: str = "unknown"  # see termination_reasons
     duration_s: float = 0.0
     achieved_hz: float = float("nan")
     late_ticks: int = 0
@@ -83,31 +85,42 @@ UNKNOWN_VALUES: dict[str, Any] = {
 
 @dataclass(frozen=True, repr=False)
 class Episode:
-    """States and actions at 30 Hz: `actions[k]` was taken in `states[k]`.
+    """States and actions at the rate of recordings: `actions[k]` was taken in `states[k]`.
 
     Attributes:
-        states: `(T, 7)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s).
-        actions: `(T, 4)` robot xy, human xy in [-1, 1].
-        final_state: `(7,)` the state that the last action led to.
-        fps: states a second; 30, except for data that was stored at another rate.
-        physics: the dynamics that led from state to state.
+        states: `(T, n)`, by `TaskSpec.state`; of the table: x, y, cos_theta, sin_theta, vx, vy, omega.
+        actions: `(T, m)`, by `TaskSpec.joint_action`; of the table: robot xy, human xy in [-1, 1].
+        final_state: `(n,)` the state that the last action led to.
+        scenario: where it began and what it was about; of the table: the map.
+        fps: states a second; that of the task, except for data that was stored at another rate.
+        settings: of the world that led from state to state; the task's default where None is given.
+        notes: what an importer noticed and wants said.
+        task: name of the task.
+
+    Raises:
+        ShapeError: an array does not fit the spec of the task.
+        UnknownNameError: the task is not installed.
     """
 
     states: np.ndarray
     actions: np.ndarray
     final_state: np.ndarray
     meta: EpisodeMeta
-    map_config: MapConfig
+    scenario: Any
     fps: int = 30
-    physics: Physics = field(default_factory=Physics)
-    notes: tuple[str, ...] = field(default=())  # what an importer noticed and wants said
+    settings: Any = None
+    notes: tuple[str, ...] = field(default=())
+    task: str = "table"
 
     def __post_init__(self):
-        steps = len(self.actions)
+        task = get_task(self.task)
+        if self.settings is None:
+            object.__setattr__(self, "settings", task.settings_type())
+        steps, width = len(self.actions), len(task.spec.state)
         for name, array, shape in (
-            ("states", self.states, (steps, 7)),
-            ("actions", self.actions, (steps, 4)),
-            ("final_state", self.final_state, (7,)),
+            ("states", self.states, (steps, width)),
+            ("actions", self.actions, (steps, len(task.spec.joint_action))),
+            ("final_state", self.final_state, (width,)),
         ):
             if array.shape != shape:
                 raise ShapeError(f"Episode.{name}", shape, array.shape)
@@ -119,6 +132,16 @@ class Episode:
         )
 
     @property
-    def path(self) -> np.ndarray:
-        """`(T + 1, 2)` the table's centre from the start to the end, px."""
-        return np.vstack((self.states[:, :2], self.final_state[:2]))
+    def map_config(self) -> Any:
+        """The scenario, by the table's name for it."""
+        return self.scenario
+
+    @property
+    def physics(self) -> Any:
+        """The settings, by the table's name for them."""
+        return self.settings
+
+    @property
+    def path(self) -> np.ndarray | None:
+        """`(T + 1, 2)` the point that the task tracks, from the start to the end; None where it tracks none."""
+        return get_task(self.task).path(np.vstack((self.states, self.final_state)))

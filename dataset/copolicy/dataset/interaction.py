@@ -1,4 +1,4 @@
-"""Between the two players: the interaction force, and whether one device moved both of them."""
+"""Whether one device moved both players."""
 
 import numpy as np
 
@@ -7,40 +7,20 @@ IDENTICAL = 0.99
 """Share of the frames with a force from which on the actions of both players count as one."""
 
 
-def interaction_force(theta: np.ndarray | float, actions: np.ndarray, legacy_axis: bool = False) -> np.ndarray:
-    """Half the difference of the two forces along the table, in units of a player's full force.
-
-    f = (u_robot - u_human) . e / 2, with e = (cos theta, -sin theta) the axis from the human's end to the robot's
-    in y-down pixels. Positive: the players pull apart. The original program uses e = (cos theta, +sin theta),
-    which is the axis mirrored, and stores 2 x 50 times this value; the paper's thresholds have no published unit.
-
-    Args:
-        theta: orientation after the step, `(...)`, rad.
-        actions: `(..., 4)` robot xy, human xy in [-1, 1].
-        legacy_axis: the mirrored axis, for comparison with the original program.
-
-    Returns:
-        `(...)`, in [-sqrt(2), sqrt(2)].
-    """
-    actions = np.asarray(actions, dtype=float)
-    sine = np.sin(theta) if legacy_axis else -np.sin(theta)
-    difference = actions[..., :2] - actions[..., 2:]
-    return (difference[..., 0] * np.cos(theta) + difference[..., 1] * sine) / 2
-
-
 def pushing(actions: np.ndarray) -> np.ndarray:
-    """`(...)` whether anybody gives a force in actions `(..., 4)` robot xy, human xy in [-1, 1]."""
+    """`(...)` whether anybody does anything in joint actions `(..., 2 n)`."""
     return np.abs(actions).max(axis=-1, initial=0.0) > _ALIKE
 
 
 def alike(actions: np.ndarray) -> np.ndarray:
-    """`(...)` whether somebody gives a force and both give the same, in actions `(..., 4)`."""
-    same = np.abs(actions[..., :2] - actions[..., 2:]).max(axis=-1) <= _ALIKE
+    """`(...)` whether somebody does something and both do the same, in joint actions `(..., 2 n)`."""
+    robot, human = np.split(actions, 2, axis=-1)
+    same = np.abs(robot - human).max(axis=-1) <= _ALIKE
     return same & pushing(actions)
 
 
 def identical(actions: np.ndarray) -> bool:
-    """Both players gave the same actions `(T, 4)` throughout; two who gave none did not."""
+    """Both players gave the same joint actions `(T, 2 n)` throughout; two who gave none did not."""
     pushed = np.count_nonzero(pushing(actions))
     return bool(pushed and np.count_nonzero(alike(actions)) >= IDENTICAL * pushed)
 

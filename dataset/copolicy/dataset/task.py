@@ -11,20 +11,21 @@ Player 0 is the robot seat, player 1 the human seat. A joint action is both play
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from importlib.metadata import entry_points
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 
+if TYPE_CHECKING:
+    from .recording.task_messages import TaskMessages
+
 RECORD_HZ = 30
 """Steps of simulation and recording per second."""
 
-STATE_NAMES = ("x", "y", "cos_theta", "sin_theta", "vx", "vy", "omega")
-ACTION_NAMES = ("robot_fx", "robot_fy", "human_fx", "human_fy")
 PLAYERS = ("robot", "human")
 
 ENTRY_POINTS = "copolicy.tasks"
@@ -61,6 +62,12 @@ class Vector:
     def bounds(self) -> np.ndarray:
         """Lowest and highest values, `(2, n)`."""
         return np.array((self.low, self.high), float)
+
+    @property
+    def range(self) -> str:
+        """The bounds in words: `[-1, 1]` where all are the same."""
+        one = len(set(self.low)) == len(set(self.high)) == 1
+        return f"[{self.low[0]:g}, {self.high[0]:g}]" if one else f"their bounds, {self.low} to {self.high}"
 
 
 class Scenario(Protocol):
@@ -122,7 +129,7 @@ class World(Protocol):
         ...
 
     def step(self, action: np.ndarray) -> Outcome:
-        """Advances under a joint action, each number clipped to its bounds."""
+        """Advances under a joint action, each number clipped to its bounds; after an end, too."""
         ...
 
     def reward(self) -> float:
@@ -144,6 +151,7 @@ class TaskSpec:
         reasons: how a world can end an episode.
         record_hz: steps a second.
         players: names of the seats.
+        title: what it is called in messages; its name where none is given.
     """
 
     name: str
@@ -155,6 +163,14 @@ class TaskSpec:
     reasons: tuple[str, ...]
     record_hz: int = RECORD_HZ
     players: tuple[str, str] = PLAYERS
+    title: str = ""
+
+    def __post_init__(self):
+        object.__setattr__(self, "title", self.title or self.name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The spec as data sets and recordings carry it, JSON-able."""
+        return asdict(self)
 
     @property
     def joint_action(self) -> Vector:
@@ -204,13 +220,95 @@ class PairTask(ABC):
             InvalidValueError: no scenario has that vector.
         """
 
+    def settings_of(self, entries: Mapping[str, Any], where: str = "settings: {}") -> Any:
+        """Settings from numbers, or from their digits, by name.
+
+        Args:
+            where: what an error calls a setting.
+
+        Raises:
+            InvalidValueError: one is missing, is no number, or is not allowed.
+        """
+        values = {}
+        for setting in fields(self.settings_type):
+            entry, kind = entries.get(setting.name), type(setting.default)
+            if isinstance(entry, bool) or not isinstance(entry, (str, int) if kind is int else (str, int, float)):
+                raise InvalidValueError(where.format(setting.name), "a number", entry)
+            try:
+                values[setting.name] = kind(entry)
+            except (ValueError, OverflowError) as error:
+                expected = "a number" if isinstance(error, ValueError) else "a finite number"
+                raise InvalidValueError(where.format(setting.name), expected, entry) from None
+        return self.settings_type(**values)
+
     @abstractmethod
     def make_world(self, scenario: Any, settings: Any = None) -> World:
         """A world at the start of a scenario, under the default settings where none are given."""
 
+    def start_of(self, scenario: Any) -> tuple[float, ...]:
+        """The recorded state at the start of a scenario."""
+        return self.make_world(scenario).recorded
+
     def states_of(self, recorded: np.ndarray) -> np.ndarray:
         """States `(T, n)` from recorded ones `(T, k)`, to the last bit those of `World.observation`."""
         return recorded
+
+    def recorded_of(self, states: np.ndarray) -> np.ndarray:
+        """The inverse of `states_of`, as exact as the states allow."""
+        return states
+
+    def columns_of(self, scenario: Any) -> dict[str, Any]:
+        """Episode columns with what the vector of a scenario does not say."""
+        return {}
+
+    def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
+        world = self.make_world(scenario, settings)
+        world.restore(tuple(self.recorded_of(np.asarray(state, float)[None])[0].tolist()))
+        states = [world.observation]
+        for action in actions:
+            world.step(action)
+            states.append(world.observation)
+        return np.array(states)
+
+    def rewards(self, scenario: Any, states: np.ndarray) -> np.ndarray:
+        """The reward of each of some states `(T, n)`, `(T,)`."""
+        world, rewards = self.make_world(scenario), []
+        for recorded in self.recorded_of(np.asarray(states, float)).tolist():
+            world.restore(tuple(recorded))
+            rewards.append(world.reward())
+        return np.array(rewards)
+
+    @property
+    def recording(self) -> "TaskMessages | None":
+        """Messages of its own in recordings; None: the generic ones."""
+        return None
+
+    def path(self, states: np.ndarray) -> np.ndarray | None:
+        """`(T, 2)` the point that figures and statistics follow; None: there is none."""
+        return None
+
+    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+        """`(T,)` what passes between the players in states `(T, n)` under actions `(T, m)`; None: not measured."""
+        return None
+
+    def layout(self, scenario: Any, with_goal: bool = False) -> Hashable:
+        """What scenarios share that differ in their start alone, or without `with_goal` in start and goal; sortable."""
+        return scenario.digest
+
+    def strategy(self, scenario: Any, states: np.ndarray) -> str:
+        """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
+        return ""
+
+    def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
+        """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
+        return None
+
+    def settings_summary(self, settings: Any) -> str:
+        """Settings in words: what is not the default."""
+        default = asdict(self.settings_type())
+        others = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
+        return ", ".join(others) or "default"
 
     def identify(self, scenario: Any) -> tuple[str, str]:
         """Name of a scenario and of its set: `("training-17", "training")`, `("custom-1a2b3c4d", "custom")`."""

@@ -19,8 +19,9 @@ from torch import Tensor
 from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state, state_vector
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.files.staging import about, sync_folder, sync_tree
+from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.maps import MAP_SETS
 
 from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe

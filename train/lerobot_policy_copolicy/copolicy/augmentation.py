@@ -8,8 +8,8 @@ import math
 import torch
 from torch import Tensor
 
-from copolicy.dataset.features import ACTION, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.task import ACTION_NAMES, STATE_NAMES
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES
 from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
 
 _HEIGHT = float(WINDOW[1])

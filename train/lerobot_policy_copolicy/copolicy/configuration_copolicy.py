@@ -7,7 +7,8 @@ from lerobot.configs import NormalizationMode, PolicyFeature, PreTrainedConfig
 from lerobot.optim import AdamWConfig
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
+from copolicy.dataset.task import get_task
 
 from .bounds import require_bounds
 from .fast.backend import AUTO, BACKENDS
@@ -187,6 +188,6 @@ class CopolicyConfig(PreTrainedConfig):
 def _check_feature(name: str, features: dict[str, PolicyFeature]) -> None:
     if name not in features:
         raise InvalidValueError("features of the data set or environment", name, sorted(features))
-    expected, given = FEATURES[name]["shape"], tuple(features[name].shape)
+    expected, given = features_of(get_task().spec)[name]["shape"], tuple(features[name].shape)
     if given != expected:
         raise ShapeError(name, expected, given)

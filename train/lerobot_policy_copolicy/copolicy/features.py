@@ -7,7 +7,8 @@ fine-tuned or run.
 import torch
 from torch import Tensor, nn
 
-from copolicy.dataset.features import BOUNDS, ENVIRONMENT_NAMES, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.tasks.table.features import BOUNDS, ENVIRONMENT_NAMES
 from copolicy.tasks.table.map_config import MAX_OBSTACLES
 
 from .range_scan import RAYS, RangeScan

@@ -14,7 +14,8 @@ from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
-from copolicy.dataset.features import ACTION, FEATURES
+from copolicy.dataset.features import ACTION, features_of
+from copolicy.dataset.task import get_task
 from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
 from copolicy.train.finite_weights import non_finite_weight
 
@@ -29,7 +30,8 @@ from .fast.planner import FastPlanner
 from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
 from .training_data import prepare_training, require_same_rate
 
-_ACTION_SIZE = FEATURES[ACTION]["shape"][0]
+_COLUMNS = features_of(get_task().spec)
+_ACTION_SIZE = _COLUMNS[ACTION]["shape"][0]
 _PADDING = f"{ACTION}_is_pad"
 _EPISODE = "episode_index"
 _SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
@@ -306,7 +308,7 @@ def _column(batch: dict[str, Tensor], key: str, frames: int | None = None) -> Te
     """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames."""
     if key not in batch:
         raise InvalidValueError("batch", f"the column {key}", sorted(batch))
-    values, size = batch[key], FEATURES[key]["shape"][0]
+    values, size = batch[key], _COLUMNS[key]["shape"][0]
     expected = (size,) if frames is None else (frames, size)
     if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
         raise ShapeError(key, ("B", *expected), tuple(values.shape))

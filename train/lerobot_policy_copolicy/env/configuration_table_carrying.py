@@ -13,13 +13,13 @@ from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import (
     ACTION,
     ENVIRONMENT_STATE,
-    FEATURES,
     GYM_ID,
     OBSERVATION_KEYS,
     SCENE_IMAGE,
     SCENE_SIDES,
     SCENE_SIZE,
 )
+from copolicy.tasks.table.features import FEATURES
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 

@@ -10,9 +10,10 @@ from gymnasium.envs.registration import EnvSpec
 
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import BOUNDS, OBSERVATION_KEYS, SCENE_SIZE, environment_state, theta_of
-from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE
 from copolicy.dataset.task import RUNNING
+from copolicy.tasks.table.features import BOUNDS, environment_state, theta_of
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import WINDOW, MapConfig
 from copolicy.tasks.table.maps import map_set as maps_of
 from copolicy.tasks.table.physics import Physics

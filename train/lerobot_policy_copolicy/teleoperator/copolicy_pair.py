@@ -13,7 +13,7 @@ from lerobot.utils.errors import DeviceNotConnectedError
 from copolicy.collect.devices import follow_pads, open_pads
 from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, TwinWatch, user_config_folder
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import ACTION_NAMES, PLAYERS, RECORD_HZ
+from copolicy.dataset.task import PLAYERS, RECORD_HZ, get_task
 
 from .config_copolicy_pair import CopolicyPairConfig
 
@@ -57,7 +57,7 @@ class CopolicyPair(Teleoperator):
     @property
     def action_features(self) -> dict[str, type]:
         """The four forces."""
-        return dict.fromkeys(ACTION_NAMES, float)
+        return dict.fromkeys(get_task().spec.joint_action.names, float)
 
     @property
     def feedback_features(self) -> dict[str, type]:
@@ -144,7 +144,7 @@ class CopolicyPair(Teleoperator):
         forces: list[float] = []
         for pad, sample in zip(self._seats, samples, strict=True):
             forces += pad.force(sample, self._calibrations.of(pad))
-        return dict(zip(ACTION_NAMES, forces, strict=True))
+        return dict(zip(get_task().spec.joint_action.names, forces, strict=True))
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
         """Pads take none."""

@@ -9,8 +9,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from copolicy.dataset.clock import frame_actions, stride
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state, state_vector
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
+from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.map_config import MapConfig
 
 from .controller import ZERO, Reading

@@ -1,11 +1,10 @@
 """An episode of a policy with a simulated partner, played without a clock: the same every time."""
 
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
-from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
+from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.task import RUNNING
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import identify
@@ -61,7 +60,7 @@ def demonstrate(
         seed=seed,
         source="simulated",
         success=outcome.success,
-        termination_reason=cast(TerminationReason, outcome.reason),
+        termination_reason=outcome.reason,
     )
-    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config, physics=physics)
+    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config, settings=physics)
     return track_of(Path(map_id), episode)

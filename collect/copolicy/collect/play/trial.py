@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
 from copolicy.dataset.task import PLAYERS, RECORD_HZ, RUNNING, Outcome
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
@@ -110,7 +110,7 @@ class Trial:
             self._anchor,
             monotonic_ns=self._clock(),
             devices=devices,
-            physics=self.world.physics,
+            settings=self.world.physics,
         )
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:
@@ -142,8 +142,7 @@ class Trial:
         )
         self._open.step(
             action,
-            world.pose,
-            world.velocity,
+            world.recorded,
             reward,
             monotonic_ns=tick.start_ns,
             inputs=(readings[0].message, readings[1].message),
@@ -197,7 +196,7 @@ class Trial:
         """Ends an episode before its end, discarded: nobody decided how it would have gone.
 
         Args:
-            termination: one of `TerminationReason`.
+            termination: one of `termination_reasons`.
             reason: for the notes.
         """
         self._end(False, termination, True, reason, ("interrupted",))

@@ -1,6 +1,7 @@
 """The file of a recording: written as `NAME.mcap.part`, given its name only when it is complete and on the disk."""
 
 import os
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 from copolicy.dataset.exceptions import OutputExistsError
 from copolicy.dataset.files.lock import lock
 from copolicy.dataset.files.staging import sync_folder
-from copolicy.dataset.recording.topics import ENCODING, TOPICS, Topic, schema_data
+from copolicy.dataset.recording.topics import ENCODING, Topic, schema_data
 
 PART_SUFFIX = ".part"
 """What a recording's name ends with while it runs, and after it broke off."""
@@ -49,10 +50,10 @@ class EpisodeFile:
         """The file's name until it is published."""
         return self.path.with_name(self.path.name + PART_SUFFIX)
 
-    def declare_topics(self) -> None:
-        """Writes the schema and the channel of every topic."""
+    def declare(self, topics: Iterable[Topic]) -> None:
+        """Writes the schema and the channel of each topic."""
         schemas: dict[str, int] = {}
-        for topic in TOPICS:
+        for topic in topics:
             name = topic.schema_name
             if name not in schemas:
                 schemas[name] = self._writer.register_schema(name, ENCODING, schema_data(topic.message))

@@ -1,38 +1,26 @@
 """What a recording says: the metadata at its start and the messages of each step, serialised."""
 
-import math
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.recording import episode_records
-from copolicy.dataset.recording.messages.copolicy_pb2 import (
-    EpisodeEvent,
-    Interaction,
-    LoopTiming,
-    PlayerAction,
-    PlayerInput,
-    TableState,
-)
-from copolicy.dataset.recording.topics import ACTIONS, EVENT, INPUTS, INTERACTION, LOOP_TIMING, TABLE_STATE, Topic
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.topics import EVENT, INPUTS, LOOP_TIMING, Record
+from copolicy.dataset.task import TaskSpec
 
 from .wall_clock import WallClockAnchor
-
-Triple = tuple[float, float, float]
-Record = tuple[Topic, bytes]
 
 _PACKAGES = ("mcap", "numpy", "protobuf", "pygame", "pymunk")
 
 
 def start_records(
-    meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[str, str], physics: Physics
+    meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[str, str], settings: Any, spec: TaskSpec
 ) -> dict[str, dict[str, str]]:
     """The metadata records at the start of a recording, by name; no host, user or path is among them."""
     more = {
@@ -47,8 +35,8 @@ def start_records(
             "system": f"{platform.system()} {platform.machine()}",
             **{package: version(package) for package in _PACKAGES},
         },
-        "physics": episode_records.encode_physics(physics),
-        "dataset_info": episode_records.dataset_info(),
+        "physics": episode_records.encode_settings(settings),
+        "dataset_info": episode_records.dataset_info(spec),
     }
     records = {
         name: episode_records.encode(meta, columns) | more.get(name, {})
@@ -58,58 +46,37 @@ def start_records(
     return records
 
 
-def checked_forces(action: np.ndarray | Sequence[float]) -> tuple[float, ...]:
-    """An action `(4,)` as four numbers.
+def checked_action(action: np.ndarray | Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
+    """A joint action `(m,)` as numbers.
 
     Raises:
         ShapeError: another shape.
-        InvalidValueError: a force that is not in [-1, 1].
+        InvalidValueError: a number out of its bounds.
     """
-    values = np.asarray(action, dtype=float)
-    if values.shape != (4,):
-        raise ShapeError("action", (4,), values.shape)
-    forces = tuple(values.tolist())
-    if not all(-1.0 <= force <= 1.0 for force in forces):
-        raise InvalidValueError("action", "forces in [-1, 1]", forces)
-    return forces
+    values, joint = np.asarray(action, dtype=float), spec.joint_action
+    if values.shape != (len(joint),):
+        raise ShapeError("action", (len(joint),), values.shape)
+    low, high = joint.bounds
+    numbers = tuple(values.tolist())
+    if not ((low <= values) & (values <= high)).all():
+        raise InvalidValueError("action", f"numbers in {joint.range}", numbers)
+    return numbers
 
 
-def checked_state(pose: Sequence[float], velocity: Sequence[float]) -> tuple[Triple, Triple]:
-    """Pose and velocity as numbers.
+def checked_state(recorded: Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
+    """A recorded state `(k,)` as numbers.
 
     Raises:
+        ShapeError: another length.
         InvalidValueError: a number that is not finite.
     """
-    x, y, theta = (float(value) for value in pose)
-    vx, vy, omega = (float(value) for value in velocity)
-    if not all(map(math.isfinite, (x, y, theta, vx, vy, omega))):
-        raise InvalidValueError("state", "finite numbers", (x, y, theta, vx, vy, omega))
-    return (x, y, theta), (vx, vy, omega)
-
-
-def state_record(step: int, pose: Triple, velocity: Triple, monotonic_ns: int) -> Record:
-    """The table at the start of a step (px, rad, s)."""
-    (x, y, theta), (vx, vy, omega) = pose, velocity
-    state = TableState(
-        step=step,
-        sim_time=step / RECORD_HZ,
-        x=x,
-        y=y,
-        theta=theta,
-        vx=vx,
-        vy=vy,
-        omega=omega,
-        monotonic_ns=monotonic_ns,
-    )
-    return TABLE_STATE, state.SerializeToString()
-
-
-def action_records(step: int, forces: tuple[float, ...]) -> list[Record]:
-    """The forces of a step: robot xy, human xy in [-1, 1]."""
-    return [
-        (topic, PlayerAction(step=step, fx=fx, fy=fy).SerializeToString())
-        for topic, fx, fy in zip(ACTIONS, forces[::2], forces[1::2], strict=True)
-    ]
+    values = np.asarray(recorded, dtype=float)
+    if values.shape != (len(spec.recorded),):
+        raise ShapeError("state", (len(spec.recorded),), values.shape)
+    numbers = tuple(values.tolist())
+    if not np.isfinite(values).all():
+        raise InvalidValueError("state", "finite numbers", numbers)
+    return numbers
 
 
 def device_records(
@@ -122,12 +89,6 @@ def device_records(
             message.step = step
             records.append((topic, message.SerializeToString()))
     return records
-
-
-def interaction_record(step: int, theta: float, forces: tuple[float, ...], reward: float) -> Record:
-    """Interaction force and reward after a step that led to the orientation `theta` (rad)."""
-    force = float(interaction_force(theta, np.array(forces)))
-    return INTERACTION, Interaction(step=step, force=force, reward=reward).SerializeToString()
 
 
 def event_record(step: int, kind: str, detail: str) -> Record:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -15,18 +16,14 @@ from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Sch
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
 from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.log import recorded_task
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, MESSAGE_HEAD, chunk_records
 from copolicy.dataset.recording.mcap_records import RecordWalk
-from copolicy.dataset.recording.messages.copolicy_pb2 import (
-    EpisodeEvent,
-    Interaction,
-    LoopTiming,
-    PlayerAction,
-    TableState,
-)
+from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming
 from copolicy.dataset.recording.soundness import CheckSums, channels_text
-from copolicy.dataset.recording.topics import ACTIONS, EVENT, INTERACTION, LOOP_TIMING, TABLE_STATE, is_ours
-from copolicy.tasks.table.map_config import MapConfig
+from copolicy.dataset.recording.task_messages import messages_of
+from copolicy.dataset.recording.topics import EVENT, LOOP_TIMING, is_ours
+from copolicy.dataset.task import PairTask
 
 from ..ticker import LoopStatistics, Tick
 
@@ -50,8 +47,9 @@ class IntactPart:
 
     Attributes:
         path: of the file.
+        task: that was recorded.
         metadata: its metadata records; those of the start are proven by their digest.
-        map_config: the map.
+        scenario: where the episode began and what it was about.
         steps: complete steps: as many actions of both players, and one state more.
         records: how many records of the file, counted as `intact_records` gives them, are part of it.
         stopped_by: what ended it; empty where the file is whole.
@@ -63,8 +61,9 @@ class IntactPart:
     """
 
     path: Path
+    task: PairTask
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    map_config: MapConfig | None = None
+    scenario: Any = None
     steps: int = 0
     records: int = 0
     stopped_by: str = ""
@@ -73,29 +72,32 @@ class IntactPart:
     events: list[EpisodeEvent] = field(default_factory=list)
     unverified: tuple[str, ...] = ()
     loop: LoopStatistics = field(default_factory=LoopStatistics)
-    positions: array = field(default_factory=lambda: array("d"), repr=False)
+    recorded: array = field(default_factory=lambda: array("d"), repr=False)
 
     @property
-    def table_path(self) -> np.ndarray:
-        """`(steps + 1, 2)` the table's centre, px."""
-        return np.asarray(self.positions).reshape(-1, 2)[: self.steps + 1]
+    def states(self) -> np.ndarray:
+        """`(steps + 1, n)` by `TaskSpec.state`."""
+        recorded = np.asarray(self.recorded).reshape(-1, len(self.task.spec.recorded))
+        return self.task.states_of(recorded[: self.steps + 1])
 
 
-def intact_records(path: Path, check_sums: CheckSums | None = None) -> Iterator[McapRecord]:
+def intact_records(path: Path, task: PairTask, check_sums: CheckSums | None = None) -> Iterator[McapRecord]:
     """Schemas, channels, messages, metadata and attachments from the beginning of a file, one chunk in memory.
 
     Args:
+        task: that was recorded.
         check_sums: learns what of the file carries one.
 
     Raises:
         FileFormatError: at the first record that fails a check sum or a parser, and where the file breaks off.
     """
     check_sums = CheckSums() if check_sums is None else check_sums
+    scenario_file = messages_of(task).scenario_file
     with path.open("rb") as file:
         walk = RecordWalk(path, file, path.stat().st_size)
         for opcode, body in walk.records(_LARGEST):
             try:
-                yield from _records_of(opcode, body, check_sums)
+                yield from _records_of(opcode, body, scenario_file, check_sums)
             except CopolicyError:
                 raise
             except Exception as error:
@@ -111,18 +113,19 @@ def read_intact_part(path: Path) -> IntactPart:
         FileFormatError: the metadata or the map at its start are not what was written, or it is no recording.
         ForeignRecordingError: it is a recording of something else.
     """
-    part = IntactPart(path)
+    task = recorded_task(path)
+    part = IntactPart(path, task)
     count = _StepCount(part)
     check_sums = CheckSums()
     try:
-        for record in intact_records(path, check_sums):
+        for record in intact_records(path, task, check_sums):
             if isinstance(record, Metadata):
                 if record.name in part.metadata and record.name in _OUR_METADATA:
                     raise ValueError(f"a second metadata record {record.name!r}")
                 part.metadata[record.name] = record.metadata
             elif isinstance(record, Attachment):
-                if record.name == episode_records.MAP_ATTACHMENT:
-                    part.map_config = MapConfig.from_json(record.data)
+                if record.name == messages_of(task).scenario_file:
+                    part.scenario = task.scenario_of_json(record.data)
             else:
                 count.take(record)
             part.records += 1
@@ -140,7 +143,7 @@ def read_intact_part(path: Path) -> IntactPart:
     return part
 
 
-def _records_of(opcode: int, body: bytes, check_sums: CheckSums) -> Iterator[McapRecord]:
+def _records_of(opcode: int, body: bytes, scenario_file: str, check_sums: CheckSums) -> Iterator[McapRecord]:
     if opcode == Opcode.METADATA:
         yield Metadata.read(ReadDataStream(BytesIO(body)))
     elif opcode == Opcode.ATTACHMENT:
@@ -148,7 +151,7 @@ def _records_of(opcode: int, body: bytes, check_sums: CheckSums) -> Iterator[Mca
         if expected not in (0, zlib.crc32(body[:-4])):
             raise ValueError("an attachment that fails its check sum")
         attachment = Attachment.read(ReadDataStream(BytesIO(body)))
-        if attachment.name == episode_records.MAP_ATTACHMENT:
+        if attachment.name == scenario_file:
             check_sums.map = expected != 0
         yield attachment
     elif opcode == Opcode.CHUNK:
@@ -187,11 +190,12 @@ class _StepCount:
 
     def __init__(self, part: IntactPart):
         self._part = part
+        self._messages = messages_of(part.task)
         self._schemas: dict[int, str] = {}
         self._declared: set[int] = set()
         self._topics: dict[int, str] = {}  # of channels that are ours; of others nothing follows
         self._others: set[str] = set()
-        self._next = {topic.name: 0 for topic in (TABLE_STATE, *ACTIONS)}
+        self._next = {topic.name: 0 for topic in (self._messages.state, *self._messages.actions)}
         self._sequence = 0
         self._rewards = array("d")
         self._ticks = array("q")  # step, scheduled, start, skipped
@@ -212,7 +216,7 @@ class _StepCount:
             self._schemas[record.id] = record.name
         elif isinstance(record, Channel):
             self._declared.add(record.id)
-            if is_ours(record, self._schemas.get(record.schema_id, "")):
+            if is_ours(record, self._schemas.get(record.schema_id, ""), self._messages.topics):
                 self._topics[record.id] = record.topic
             else:
                 self._others.add(record.topic)
@@ -236,14 +240,14 @@ class _StepCount:
                 self._part.loop.add(Tick(scheduled, start, skipped))
 
     def _follow(self, topic: str, message: Message) -> None:
-        if topic == TABLE_STATE.name:
-            state = TableState.FromString(message.data)
-            self._advance(topic, state.step, message.sequence)
-            self._part.positions.extend((state.x, state.y))
+        if topic == self._messages.state.name:
+            step, recorded = self._messages.decode_state(message.data)
+            self._advance(topic, step, message.sequence)
+            self._part.recorded.extend(recorded)
         elif topic in self._next:
-            self._advance(topic, PlayerAction.FromString(message.data).step, message.sequence)
-        elif topic == INTERACTION.name:
-            self._rewards.append(Interaction.FromString(message.data).reward)
+            self._advance(topic, self._messages.decode_action(message.data)[0], message.sequence)
+        elif topic == self._messages.measures.name:
+            self._rewards.append(self._messages.decode_reward(message.data))
         elif topic == LOOP_TIMING.name:
             timing = LoopTiming.FromString(message.data)
             self._ticks.extend((timing.step, timing.scheduled_ns, timing.start_ns, timing.skipped_ticks))
@@ -260,7 +264,7 @@ def _check_start(part: IntactPart, foreign: tuple[str, ...]) -> None:
     digest = part.metadata.get("dataset_info", {}).get(episode_records.START_DIGEST)
     if digest is None and foreign:
         raise ForeignRecordingError(part.path, "a recording of this task", channels_text(foreign))
-    if part.map_config is None or digest is None:
+    if part.scenario is None or digest is None:
         found = part.stopped_by.rpartition("found ")[2] or "none"
         raise FileFormatError(part.path, "the start of a recording of this task: metadata and map", found)
     if digest != episode_records.start_digest(part.metadata):

@@ -6,28 +6,24 @@ from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.episode import EpisodeMeta, TerminationReason
+from copolicy.dataset.episode import EpisodeMeta, termination_reasons
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import about
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
-from copolicy.dataset.recording.topics import SCENE, SCENE_MAP
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.artist.scene import TableScene, map_scene
-from copolicy.tasks.table.artist.scene_solids import TableFrame, solid_records
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.routes import route_class
+from copolicy.dataset.recording.task_messages import messages_of
+from copolicy.dataset.recording.topics import Record
+from copolicy.dataset.task import get_task
 
 from . import episode_messages
 from .episode_file import EpisodeFile
-from .episode_messages import Record, Triple, checked_forces, checked_state
+from .episode_messages import checked_action, checked_state
 from .wall_clock import WallClockAnchor
 
 # A killed process loses what came after the last flush, and the action of the step before it, whose outcome was not
@@ -45,10 +41,10 @@ class EpisodeRecorder:
     The recording begins with the state s_0. Each `step` takes the action u_k, chosen in the last state that was
     given, and the state s_{k+1} that it led to; `finish` says how it ended:
 
-        with EpisodeRecorder(path, map_config, meta, anchor) as recorder:
+        with EpisodeRecorder(path, scenario, meta, anchor) as recorder:
             while not outcome.done:
                 outcome = world.step(action)
-                recorder.step(action, world.pose, world.velocity, world.reward())
+                recorder.step(action, world.recorded, world.reward())
             recorder.finish(outcome.success, outcome.reason)
 
     What is recorded of step k carries the time of step k. The file is flushed every 0.9 s of recording and at
@@ -66,44 +62,49 @@ class EpisodeRecorder:
     def __init__(
         self,
         path: Path | str,
-        map_config: MapConfig,
+        scenario: Any,
         meta: EpisodeMeta,
         anchor: WallClockAnchor | None = None,
         *,
-        pose: Triple | None = None,
-        velocity: Triple = (0.0, 0.0, 0.0),
+        task: str = "table",
+        state: Sequence[float] | None = None,
         monotonic_ns: int | None = None,
         devices: Mapping[str, str] | None = None,
-        physics: Physics | None = None,
+        settings: Any = None,
     ):
         """Prepares a recording; the file appears when the `with` block is entered.
 
         Args:
             path: of the finished file, `NAME.mcap`.
-            map_config: the map.
+            scenario: of the task; the map.
             meta: all that is known at the start; `finish` fills in the columns of the result.
             anchor: of the session's clock, by default now.
-            pose: of s_0 (px, px, rad), by default the map's start.
-            velocity: of s_0 (px/s, px/s, rad/s).
+            task: name of the task.
+            state: s_0 as `TaskSpec.recorded` has it, by default that of the scenario's start.
             monotonic_ns: when s_0 was read, by default the anchor's moment.
             devices: what is known of the devices; no serial numbers, since those identify people.
-            physics: settings of the world that the states come from.
+            settings: of the world that the states come from.
+
+        Raises:
+            UnknownNameError: the task is not installed.
         """
         self.meta = meta
         self.steps = 0
         self._path = Path(path)
-        self._map_config = map_config
+        self._scenario = scenario
+        self._task = get_task(task)
+        self._messages, self._spec = messages_of(self._task), self._task.spec
         self._anchor = anchor or WallClockAnchor.now()
         self._devices = dict(devices or {})
-        self._physics = physics or Physics()
+        self._settings = settings or self._task.settings_type()
         self._begin_ns = self._anchor.monotonic_ns if monotonic_ns is None else monotonic_ns
         self._time_ns = self._begin_ns  # of the present step
         self._flushed_ns = self._begin_ns
-        self._pose, self._velocity = checked_state(map_config.start if pose is None else pose, velocity)
-        self._positions = array("d", self._pose[:2])
+        self._state = checked_state(self._task.start_of(scenario) if state is None else state, self._spec)
+        self._states = array("d", self._state)
         self._total_reward = 0.0
-        self._forces = array("d")
-        self._scene, self._frame = TableScene(), TableFrame()
+        self._actions = array("d")
+        self._scene = self._messages.scene_writer()
         self._ended = False
 
     def __enter__(self) -> "EpisodeRecorder":
@@ -147,8 +148,7 @@ class EpisodeRecorder:
     def step(
         self,
         action: np.ndarray | Sequence[float],
-        pose: Triple,
-        velocity: Triple,
+        state: Sequence[float],
         reward: float,
         *,
         monotonic_ns: int | None = None,
@@ -158,41 +158,40 @@ class EpisodeRecorder:
         """Records the action of a step and the state after it.
 
         Args:
-            action: `(4,)` robot xy, human xy in [-1, 1], as it acted in the last state.
-            pose: after the step (px, px, rad).
-            velocity: after the step (px/s, px/s, rad/s).
+            action: `(m,)` of both players, robot first, as it acted in the last state.
+            state: after the step, as `TaskSpec.recorded` has it (`World.recorded`).
             reward: after the step.
-            monotonic_ns: when the step began (its state was read); by default 1/30 s after the one before.
+            monotonic_ns: when the step began (its state was read); by default a step after the one before.
             inputs: what the players' devices said; their `step` is filled in.
             timing: how well the loop kept its time; its `step` is filled in.
 
         Raises:
-            ShapeError: an action of another shape.
-            InvalidValueError: numbers that are not finite or forces beyond [-1, 1]; nothing was recorded.
+            ShapeError: an action or a state of another shape.
+            InvalidValueError: numbers that are not finite or actions out of their bounds; nothing was recorded.
             RunError: the recording has ended.
         """
         if self._ended:
             raise RunError(f"{self._path}: expected no step after the end of the recording, found one")
-        forces = checked_forces(action)
-        after = checked_state(pose, velocity)
-        step = self.steps
+        joint, after = checked_action(action, self._spec), checked_state(state, self._spec)
+        step, messages, one = self.steps, self._messages, len(self._spec.action)
         if monotonic_ns is not None:
             self._time_ns = monotonic_ns
         # Nothing of a step is written before all of it is known to be sound.
-        records = self._state_records(forces)
-        records += episode_messages.action_records(step, forces)
+        records = self._state_records(joint)
+        for topic, values in zip(messages.actions, (joint[:one], joint[one:]), strict=True):
+            records.append((topic, messages.encode_action(step, values)))
         records += episode_messages.device_records(step, inputs, timing)
-        records.append(episode_messages.interaction_record(step, after[0][2], forces, float(reward)))
+        records.append((messages.measures, messages.encode_measures(step, after, joint, float(reward))))
         self._write(records)
         self.steps = step + 1
-        self._pose, self._velocity = after
-        self._positions.extend(self._pose[:2])
+        self._state = after
+        self._states.extend(after)
         self._total_reward += float(reward)
-        self._forces.extend(forces)
+        self._actions.extend(joint)
         if monotonic_ns is None:
-            self._time_ns = self._begin_ns + self.steps * 10**9 // RECORD_HZ
+            self._time_ns = self._begin_ns + self.steps * 10**9 // self._spec.record_hz
         else:
-            self._time_ns = monotonic_ns + 10**9 // RECORD_HZ
+            self._time_ns = monotonic_ns + 10**9 // self._spec.record_hz
         if self._time_ns - self._flushed_ns >= _FLUSH_NS:
             self._flush()
 
@@ -217,8 +216,8 @@ class EpisodeRecorder:
         """Records the final state and the result, and gives the file its name once it is on the disk.
 
         Args:
-            success: the table reached the goal.
-            termination_reason: one of `TerminationReason`.
+            success: the players reached the goal.
+            termination_reason: one of `termination_reasons`.
             achieved_hz: rate that the loop kept; nan where time is simulated.
             late_ticks: steps that began late.
             quality_flags: comma separated.
@@ -226,14 +225,15 @@ class EpisodeRecorder:
             notes: of the operator; no names.
 
         Raises:
-            InvalidValueError: another reason than those of `TerminationReason`.
+            InvalidValueError: another reason than those of the task.
             OutputExistsError: another file took the name meanwhile; the recording stays as `.part`.
             RunError: the recording has ended already.
         """
         if self._ended:
             raise RunError(f"{self._path}: expected one end of the recording, found another")
-        if termination_reason not in get_args(TerminationReason):
-            raise InvalidValueError("termination_reason", f"one of {get_args(TerminationReason)}", termination_reason)
+        reasons = termination_reasons(self._spec)
+        if termination_reason not in reasons:
+            raise InvalidValueError("termination_reason", f"one of {reasons}", termination_reason)
         self._end(
             bool(success),
             termination_reason,
@@ -246,43 +246,42 @@ class EpisodeRecorder:
         self._file.publish()
 
     def _write_start(self) -> None:
-        records = episode_messages.start_records(self.meta, self._anchor, self._devices, self._physics)
+        records = episode_messages.start_records(self.meta, self._anchor, self._devices, self._settings, self._spec)
         for name, entries in records.items():
             self._file.add_metadata(name, entries)
         time_ns = self._anchor.at(self._time_ns)
-        map_json = self._map_config.to_json().encode()
-        self._file.add_attachment(episode_records.MAP_ATTACHMENT, "application/json", map_json, time_ns)
-        self._file.declare_topics()
-        self._write([(SCENE_MAP, map_scene(self._map_config, time_ns)), *solid_records(self._map_config, time_ns)])
+        scenario = self._scenario.to_json().encode()
+        self._file.add_attachment(self._messages.scenario_file, "application/json", scenario, time_ns)
+        self._file.declare(self._messages.topics)
+        self._write(self._messages.scenario_records(self._scenario, time_ns))
         self.event("start")
 
     def _end(self, success: bool, termination_reason: str, notes: str = "", **columns: Any) -> None:
-        path = np.asarray(self._positions).reshape(-1, 2)
-        meta = self.meta
+        states = self._task.states_of(np.asarray(self._states).reshape(-1, len(self._spec.recorded)))
+        meta, joint = self.meta, self._spec.joint_action
         suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
-        if suspected and identical(np.asarray(self._forces).reshape(-1, 4)):
+        if suspected and identical(np.asarray(self._actions).reshape(-1, len(joint))):
             columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,
             success=success,
             termination_reason=termination_reason,
-            duration_s=self.steps / RECORD_HZ,
-            route_class=route_class(path, self._map_config),
+            duration_s=self.steps / self._spec.record_hz,
+            route_class=self._task.strategy(self._scenario, states),
             **columns,
         )
         self._ended = True
-        self._write(self._state_records((0.0, 0.0, 0.0, 0.0)))
+        self._write(self._state_records((0.0,) * len(joint)))
         self.event("end", termination_reason)
         result = episode_records.encode(self.meta, episode_records.COLUMNS_AT_END)
         result |= {"steps": str(self.steps), "total_reward": repr(self._total_reward), "notes": notes}
         self._file.add_metadata(episode_records.RESULT, result)
         self._file.complete()
 
-    def _state_records(self, forces: tuple[float, ...]) -> list[Record]:
-        state = episode_messages.state_record(self.steps, self._pose, self._velocity, self._time_ns)
-        time_ns = self._anchor.at(self._time_ns)
-        scene = SCENE, self._scene.update(time_ns, self._pose, forces)
-        return [state, scene, self._frame.record(time_ns, self._pose)]
+    def _state_records(self, action: tuple[float, ...]) -> list[Record]:
+        state = self._messages.encode_state(self.steps, self._state, self._time_ns)
+        scene = self._scene(self._anchor.at(self._time_ns), self._state, action)
+        return [(self._messages.state, state), *scene]
 
     def _write(self, records: list[Record]) -> None:
         time_ns = self._anchor.at(self._time_ns)

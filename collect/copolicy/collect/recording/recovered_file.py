@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import os
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -18,16 +19,13 @@ from copolicy.dataset.files.staging import about, sync_folder
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.log import read_episode
-from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerAction, TableState
 from copolicy.dataset.recording.soundness import RECOVERY, UNVERIFIED
-from copolicy.dataset.recording.topics import ACTIONS, EVENT, SCENE, TABLE_STATE, is_ours
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.artist.scene import TableScene
-from copolicy.tasks.table.artist.scene_solids import TableFrame
-from copolicy.tasks.table.routes import route_class
+from copolicy.dataset.recording.task_messages import messages_of
+from copolicy.dataset.recording.topics import EVENT, Record, is_ours
+from copolicy.dataset.task import PairTask
 
 from ..session.recorded import OFF_CENTRE, PRACTICE
-from .episode_messages import Record, event_record
+from .episode_messages import event_record
 from .intact_records import IntactPart, intact_records
 from .recorder import IDENTICAL_ACTIONS
 
@@ -68,8 +66,8 @@ def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
     software = version("lerobot_policy_copolicy")
     writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(library=f"copolicy/{software} {LIBRARY_IDENTIFIER}")
-    copy = _Copy(writer, part.steps)
-    for record in itertools.islice(intact_records(part.path), part.records):
+    copy = _Copy(writer, part.task, part.steps)
+    for record in itertools.islice(intact_records(part.path, part.task), part.records):
         copy.take(record)
     copy.end(part.stopped_by)
     writer.add_metadata(episode_records.RESULT, _result(part, copy.actions))
@@ -91,20 +89,22 @@ def _write(part: IntactPart, file: BinaryIO, source_sha256: str) -> None:
 class _Copy:
     """Copies what belongs to the complete steps and the state after them, with times and sequence numbers."""
 
-    def __init__(self, writer: Writer, steps: int):
-        self._writer, self._steps = writer, steps
+    def __init__(self, writer: Writer, task: PairTask, steps: int):
+        self._writer, self._task, self._steps = writer, task, steps
+        self._messages = messages_of(task)
         self._schemas: dict[int, int] = {0: 0}
         self._channels: dict[int, int] = {}
         self._names: dict[int, str] = {}
         self._topics: dict[int, str] = {}
-        self._forces: tuple[list[tuple[float, float]], list[tuple[float, float]]] = ([], [])
-        self._final = TableState()
+        self._taken: tuple[list[Sequence[float]], list[Sequence[float]]] = ([], [])
+        self._final: Sequence[float] = ()
         self._time_ns = 0  # of the final state
 
     @property
     def actions(self) -> np.ndarray:
-        """`(steps, 4)` robot xy, human xy of the complete steps."""
-        return np.hstack([np.reshape(forces, (-1, 2)) for forces in self._forces])
+        """`(steps, m)` of both players in the complete steps."""
+        one = len(self._task.spec.action)
+        return np.hstack([np.reshape(np.array(actions, float), (-1, one)) for actions in self._taken])
 
     def take(self, record: McapRecord) -> None:
         """Copies one record, or passes it by."""
@@ -118,7 +118,7 @@ class _Copy:
             schema = self._schemas[record.schema_id]
             channel = writer.register_channel(record.topic, record.message_encoding, schema, record.metadata)
             self._channels[record.id] = channel
-            if is_ours(record, self._names.get(record.schema_id, "")):
+            if is_ours(record, self._names.get(record.schema_id, ""), self._messages.topics):
                 self._topics[record.id] = record.topic
         elif isinstance(record, Attachment):
             writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
@@ -126,25 +126,24 @@ class _Copy:
             writer.add_metadata(record.name, record.metadata)
 
     def end(self, stopped_by: str) -> None:
-        """Adds the scene of the final state, in which no force acts any more, and the event of the recovery."""
-        pose = self._final.x, self._final.y, self._final.theta
-        self._add_ours((SCENE, TableScene().update(self._time_ns, pose, (0.0, 0.0, 0.0, 0.0))))
-        self._add_ours(TableFrame().record(self._time_ns, pose))
+        """Adds the scene of the final state, in which nobody acts any more, and the event of the recovery."""
+        nothing = (0.0,) * len(self._task.spec.joint_action)
+        for record in self._messages.scene_writer()(self._time_ns, self._final, nothing):
+            self._add_ours(record)
         self._add_ours(event_record(self._steps, RECOVERED, stopped_by))
 
     def _take_message(self, message: Message) -> None:
-        topic = self._topics.get(message.channel_id)
+        topic, state = self._topics.get(message.channel_id), self._messages.state.name
         # Sequence numbers are steps. Of the step after the last complete one count the state, and the events before
         # it, but not what was chosen in it.
-        last = self._steps if topic in (TABLE_STATE.name, EVENT.name) else self._steps - 1
+        last = self._steps if topic in (state, EVENT.name) else self._steps - 1
         if topic is not None and message.sequence > last:
             return
-        if topic == TABLE_STATE.name and message.sequence == self._steps:
-            self._final, self._time_ns = TableState.FromString(message.data), message.log_time
-        for forces, action_topic in zip(self._forces, ACTIONS, strict=True):
+        if topic == state and message.sequence == self._steps:
+            self._final, self._time_ns = self._messages.decode_state(message.data)[1], message.log_time
+        for taken, action_topic in zip(self._taken, self._messages.actions, strict=True):
             if topic == action_topic.name:
-                action = PlayerAction.FromString(message.data)
-                forces.append((action.fx, action.fy))
+                taken.append(self._messages.decode_action(message.data)[1])
         channel = self._channels[message.channel_id]
         self._writer.add_message(channel, message.log_time, message.data, message.publish_time, message.sequence)
 
@@ -160,7 +159,6 @@ def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
     if recorded is not None and not part.stopped_by:
         flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]
         return recorded | {"quality_flags": ",".join([*flags, RECOVERED])}
-    assert part.map_config is not None
     happened = {event.kind: event for event in part.events}
     practice = PRACTICE in happened
     columns = {name: text for record in ("episode", "players") for name, text in part.metadata[record].items()}
@@ -176,10 +174,10 @@ def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
     meta = EpisodeMeta(
         "",
         termination_reason="crash_recovered",
-        duration_s=part.steps / RECORD_HZ,
+        duration_s=part.steps / part.task.spec.record_hz,
         achieved_hz=part.loop.achieved_hz,
         late_ticks=part.loop.late,
-        route_class=route_class(part.table_path, part.map_config),
+        route_class=part.task.strategy(part.scenario, part.states),
         quality_flags=",".join(flag for flag, raised in flags.items() if raised),
         discarded=practice,
     )

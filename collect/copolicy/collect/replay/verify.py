@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import theta_of
 from copolicy.dataset.task import RUNNING, Outcome
+from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.world import TableWorld
 
 from .track import Track

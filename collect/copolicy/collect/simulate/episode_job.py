@@ -71,12 +71,12 @@ def record_episode(
         physics: settings of the dynamics.
     """
     world = TableWorld(map_config, physics)
-    with EpisodeRecorder(path, map_config, meta, anchor, physics=physics) as recorder:
+    with EpisodeRecorder(path, map_config, meta, anchor, settings=physics) as recorder:
         outcome = RUNNING
         while not outcome.done:
             state = world.observation
             action = np.clip(np.concatenate([pilot.act(state) for pilot in pilots]), -1.0, 1.0)
             outcome = world.step(action)
-            recorder.step(action, world.pose, world.velocity, world.reward())
+            recorder.step(action, world.recorded, world.reward())
         recorder.finish(outcome.success, outcome.reason)
     return EpisodeResult(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)

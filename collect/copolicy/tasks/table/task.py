@@ -1,56 +1,36 @@
-"""The table as a task: what it is in plain data, and where its parts are."""
+"""The table as a task: where its parts are."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.dataset.features import environment_state, map_of
-from copolicy.dataset.task import PairTask, TaskSpec, Vector
+from copolicy.dataset.task import PairTask
 
-from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
+from .dynamics import integrate
+from .features import environment_state, map_of, states_7, theta_of
+from .interaction import interaction_force
+from .map_config import MapConfig
 from .maps import MAP_SETS, identify
 from .physics import Physics
+from .reward import reward
+from .routes import route_class
+from .spec import SPEC
 
 if TYPE_CHECKING:
+    from .recording import TableMessages
     from .world import TableWorld
 
-_WIDTH, _HEIGHT = (float(side) for side in WINDOW)
-_TURN = 2 * math.pi
-_SPEED, _SPIN = 50.0, math.pi / 2  # px/s, the terminal speed of an axis under two full forces; rad/s
-
-_VELOCITY = (("vx", "px/s", -_SPEED, _SPEED), ("vy", "px/s", -_SPEED, _SPEED), ("omega", "rad/s", -_SPIN, _SPIN))
-_POSITION = (("x", "px", 0.0, _WIDTH), ("y", "px", 0.0, _HEIGHT))
-
-
-def _vector(*entries: tuple[str, str, float, float]) -> Vector:
-    return Vector(*zip(*entries, strict=True))
+_LIMITS = {math.pi / 2: "pi/2", math.pi / 8: "pi/8"}
 
 
 class TableTask(PairTask):
     """Two players carry a table past obstacles to a goal (Ng, Liu and Kennedy, RA-L 2023)."""
 
-    spec: ClassVar[TaskSpec] = TaskSpec(
-        name="table",
-        sentence="Carry the table to the goal together.",
-        state=_vector(*_POSITION, ("cos_theta", "1", -1.0, 1.0), ("sin_theta", "1", -1.0, 1.0), *_VELOCITY),
-        recorded=_vector(*_POSITION, ("theta", "rad", 0.0, _TURN), *_VELOCITY),
-        scenario=_vector(
-            ("start_x", "px", 0.0, _WIDTH),
-            ("start_y", "px", 0.0, _HEIGHT),
-            ("start_theta", "rad", 0.0, _TURN),
-            ("goal_x", "px", 0.0, _WIDTH),
-            ("goal_y", "px", 0.0, _HEIGHT),
-            *(
-                (f"obstacle_{slot}_{axis}", "px", 0.0, side)
-                for slot in range(MAX_OBSTACLES)
-                for axis, side in (("x", _WIDTH), ("y", _HEIGHT))
-            ),
-        ),
-        action=_vector(("fx", "a player's full force", -1.0, 1.0), ("fy", "a player's full force", -1.0, 1.0)),
-        reasons=("goal", "collision_obstacle", "collision_wall", "timeout"),
-    )
+    spec = SPEC
     scenario_type = MapConfig
     settings_type = Physics
 
@@ -68,14 +48,26 @@ class TableTask(PairTask):
         return environment_state(scenario)
 
     def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> MapConfig:
-        """The map of an `environment_state`; the size of its obstacles is the episode column `obstacle_size`."""
-        return map_of(vector, columns["obstacle_size"])
+        """The map of an `environment_state`; the size of its obstacles is the episode column `obstacle_size`.
+
+        Data sets of earlier versions lack it: there the name of the map tells, and 50 px is that of no set.
+        """
+        paper = str(columns.get("map_id", "")).startswith(("holdout", "unseen"))
+        return map_of(vector, columns.get("obstacle_size") or (45 if paper else MapConfig.obstacle_size))
+
+    def columns_of(self, scenario: MapConfig) -> dict[str, Any]:
+        """The size of the obstacles."""
+        return {"obstacle_size": scenario.obstacle_size}
 
     def make_world(self, scenario: MapConfig, settings: Physics | None = None) -> "TableWorld":
         """A table at rest at the start of a map."""
         from .world import TableWorld  # pymunk
 
         return TableWorld(scenario, settings)
+
+    def start_of(self, scenario: MapConfig) -> tuple[float, ...]:
+        """At rest at the start of the map, its orientation as the map has it."""
+        return (*scenario.start, 0.0, 0.0, 0.0)
 
     def states_of(self, recorded: np.ndarray) -> np.ndarray:
         """`(T, 6)` x, y, theta and velocity to `(T, 7)`, with the cosine that `TableWorld.observation` has."""
@@ -86,6 +78,57 @@ class TableTask(PairTask):
         states[:, 3] = [math.sin(theta) for theta in thetas]
         states[:, 4:] = recorded[:, 3:]
         return states
+
+    def recorded_of(self, states: np.ndarray) -> np.ndarray:
+        """`(T, 7)` to `(T, 6)` x, y, theta and velocity."""
+        return np.column_stack((states[:, :2], theta_of(states), states[:, 4:]))
+
+    def rewards(self, scenario: MapConfig, states: np.ndarray) -> np.ndarray:
+        """See `reward`; the position alone matters."""
+        return np.array([reward(x, y, scenario) for x, y in states[:, :2].tolist()])
+
+    def integrate(self, scenario: MapConfig, settings: Physics, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """By `dynamics.integrate`, many times as fast as the world, which also asks what the table touches."""
+        x, y, _, _, vx, vy, omega = state.astype(float).tolist()
+        return states_7(integrate((x, y, float(theta_of(state))), (vx, vy, omega), actions, settings))
+
+    def path(self, states: np.ndarray) -> np.ndarray:
+        """`(T, 2)` the table's centre, px."""
+        return states[:, :2]
+
+    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """See `interaction_force`."""
+        return interaction_force(theta_of(states), actions)
+
+    def layout(self, scenario: MapConfig, with_goal: bool = False) -> tuple:
+        """The obstacles, whatever their order, and the goal."""
+        return tuple(sorted(scenario.obstacles)), scenario.goal if with_goal else ()
+
+    def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
+        """See `route_class`."""
+        return route_class(states[:, :2], scenario)
+
+    def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+        """The table on its map, as `SceneImage` draws it."""
+        from .artist.scene_image import SceneImage  # pygame
+
+        image = SceneImage(scenario, size)
+        for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
+            yield image.draw((x, y, theta))
+
+    @cached_property
+    def recording(self) -> "TableMessages":
+        """The table's own messages."""
+        from .recording import TableMessages  # protobuf
+
+        return TableMessages()
+
+    def settings_summary(self, settings: Physics) -> str:
+        """The bound on the angular acceleration, and whatever else is not the default."""
+        limit = settings.angular_acceleration_limit
+        default = asdict(Physics(angular_acceleration_limit=limit))
+        others = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
+        return ", ".join([f"angular acceleration up to {_LIMITS.get(limit, f'{limit!r}')} rad/s^2", *others])
 
     def identify(self, scenario: MapConfig) -> tuple[str, str]:
         """Name of a map and of its set, whatever the order of its obstacles; see `maps.identify`."""

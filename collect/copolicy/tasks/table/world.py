@@ -8,9 +8,9 @@ import numpy as np
 import pymunk
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.features import state_vector
 from copolicy.dataset.task import RUNNING, Outcome
 
+from .features import state_vector
 from .map_config import WINDOW, MapConfig
 from .outline import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 from .physics import GOAL_SIZE, Physics

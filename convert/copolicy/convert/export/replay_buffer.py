@@ -23,12 +23,12 @@ import numpy as np
 
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
-from copolicy.dataset.features import ENVIRONMENT_NAMES, theta_of
 from copolicy.dataset.files.staging import new_folder
-from copolicy.dataset.task import ACTION_NAMES, RECORD_HZ, STATE_NAMES
+from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.dynamics import step_angular, step_linear
+from copolicy.tasks.table.features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES, theta_of
 from copolicy.tasks.table.physics import Physics
 
-from ..dynamics import step_angular, step_linear
 from ..upstream.episode import states_7
 from ..upstream.zarr import ZARR_HZ
 from .source import ExportEpisode, ExportSource

@@ -1,4 +1,4 @@
-"""The episodes of a LeRobot v3 data set of this task, one after the other, for the exporters."""
+"""The episodes of a LeRobot v3 data set, one after the other, for the exporters."""
 
 import math
 from collections import Counter
@@ -12,17 +12,13 @@ import numpy as np
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, FEATURES, HUMAN_ACTION, STATE, theta_of
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
 from copolicy.dataset.physics_text import physics_counts, physics_of
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.physics import Physics
-
-from ..dynamics import integrate
-from ..upstream.episode import states_7
+from copolicy.dataset.task import PairTask
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,14 +27,15 @@ class ExportEpisode:
 
     Attributes:
         index: its `episode_index`.
-        states: `(T, 7)` float32.
-        environment: `(11,)` float32.
-        human_actions: `(T, 2)` float32, of the frame before.
-        actions: `(T, 4)` float32.
+        states: `(T, n)` float32.
+        environment: `(k,)` float32, the vector of the scenario.
+        human_actions: `(T, m / 2)` float32, of the frame before.
+        actions: `(T, m)` float32.
         rewards: `(T,)` float32.
         meta: its episode columns.
         fps: frames a second.
         physics: what led from state to state; the default where the data set does not say.
+        task: that it is of.
     """
 
     index: int
@@ -49,27 +46,27 @@ class ExportEpisode:
     rewards: np.ndarray
     meta: dict[str, Any]
     fps: int
-    physics: Physics
+    physics: Any
+    task: PairTask
 
     def __len__(self) -> int:
         return len(self.actions)
 
     def final_state(self) -> np.ndarray:
-        """`(7,)` float32, the state that the last action led to.
+        """`(n,)` float32, the state that the last action led to.
 
         The data set ends with the last action, so that it is integrated from the last state over the steps that
         `duration_s` leaves for the last frame, under the episode's own physics.
         """
-        step = stride(self.fps)
-        seconds = self.meta["duration_s"]
-        steps = round(seconds * RECORD_HZ) - step * (len(self) - 1) if math.isfinite(seconds) else step
-        x, y, _, _, vx, vy, omega = self.states[-1].astype(float).tolist()
+        record_hz = self.task.spec.record_hz
+        step, seconds = stride(self.fps, record_hz), self.meta["duration_s"]
+        steps = round(seconds * record_hz) - step * (len(self) - 1) if math.isfinite(seconds) else step
         held = np.repeat(self.actions[-1:].astype(float), min(max(steps, 1), step), axis=0)
-        after = integrate((x, y, float(theta_of(self.states[-1]))), (vx, vy, omega), held, self.physics)
-        return states_7(after[-1]).astype(np.float32)
+        scenario = self.task.scenario_of_vector(self.environment, self.meta)
+        return self.task.integrate(scenario, self.physics, self.states[-1], held)[-1].astype(np.float32)
 
     def next_states(self) -> np.ndarray:
-        """`(T, 7)` float32, the state of the following frame."""
+        """`(T, n)` float32, the state of the following frame."""
         return np.vstack((self.states[1:], self.final_state()))
 
 
@@ -82,6 +79,7 @@ class ExportSource:
         splits: ranges of `episode_index` by name.
         rows: one dict an exported episode: `episode_index`, `length` and the episode columns.
         left_out: discarded episodes that are not exported.
+        task: that the episodes are of.
     """
 
     root: Path
@@ -90,6 +88,7 @@ class ExportSource:
     splits: dict[str, range]
     rows: tuple[dict[str, Any], ...]
     left_out: int
+    task: PairTask
     _lengths: dict[int, int] = field(repr=False)
 
     @classmethod
@@ -100,29 +99,30 @@ class ExportSource:
             keep_discarded: export, too, what its operator discarded or `copolicy-dataset exclude` flagged.
 
         Raises:
-            FileFormatError: no LeRobot v3 data set of this task.
+            FileFormatError: no LeRobot v3 data set.
             RunError: no episode is left.
         """
         folder = LeRobotFolder.open(root)
-        folder.require_task(tuple(FEATURES))
-        info = folder.info
+        task, info = folder.task, folder.info
+        folder.require_task(tuple(features_of(task.spec)))
+        record_hz = task.spec.record_hz
         fps, hold = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))
         if fps != int(fps):
-            raise FileFormatError(root / INFO_FILE, f"a rate that divides {RECORD_HZ}", str(fps))
+            raise FileFormatError(root / INFO_FILE, f"a rate that divides {record_hz}", str(fps))
         fps = int(fps)
         splits = {name: _range(text, root) for name, text in (info.get("splits") or {}).items()}
-        stride(fps)
+        stride(fps, record_hz)
         rows = folder.rows()
         for row in rows:
             try:
-                physics_of(row["physics"])
+                physics_of(row["physics"], task)
             except InvalidValueError as error:
                 raise FileFormatError(root, f"the settings of episode {row['episode_index']}", str(error)) from None
         kept = tuple(row for row in rows if keep_discarded or not row["discarded"])
         if not kept:
             raise RunError(f"{root}: expected an episode to export, found {len(rows)}, all discarded")
         lengths = {row["episode_index"]: row["length"] for row in rows}
-        return cls(root, fps, hold, splits, kept, len(rows) - len(kept), lengths)
+        return cls(root, fps, hold, splits, kept, len(rows) - len(kept), task, lengths)
 
     @property
     def frames(self) -> int:
@@ -134,13 +134,13 @@ class ExportSource:
         sources = Counter(row["source"] for row in self.rows)
         licenses = sorted({row["license"] for row in self.rows} - {""})
         return {
-            "format_of_origin": "LeRobot v3, copolicy table carrying",
+            "format_of_origin": f"LeRobot v3, copolicy {self.task.spec.title}",
             "fps": self.fps,
             "hold": self.hold,
             "sources": dict(sorted(sources.items())),
             "simulated": bool(sources["simulated"]),
             "licenses": licenses,
-            "physics": physics_counts(row["physics"] for row in self.rows),
+            "physics": physics_counts((row["physics"] for row in self.rows), self.task),
         }
 
     @property
@@ -149,12 +149,12 @@ class ExportSource:
 
         A setting in which the episodes differ keeps its default; `facts` says which physics they have.
         """
-        default = Physics()
-        settings = [physics_of(row["physics"]) or default for row in self.rows]
+        default: Any = self.task.settings_type()
+        settings = [physics_of(row["physics"], self.task) or default for row in self.rows]
         kwargs: dict[str, Any] = {"fps": self.fps}
         for name in ("step_limit", "angular_acceleration_limit"):
-            values = {getattr(physics, name) for physics in settings}
-            if len(values) == 1 and values != {getattr(default, name)}:
+            values = {getattr(physics, name, None) for physics in settings}
+            if len(values) == 1 and values != {getattr(default, name, None)}:
                 kwargs[name] = values.pop()
         return kwargs
 
@@ -167,7 +167,7 @@ class ExportSource:
         wanted = {row["episode_index"]: row for row in self.rows}
         expected = iter(sorted(self._lengths))
         for path in visible_files(self.root / "data", "*.parquet"):
-            columns = _frames(path)
+            columns = _frames(path, self.task)
             numbers = columns["episode_index"]
             starts = np.flatnonzero(np.diff(numbers, prepend=-1))
             for start, end in zip(starts, np.append(starts[1:], len(numbers)), strict=True):
@@ -179,7 +179,7 @@ class ExportSource:
                     raise FileFormatError(path, f"{promised}, next", f"episode {index} with {end - start}")
                 if index in wanted:
                     part = {name: values[start:end] for name, values in columns.items()}
-                    yield _episode(index, part, wanted[index], self.fps)
+                    yield _episode(index, part, wanted[index], self.fps, self.task)
         if (due := next(expected, None)) is not None:
             raise FileFormatError(self.root / "data", f"the frames of episode {due}", "none")
 
@@ -191,20 +191,21 @@ def _range(text: str, root: Path) -> range:
     return range(int(first), int(last))
 
 
-def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int) -> ExportEpisode:
+def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int, task: PairTask) -> ExportEpisode:
     meta = {name: row[name] for name in EPISODE_COLUMNS}
     return ExportEpisode(
         index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta,
-        fps, physics_of(row["physics"]) or Physics(),
+        fps, physics_of(row["physics"], task) or task.settings_type(), task,
     )  # fmt: skip
 
 
-def _frames(path: Path) -> dict[str, np.ndarray]:
+def _frames(path: Path, task: PairTask) -> dict[str, np.ndarray]:
     names = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION, "next.reward")
     table = read_parquet(path, (*names, "episode_index"))
     columns = {"episode_index": feature_values(table, "episode_index", (1,), path)}
+    features = features_of(task.spec)
     for name in names:
-        columns[name] = feature_values(table, name, FEATURES[name]["shape"], path)
+        columns[name] = feature_values(table, name, features[name]["shape"], path)
         if not np.isfinite(columns[name]).all():
             raise FileFormatError(path, f"finite numbers of {name}", "nan or inf")
     return columns

@@ -17,7 +17,7 @@ from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from copolicy.dataset.files.staging import about, sync_folder, sync_tree
-from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, minimal_card
@@ -149,7 +149,7 @@ def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
     record = stored_record(whole)
     versions = converter_versions([record, *record.get("appended", [])])
     try:
-        mixtures = Mixtures.of(rows)
+        mixtures = Mixtures.of(rows, task_of(read_info(whole)))
     except InvalidValueError as error:
         raise FileFormatError(whole, "episodes that say their physics", str(error)) from None
     return replace(mixtures, mixed=[*mixtures.mixed, *versions, *rewards])

@@ -5,31 +5,31 @@ import numpy as np
 from copolicy.dataset.clock import Hold, frame_actions, frame_states, previous_actions, stride
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.reward import reward
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.dataset.task import get_task
 
 
 def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, np.ndarray]:
-    """The columns of `features.FEATURES` for one episode, `(T', n)` float32 or `(T',)`, by the rules of the one clock.
+    """The columns of one episode (`features_of` its task), `(T', n)` float32 or `(T',)`, by the rules of the one clock.
 
     `next.reward` is the reward of the state that the frame's held steps led to; `next.done` marks the last frame,
     `next.success` the last frame of a success.
 
     Raises:
-        InvalidValueError: no steps, a value that is not finite, an `fps` that does not divide 30, or an episode that
-            was stored at a lower rate and is asked for at another.
+        InvalidValueError: no steps, a value that is not finite, an `fps` that does not divide the recording rate, or
+            an episode that was stored at a lower rate and is asked for at another.
     """
-    states, actions = _at_rate(episode, fps, hold)
+    task = get_task(episode.task)
+    states, actions = _at_rate(episode, task.spec.record_hz, fps, hold)
     after = np.vstack((states[1:], episode.final_state))
     frames = len(states)
     last = np.arange(frames) == frames - 1
     columns = {
         STATE: states.astype(np.float32),
-        ENVIRONMENT_STATE: np.tile(environment_state(episode.map_config).astype(np.float32), (frames, 1)),
-        HUMAN_ACTION: previous_actions(actions)[:, 2:].astype(np.float32),
+        ENVIRONMENT_STATE: np.tile(task.scenario_vector(episode.scenario).astype(np.float32), (frames, 1)),
+        HUMAN_ACTION: np.split(previous_actions(actions), 2, axis=1)[1].astype(np.float32),
         ACTION: actions.astype(np.float32),
-        "next.reward": np.array([reward(x, y, episode.map_config) for x, y in after[:, :2].tolist()], np.float32),
+        "next.reward": task.rewards(episode.scenario, after).astype(np.float32),
         "next.done": last,
         "next.success": last & episode.meta.success,
     }
@@ -39,12 +39,12 @@ def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, 
     return columns
 
 
-def _at_rate(episode: Episode, fps: int, hold: Hold) -> tuple[np.ndarray, np.ndarray]:
+def _at_rate(episode: Episode, record_hz: int, fps: int, hold: Hold) -> tuple[np.ndarray, np.ndarray]:
     if not len(episode.actions):
         raise InvalidValueError(f"steps of episode {episode.meta.episode_uuid}", "at least one", 0)
-    if episode.fps == RECORD_HZ:
-        return frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
-    stride(fps)
+    if episode.fps == record_hz:
+        return frame_states(episode.states, fps, record_hz), frame_actions(episode.actions, fps, hold, record_hz)
+    stride(fps, record_hz)
     if fps != episode.fps:
         rate = f"{episode.fps}, the only rate at which episode {episode.meta.episode_uuid} was stored"
         raise InvalidValueError("fps", rate, fps)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from copolicy.dataset.physics_text import physics_counts
+from copolicy.dataset.task import PairTask
 
 _COLUMNS = ("source", "software_version", "license")
 
@@ -24,14 +25,14 @@ class Mixtures:
     mixed: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, rows: Iterable[Mapping[str, Any]]) -> "Mixtures":
-        """From the episode columns of each episode.
+    def of(cls, rows: Iterable[Mapping[str, Any]], task: PairTask | None = None) -> "Mixtures":
+        """From the episode columns of each episode of a task, the table by default.
 
         Raises:
             InvalidValueError: the column `physics` of an episode cannot be read.
         """
         rows = list(rows)
-        counts: dict[str, Mapping[str, int]] = {"physics": physics_counts(row.get("physics") for row in rows)}
+        counts: dict[str, Mapping[str, int]] = {"physics": physics_counts((row.get("physics") for row in rows), task)}
         for name in _COLUMNS:
             counts[name] = Counter(str(row.get(name) or "none") for row in rows)
         sizes: dict[str, Counter[str]] = {}

@@ -9,11 +9,11 @@ import numpy as np
 
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.exceptions import CopolicyError, RunError
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.features import STATE
+from copolicy.dataset.task import get_task
 
 from ..column_statistics import episode_statistics
-from ..replay import replay_drift
 from .frames import frame_columns
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class PreparedEpisode:
 
     Attributes:
         origin: the file that the episode was read from, for messages; no part of the data set.
+        task: name of its task.
     """
 
     columns: dict[str, np.ndarray]
@@ -55,6 +56,7 @@ class PreparedEpisode:
     notes: tuple[str, ...] = ()
     scene: "SceneClip | None" = None
     origin: str = ""
+    task: str = "table"
 
     @property
     def frames(self) -> int:
@@ -113,19 +115,34 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
     if not meta.license:
         meta = replace(meta, license=conversion.license)
     if conversion.drift and np.isnan(meta.replay_drift_px):
-        # Positions do not depend on the rotation, so that its settings do not matter here.
-        meta = replace(meta, replay_drift_px=replay_drift(episode, episode.physics))
+        meta = replace(meta, replay_drift_px=replay_drift(episode))
     statistics = episode_statistics(columns)
     if conversion.video is None:
-        return PreparedEpisode(columns, statistics, meta, episode.notes)
+        return PreparedEpisode(columns, statistics, meta, episode.notes, task=episode.task)
 
     # They load what a conversion without a video never needs.
-    from ..video.scene_pictures import scene_pictures
     from ..video.scene_video import SCENE, scene_clip
 
-    pictures = scene_pictures(columns[STATE], episode.map_config, conversion.video)
-    clip = scene_clip(pictures, conversion.fps, conversion.video)
-    return PreparedEpisode(columns, {**statistics, SCENE: clip.statistics}, meta, episode.notes, clip)
+    task = get_task(episode.task)
+    images = task.images(episode.scenario, columns[STATE], conversion.video)
+    if images is None:
+        raise InvalidValueError("--video", "a task that is drawn", task.missing("artist"))
+    clip = scene_clip(images, conversion.fps, conversion.video)
+    statistics = {**statistics, SCENE: clip.statistics}
+    return PreparedEpisode(columns, statistics, meta, episode.notes, clip, task=episode.task)
+
+
+def replay_drift(episode: Episode) -> float:
+    """Largest distance between the path recorded and the one that the actions give from the first state on; of the
+    table in px.
+
+    NaN where not every recorded action was stored, or the task tracks no point.
+    """
+    task, path = get_task(episode.task), episode.path
+    if path is None or episode.fps != task.spec.record_hz or not len(episode.actions):
+        return float("nan")
+    replayed = task.path(task.integrate(episode.scenario, episode.settings, episode.states[0], episode.actions))
+    return float(np.linalg.norm(replayed - path, axis=1).max())
 
 
 def prepare_from(

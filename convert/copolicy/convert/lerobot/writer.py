@@ -17,13 +17,13 @@ import numpy as np
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
-from copolicy.dataset.features import ACTION, FEATURES, TASK
+from copolicy.dataset.features import ACTION, features_of
 from copolicy.dataset.files.meta_files import CARD_FILE, RECORD_FILE
 from copolicy.dataset.files.staging import new_folder
-from copolicy.dataset.lerobot_folder.info import ROBOT_TYPE
+from copolicy.dataset.lerobot_folder.info import robot_type
 from copolicy.dataset.publication.licences import licence_identifier
 from copolicy.dataset.publication.minimal_card import minimal_card
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task import TaskSpec, get_task
 
 from ..column_statistics import episode_statistics
 from ..video.scene_video import SCENE, scene_encoder, scene_feature
@@ -79,7 +79,8 @@ def write_dataset(
 
     How actions were held is an extra key of the feature `action` in meta/info.json, where it survives loading,
     pushing, splitting and editing and keeps sets of different holds from being merged. The rest of `record`
-    (versions, sources, what was left out, notes by episode) is in meta/copolicy.json: extra keys at the top of
+    (versions, sources, what was left out, notes by episode), and the spec of the task, which the robot type in
+    info.json names, is in meta/copolicy.json: extra keys at the top of
     info.json do not survive, and inside a feature they would keep sets of different versions from being merged.
 
     Args:
@@ -97,13 +98,15 @@ def write_dataset(
         first = next(remaining, None)
         if first is None:
             raise RunError(f"{root}: expected at least one episode to write, found none")
-        features = _features(hold, first)
+        task = get_task(first.task)
+        spec = task.spec
+        features = _features(spec, hold, first)
         meta = LeRobotDatasetMetadata.create(
-            repo_id, fps, features, ROBOT_TYPE, partial, use_videos=SCENE in features,
+            repo_id, fps, features, robot_type(spec.name), partial, use_videos=SCENE in features,
             data_files_size_in_mb=data_file_mb, video_files_size_in_mb=video_file_mb,
         )  # fmt: skip
-        meta.save_episode_tasks([TASK])
-        rows, statistics, notes = _write_data(chain((first,), remaining), meta)
+        meta.save_episode_tasks([spec.sentence])
+        rows, statistics, notes = _write_data(chain((first,), remaining), spec, meta)
         _write_episodes(rows, statistics, partial)
         meta.info.total_episodes, meta.info.total_frames = len(rows), rows[-1]["dataset_to_index"]
         meta.info.total_tasks, meta.info.splits = 1, {"train": f"0:{len(rows)}"}
@@ -111,14 +114,14 @@ def write_dataset(
             meta.update_video_info(SCENE, scene_encoder(fps))
         write_info(meta.info, partial)
         write_stats(aggregate_stats(statistics), partial)
-        text = json.dumps({**record(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
+        text = json.dumps({**record(), "task": spec.to_dict(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
         card = minimal_card({row["license"] for row in rows})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
     _warn_of_licences(root, rows)
     successes = sum(row["success"] for row in rows)
     frames = rows[-1]["dataset_to_index"]
-    return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows))
+    return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows, task))
 
 
 def _warn_of_licences(root: Path, rows: list[dict]) -> None:
@@ -131,13 +134,16 @@ def _warn_of_licences(root: Path, rows: list[dict]) -> None:
         )  # fmt: skip
 
 
-def _features(hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
-    action = {**FEATURES[ACTION], "hold": hold, "record_hz": RECORD_HZ}
+def _features(spec: TaskSpec, hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
+    features = features_of(spec)
+    action = {**features[ACTION], "hold": hold, "record_hz": spec.record_hz}
     video = {SCENE: scene_feature(example.scene.size)} if example.scene else {}
-    return {**FEATURES, ACTION: action, **video}
+    return {**features, ACTION: action, **video}
 
 
-def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
+def _write_data(
+    episodes: Iterable[PreparedEpisode], spec: TaskSpec, meta
+) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
     """Rows of meta/episodes without statistics, statistics of every episode, and notes by episode."""
     rows: list[dict] = []
     statistics: list[dict] = []
@@ -158,7 +164,7 @@ def _write_data(episodes: Iterable[PreparedEpisode], meta) -> tuple[list[dict], 
             rows.append(
                 {
                     "episode_index": index,
-                    "tasks": [TASK],
+                    "tasks": [spec.sentence],
                     "length": episode.frames,
                     **frames.append({**episode.columns, **clock}),
                     **(videos.append(episode.scene.mp4, episode.frames) if episode.scene else {}),

@@ -18,18 +18,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from copolicy.dataset.episode import Episode, EpisodeMeta, TerminationReason
-from copolicy.dataset.features import theta_of
+from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.lerobot_folder.exclusions import FLAG
 from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.features import states_7, theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import identify
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.routes import route_class
 from copolicy.tasks.table.world import TableWorld
 
-from ..replay import replay_drift
+from ..lerobot.prepare import replay_drift
 
 ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 """Bounds on the angular acceleration that versions of the program used, rad/s^2."""
@@ -82,21 +82,13 @@ def best_fit(fit: Callable[[Physics], Trajectory], angular_limit: str) -> Trajec
     return replace(best, told=all(residual > 2 * best.residual + _SAME for residual in others))
 
 
-def states_7(states: np.ndarray) -> np.ndarray:
-    """`(..., 6)` with theta to `(..., 7)` with its cosine and sine."""
-    cosine, sine = np.cos(states[..., 2]), np.sin(states[..., 2])
-    return np.concatenate((states[..., :2], cosine[..., None], sine[..., None], states[..., 3:]), axis=-1)
-
-
 def start_pose(state: np.ndarray) -> tuple[float, float, float]:
     """Start of a map from a first state `(6,)`, without the noise of single precision."""
     x, y, theta = (float(value) for value in state[:3])
     return round(x, 3), round(y, 3), round(theta % (2 * math.pi), 5)
 
 
-def outcome(
-    config: MapConfig, physics: Physics, final_state: np.ndarray, last_action: np.ndarray
-) -> TerminationReason | None:
+def outcome(config: MapConfig, physics: Physics, final_state: np.ndarray, last_action: np.ndarray) -> str | None:
     """What ended an episode: what the table touches at its last stored pose or, holding the last action, in the
     next two steps.
 
@@ -173,7 +165,7 @@ def build_episode(
     doubt = "" if trajectory.told else ", which the rows do not tell"
     notes = (f"from {origin}, angular limit {limit}{doubt}", *notes)
     episode = Episode(states, trajectory.actions, final_state, meta, config, fps, physics, notes)
-    return replace(episode, meta=replace(meta, replay_drift_px=replay_drift(episode, physics)))
+    return replace(episode, meta=replace(meta, replay_drift_px=replay_drift(episode)))
 
 
 def _wrong_map(flags: tuple[str, ...]) -> bool:

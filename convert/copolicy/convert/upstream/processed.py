@@ -13,10 +13,10 @@ import numpy as np
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.dynamics import step_linear, torque
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from ..dynamics import step_linear, torque
 from .episode import Trajectory, UpstreamOptions, best_fit, build_episode
 from .maps import check_by_rewards, rounded
 from .restricted_npz import load_npz

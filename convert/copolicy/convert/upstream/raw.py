@@ -14,10 +14,10 @@ from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from ..dynamics import step_angular, step_linear, undo_angular, undo_linear
 from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, start_pose
 from .maps import start_differs
 from .restricted_npz import load_npz

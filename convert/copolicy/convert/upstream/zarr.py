@@ -13,10 +13,10 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.features import map_of
+from copolicy.tasks.table.dynamics import undo_angular, undo_linear
+from copolicy.tasks.table.features import map_of
 from copolicy.tasks.table.physics import Physics
 
-from ..dynamics import undo_angular, undo_linear
 from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
 from .maps import check_by_path, rounded
 from .zarr_store import ZarrArrays

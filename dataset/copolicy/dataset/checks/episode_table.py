@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..task import PairTask, get_task
 from .finding import Finding
 
 COLUMN_TYPES: dict[str, type] = {"str": str, "float": float, "int": np.int64, "bool": bool}
@@ -24,13 +25,14 @@ class EpisodeTable:
         frames: the columns of the frames that are there, `(N, n)` or `(N,)` each.
         framed: `(F,)` places in `labels` of the episodes that have frames, in the order of their frames.
         starts: `(F,)` first frame of each.
-        final_states: `(F, 7)` the state after the last action, where it was stored.
+        final_states: `(F, n)` the state after the last action, where it was stored.
         info: `meta/info.json` of a LeRobot data set.
         files: how the data files describe the columns of the frames: name to (type, width).
         damage: what kept a part of the data from being read, or contradicts the rest of it.
         obstacle_sizes: `(F,)` side of the obstacles, px, where it was stored.
         episodes: the rows of meta/episodes in the order of `labels`, as they are stored.
         data_files: the episodes that each data file has rows of, by its path below the folder.
+        task: that they are of.
     """
 
     root: Path
@@ -48,6 +50,7 @@ class EpisodeTable:
     damage: tuple[Finding, ...] = ()
     episodes: Any = None  # a pyarrow.Table, where it was read from one
     data_files: dict[str, frozenset[int]] = field(default_factory=dict)
+    task: PairTask = field(default_factory=get_task)
 
     @property
     def frame_count(self) -> int:

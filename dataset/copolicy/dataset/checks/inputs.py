@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..features import ACTION, BOUNDS, STATE
+from ..features import ACTION, STATE
 from ..interaction import alike, may_be_one_device, pushing
 from ..task import PLAYERS
 from .episode_table import EpisodeTable
@@ -34,7 +34,7 @@ def _action_range(table: EpisodeTable) -> Iterator[Finding]:
 
 def _state_range(table: EpisodeTable) -> Iterator[Finding]:
     states = table.frames[STATE].astype(float)
-    low, high = BOUNDS[STATE]
+    low, high = table.task.spec.state.bounds
     outside = np.maximum(low - states, states - high)[:, :2].max(axis=1)
     worst = np.maximum.reduceat(outside, table.starts)
     message = "the table's centre is this many px outside the window"

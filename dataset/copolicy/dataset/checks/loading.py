@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import CopolicyError
-from ..features import FEATURES
+from ..features import features_of
 from .episode_table import EpisodeTable
 from .finding import Finding, Severity
 from .limits import limit
@@ -42,7 +42,8 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
     except CopolicyError:
         return
     # LeRobot's merge leaves those of the running numbers (index, episode_index) as they were in the parts.
-    for name, values in ((name, values) for name, values in table.frames.items() if name in FEATURES):
+    ours = features_of(table.task.spec)
+    for name, values in ((name, values) for name, values in table.frames.items() if name in ours):
         rows = values.reshape(table.frame_count, -1).astype(float)
         if name in stored and np.isfinite(rows).all():  # else said by `finite`
             yield from _against_frames(name, stored[name], rows)

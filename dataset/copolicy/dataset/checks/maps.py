@@ -7,11 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from copolicy.tasks.table.features import map_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS, map_set
 
 from ..exceptions import CopolicyError
-from ..features import ENVIRONMENT_STATE, STATE, map_of
+from ..features import ENVIRONMENT_STATE, STATE
 from ..lerobot_folder.exclusions import FLAG
 from .episode_table import EpisodeTable
 from .finding import Finding

@@ -7,11 +7,11 @@ import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
-from ..features import ACTION, FEATURES, STATE
+from ..features import ACTION, STATE, features_of
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..lerobot_folder.folder import POSITIONS, other_task
-from ..lerobot_folder.info import read_info, require_episodes
+from ..lerobot_folder.info import read_info, require_episodes, task_of
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
 from .episode_table import EpisodeTable
 from .finding import Finding
@@ -28,6 +28,7 @@ def read_lerobot(root: Path) -> EpisodeTable:
     """
     info = read_info(root)
     require_episodes(root, info)
+    features = features_of(task_of(info).spec)
     damage: list[Finding] = []
     meta = _concatenated(root, EPISODES_FOLDER, damage)[0]
     if meta is None:
@@ -42,7 +43,7 @@ def read_lerobot(root: Path) -> EpisodeTable:
     if data is not None:
         files = {column.name: _type(column.type) for column in data.schema}
         _require_task(root, info, files)
-        frames = _frame_columns(data, damage)
+        frames = _frame_columns(data, features, damage)
     frames, framed, starts = _whole_episodes(frames, columns, labels, damage)
     counted = (len(labels), data.num_rows if data is not None else 0)
     for name, number in zip(("total_episodes", "total_frames"), counted, strict=True):
@@ -51,17 +52,17 @@ def read_lerobot(root: Path) -> EpisodeTable:
             damage.append(Finding("", "rows", number, info[name], "error", message))
     return EpisodeTable(
         root, "lerobot", float(info["fps"]), labels, columns, frames, framed, starts, None, None, info, files,
-        tuple(damage), meta.take(pa.array(order)), episodes_of_files,
+        tuple(damage), meta.take(pa.array(order)), episodes_of_files, task_of(info),
     )  # fmt: skip
 
 
 def _require_task(root: Path, info: dict[str, Any], files: dict[str, tuple[str, int]]) -> None:
     """A sound data set of another task is none to hold against the rules of this one."""
     widths = {name: files[name][1] if name in files else None for name in (STATE, ACTION)}
-    ours = {name: FEATURES[name]["shape"][0] for name in (STATE, ACTION)}
+    spec = task_of(info).spec
     difference = other_task(info)
-    if difference and widths != ours:
-        raise FileFormatError(root / INFO_FILE, "a data set of carrying a table (copolicy-convert)", difference)
+    if difference and widths != {STATE: len(spec.state), ACTION: len(spec.joint_action)}:
+        raise FileFormatError(root / INFO_FILE, f"a data set of {spec.title} (copolicy-convert)", difference)
 
 
 def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dict[str, np.ndarray]:
@@ -104,14 +105,14 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
     return columns
 
 
-def _frame_columns(data: "pa.Table", damage: list[Finding]) -> dict[str, np.ndarray]:
+def _frame_columns(data: "pa.Table", features: dict[str, dict], damage: list[Finding]) -> dict[str, np.ndarray]:
     """The columns of the frames that are numbers in every row; what is wrong with the others is a finding."""
     frames: dict[str, np.ndarray] = {}
-    needed = (*FEATURES, *CLOCK)
+    needed = (*features, *CLOCK)
     for name in data.column_names:
         try:
             values = vectors(data.column(name))
-            width = FEATURES[name]["shape"][0] if name in FEATURES else 1 if name in CLOCK else None
+            width = features[name]["shape"][0] if name in features else 1 if name in CLOCK else None
             if width is None or values.size == width * len(values):
                 frames[name] = values if width is None or width > 1 else values.reshape(-1)
             # Another width is said by the rule on features.

@@ -8,10 +8,10 @@ import numpy as np
 from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, ForeignRecordingError
-from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
+from ..features import ACTION, ENVIRONMENT_STATE, STATE
 from ..files.listing import broken_links, distinct_files
 from ..recording.log import read_episode
-from ..task import RECORD_HZ
+from ..task import get_task
 from .episode_table import COLUMN_TYPES, EpisodeTable
 from .finding import Finding
 
@@ -41,7 +41,10 @@ def read_recordings(root: Path) -> EpisodeTable:
             damage.append(Finding(label, rule, None, None, "error", message))
             continue
         damage += not_verified(label, episode)
-        if len(episode.actions):
+        if episodes and episode.task != episodes[0].task:
+            found = f"a recording of the task {episode.task!r} beside those of {episodes[0].task!r}"
+            damage.append(Finding(label, "foreign", None, None, "error", found))
+        elif len(episode.actions):
             episodes.append(episode)
             labels.append(label)
         else:
@@ -61,8 +64,9 @@ def recordings_table(
 
     Args:
         labels: how findings name them.
-        episodes: of at least one step each.
+        episodes: of one task, of at least one step each.
     """
+    task = get_task(episodes[0].task) if episodes else get_task()
     lengths = np.array([len(episode.actions) for episode in episodes], np.int64)
     columns = {
         name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[kind])
@@ -71,23 +75,24 @@ def recordings_table(
     frames: dict[str, np.ndarray] = {}
     final_states = None
     if episodes:
-        maps = np.array([environment_state(episode.map_config) for episode in episodes])
+        scenarios = np.array([task.scenario_vector(episode.scenario) for episode in episodes])
         frames = {
             STATE: np.concatenate([episode.states for episode in episodes]),
             ACTION: np.concatenate([episode.actions for episode in episodes]),
-            ENVIRONMENT_STATE: np.repeat(maps, lengths, axis=0),
+            ENVIRONMENT_STATE: np.repeat(scenarios, lengths, axis=0),
         }
         final_states = np.array([episode.final_state for episode in episodes])
     return EpisodeTable(
         root,
         "recordings",
-        float(RECORD_HZ),
+        float(task.spec.record_hz),
         tuple(labels),
         {**columns, "length": lengths},
         frames,
         np.arange(len(episodes)),
         np.cumsum(lengths) - lengths,
         final_states,
-        np.array([episode.map_config.obstacle_size for episode in episodes], float),
+        np.array([task.columns_of(episode.scenario).get("obstacle_size", 0) for episode in episodes], float),
         damage=damage,
+        task=task,
     )

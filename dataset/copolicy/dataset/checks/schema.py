@@ -5,10 +5,9 @@ from typing import get_args
 
 import numpy as np
 
-from ..episode import EPISODE_COLUMNS, Source, TerminationReason
-from ..features import ACTION, FEATURES, HUMAN_ACTION
+from ..episode import EPISODE_COLUMNS, Source, termination_reasons
+from ..features import ACTION, HUMAN_ACTION, features_of
 from ..lerobot_folder.info import stripped_hint
-from ..task import RECORD_HZ
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit
@@ -23,21 +22,20 @@ CLOCK_FEATURES: dict[str, dict] = {
 }
 """The features that LeRobot adds to every data set."""
 
-_CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
-
 
 def _format(table: EpisodeTable) -> Iterator[Finding]:
     version = str(table.info.get("codebase_version"))
     if not version.startswith("v3."):
         yield Finding("", "schema", version, "v3.x", "error", "another version of LeRobot's format")
-    if table.fps not in [rate for rate in range(1, RECORD_HZ + 1) if RECORD_HZ % rate == 0]:
-        message = f"the rate is no divisor of {RECORD_HZ} Hz"
-        yield Finding("", "schema", table.fps, f"a divisor of {RECORD_HZ}", "error", message)
+    record_hz = table.task.spec.record_hz
+    if not table.fps or record_hz % table.fps:
+        message = f"the rate is no divisor of {record_hz} Hz"
+        yield Finding("", "schema", table.fps, f"a divisor of {record_hz}", "error", message)
 
 
 def _features(table: EpisodeTable) -> Iterator[Finding]:
-    features = table.info["features"]
-    for name, expected in {**FEATURES, **CLOCK_FEATURES}.items():
+    features, ours = table.info["features"], features_of(table.task.spec)
+    for name, expected in {**ours, **CLOCK_FEATURES}.items():
         entry = features.get(name)
         if entry is None:
             yield Finding("", "schema", None, None, "error", f"no feature {name} in meta/info.json")
@@ -51,7 +49,7 @@ def _features(table: EpisodeTable) -> Iterator[Finding]:
         if not table.files:
             continue  # that no file can be read is said elsewhere, once
         if name not in table.files:
-            if name in FEATURES:
+            if name in ours:
                 yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
             continue
         kind, width = {"float32": "float"}.get(expected["dtype"], expected["dtype"]), expected["shape"][0]
@@ -70,7 +68,8 @@ def _columns(table: EpisodeTable) -> Iterator[Finding]:
         hint = stripped_hint(table.info, table.root) if "episode_uuid" in missing and table.kind == "lerobot" else ""
         message = f"meta/episodes has no usable columns {', '.join(missing)}{hint}"
         yield Finding("", "schema", len(missing), 0, "error", message)
-    for name, choices in _CHOICES.items():
+    reasons = termination_reasons(table.task.spec)
+    for name, choices in {"source": get_args(Source), "termination_reason": reasons}.items():
         if name in table.columns:
             values = table.columns[name]
             unknown = ~np.isin(values, choices)
@@ -104,7 +103,7 @@ def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _alignment(table: EpisodeTable) -> Iterable[Finding]:
-    human, stored = table.frames[ACTION][:, 2:], table.frames[HUMAN_ACTION]
+    human, stored = np.split(table.frames[ACTION], 2, axis=1)[1], table.frames[HUMAN_ACTION]
     previous = np.zeros_like(human)
     previous[1:] = human[:-1]
     previous[table.starts] = 0

@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, get_args
 
-from ..episode import Source, TerminationReason
+from ..episode import OTHER_REASONS, Source
 from ..exceptions import InvalidValueError, RunError
 from ..lerobot_folder.episode_rows import chosen_episodes
+from ..task import get_task, installed_tasks
 from .expression import parse_condition
-
-RESULTS = ("success", "failure", *get_args(TerminationReason))
-"""What an episode may have come to: success or failure, or how exactly it ended."""
 
 Row = Mapping[str, Any]
 
@@ -24,7 +22,7 @@ class Selection:
         pairs, map_sets, map_ids, sources: values of the episode columns.
         players: at either seat.
         consents: one of the ids in `consent_id`, which may hold several.
-        results: of `RESULTS`.
+        results: `success`, `failure`, or how exactly an episode ended.
         where: a condition (`expression.parse_condition`).
         drop_excluded: without what is discarded or excluded.
     """
@@ -41,8 +39,10 @@ class Selection:
     drop_excluded: bool = False
 
     def __post_init__(self):
+        reasons = (reason for name in installed_tasks() for reason in get_task(name).spec.reasons)
+        results = ("success", "failure", *dict.fromkeys(reasons), *OTHER_REASONS) if self.results else ()
         for name, values, choices in (
-            ("--results", self.results, RESULTS),
+            ("--results", self.results, results),
             ("--sources", self.sources, get_args(Source)),
         ):
             for value in values:

@@ -9,10 +9,11 @@ import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
-from ..features import ACTION, FEATURES, STATE
+from ..features import ACTION, STATE, features_of
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
-from .info import read_info, require_episodes, stripped_hint
+from ..task import PairTask
+from .info import read_info, require_episodes, stripped_hint, task_of
 from .tables import column_types, damaged, episode_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
@@ -62,6 +63,11 @@ class LeRobotFolder:
         return cls(root, info, table)
 
     @property
+    def task(self) -> PairTask:
+        """The task of the data set, as `task_of`."""
+        return task_of(self.info)
+
+    @property
     def lengths(self) -> list[int]:
         """Frames of each episode."""
         return self.episodes.column("length").to_pylist()
@@ -100,16 +106,16 @@ class LeRobotFolder:
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
     def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:
-        """Checks that the data set is one of this task.
+        """Checks that the data set is one of its task.
 
         Raises:
             FileFormatError: a feature is missing or has another shape, as in a data set of another task.
+            UnknownNameError: its task is not installed.
         """
         difference = other_task(self.info, features)
         if difference:
-            raise FileFormatError(
-                self.root / INFO_FILE, "a data set of carrying a table (copolicy-convert)", difference
-            )
+            expected = f"a data set of {self.task.spec.title} (copolicy-convert)"
+            raise FileFormatError(self.root / INFO_FILE, expected, difference)
 
     def require_frames(self, features: Sequence[str]) -> None:
         """Checks that every data file has the columns of some features.
@@ -147,13 +153,14 @@ def read_episodes(root: Path) -> pa.Table:
 
 
 def other_task(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) -> str:
-    """What makes a feature table one of another task; empty where nothing does."""
+    """What makes a feature table none of the task that its robot type names; empty where nothing does."""
+    expected = features_of(task_of(info).spec)
     for name in features:
         feature = info["features"].get(name)
         if feature is None:
             present = ", ".join(name for name in info["features"] if name not in ("timestamp", "frame_index"))
             return f"one of another task: no feature {name} ({present[:120]})"
-        shape = tuple(FEATURES[name]["shape"])
+        shape = tuple(expected[name]["shape"])
         if tuple(feature["shape"]) != shape:
             return f"one of another task: {name} of shape {tuple(feature['shape'])} instead of {shape}"
     return ""

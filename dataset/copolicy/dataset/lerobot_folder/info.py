@@ -10,12 +10,28 @@ from ..files.file_kinds import kind_of
 from ..files.json_file import read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
-
-ROBOT_TYPE = "copolicy_table"
-"""The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes."""
+from ..task import PairTask, get_task
 
 _OURS = "copolicy"  # begins the robot types of our data sets
 _WHAT = "LeRobot's data set information"
+
+
+def robot_type(task: str) -> str:
+    """The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes: it names their task.
+
+    It survives LeRobot's tools and keeps sets of different tasks from being merged.
+    """
+    return f"{_OURS}_{task}"
+
+
+def task_of(info: Mapping[str, Any]) -> PairTask:
+    """The task of a data set; the table where its robot type names none.
+
+    Raises:
+        UnknownNameError: the task is not installed.
+    """
+    ours, _, name = str(info.get("robot_type") or "").partition("_")
+    return get_task(name if ours == _OURS and name else "table")
 
 
 class Feature(TypedDict):

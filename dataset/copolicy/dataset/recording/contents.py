@@ -1,10 +1,9 @@
 """What a walk over a recording collects, and the episode that it makes in the end."""
 
-import math
 import zlib
 from array import array
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -13,16 +12,14 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
-from copolicy.tasks.table.map_config import MapConfig
-
 from ..episode import Episode
 from ..exceptions import FileFormatError, ForeignRecordingError
 from ..physics_text import physics_text
-from ..task import RECORD_HZ
+from ..task import PairTask
 from . import episode_records
 from .mcap_chunks import MESSAGE_HEAD, chunk_records, walk_chunk
 from .mcap_records import RecordWalk
-from .messages.copolicy_pb2 import EpisodeEvent, PlayerAction, TableState
+from .messages.copolicy_pb2 import EpisodeEvent
 from .soundness import (
     RECOVERY,
     UNVERIFIED,
@@ -33,20 +30,20 @@ from .soundness import (
     require_version,
     sole_records,
 )
-from .topics import ACTIONS, EVENT, SCHEMA_PACKAGE, TABLE_STATE, Topic, channel_difference
-
-_MOTION = (TABLE_STATE, *ACTIONS)
+from .task_messages import messages_of
+from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
 
 
 class RecordingContents:
-    """What a walk over a file has collected so far: 88 bytes a step and the events, whatever else the file holds.
+    """What a walk over a file has collected so far: states, actions and the events, whatever else the file holds.
 
     Attributes:
         check_sums: what of the file carries one.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, task: PairTask):
+        self.path, self.task, self._task_messages = path, task, messages_of(task)
+        self._motion_topics = (self._task_messages.state, *self._task_messages.actions)
         self.check_sums = CheckSums()
         self._declared: dict[tuple[int, int], bytes] = {}
         self._schemas: dict[int, Schema] = {}
@@ -56,11 +53,11 @@ class RecordingContents:
         self._read: set[str] = set()  # topics of ours with a channel that can be read
         self._ours = False  # a channel has a schema of ours, of this version or another
         self._records: dict[str, list[dict[str, str]]] = {}
-        self._maps: set[bytes] = set()
+        self._scenarios: set[bytes] = set()
         self._messages = 0
         self._events: list[EpisodeEvent] = []
-        self._steps = {topic.name: array("q") for topic in _MOTION}
-        self._values = {topic.name: array("d") for topic in _MOTION}
+        self._steps = {topic.name: array("q") for topic in self._motion_topics}
+        self._values = {topic.name: array("d") for topic in self._motion_topics}
 
     @property
     def events(self) -> tuple[EpisodeEvent, ...]:
@@ -99,8 +96,8 @@ class RecordingContents:
         if expected not in (0, zlib.crc32(body[:-4])):
             raise ValueError("an attachment that fails its check sum")
         attachment = Attachment.read(ReadDataStream(BytesIO(body)))
-        if attachment.name == episode_records.MAP_ATTACHMENT:
-            self._maps.add(attachment.data)
+        if attachment.name == self._task_messages.scenario_file:
+            self._scenarios.add(attachment.data)
             self.check_sums.map = expected != 0
 
     def _declare(self, opcode: int, body: bytes) -> None:
@@ -123,7 +120,7 @@ class RecordingContents:
             raise ValueError(f"a channel without its schema of number {channel.schema_id}")
         self._ours |= schema is not None and schema.name.startswith(SCHEMA_PACKAGE)
         self._topics.add(channel.topic)
-        for topic in (*_MOTION, EVENT):
+        for topic in (*self._motion_topics, EVENT):
             if topic.name == channel.topic:
                 difference = channel_difference(channel, schema, topic)
                 if difference:
@@ -137,23 +134,15 @@ class RecordingContents:
         if topic is EVENT:
             return lambda payload: self._events.append(EpisodeEvent.FromString(payload))
         step, extend = self._steps[topic.name].append, self._values[topic.name].extend
-        if topic is TABLE_STATE:
-            parse_state = TableState.FromString
+        is_state = topic is self._task_messages.state
+        decode = self._task_messages.decode_state if is_state else self._task_messages.decode_action
 
-            def take_state(payload: bytes) -> None:
-                state = parse_state(payload)
-                step(state.step)
-                extend((state.x, state.y, state.theta, state.vx, state.vy, state.omega))
+        def take(payload: bytes) -> None:
+            number, values = decode(payload)
+            step(number)
+            extend(values)
 
-            return take_state
-        parse_action = PlayerAction.FromString
-
-        def take_action(payload: bytes) -> None:
-            action = parse_action(payload)
-            step(action.step)
-            extend((action.fx, action.fy))
-
-        return take_action
+        return take
 
     def require_this_task(self, summary_topics: Sequence[str] = ()) -> None:
         """Checks that the file is a recording of this task and of a version that this reader knows.
@@ -179,55 +168,61 @@ class RecordingContents:
             FileFormatError: it is not whole.
             InvalidValueError: the metadata or the map are not what they should be.
         """
-        path, records = self.path, sole_records(self.path, self._records)
+        path, settings_type = self.path, self.task.settings_type
+        records = sole_records(path, self._records, (setting.name for setting in fields(settings_type)))
         for topic in self._steps:
             if topic in self._differences and topic not in self._read:
                 raise FileFormatError(path, "a recording of this task", self._differences[topic])
-        meta = episode_records.decode(records)
-        physics = episode_records.decode_physics(records)
-        if len(self._maps) != 1:
-            found = "none" if not self._maps else f"{len(self._maps)} of them"
-            raise FileFormatError(path, f"an attachment {episode_records.MAP_ATTACHMENT!r}", found)
+        task, spec = self.task, self.task.spec
+        meta = episode_records.decode(records, spec)
+        settings = episode_records.decode_settings(records, task)
+        if len(self._scenarios) != 1:
+            found = "none" if not self._scenarios else f"{len(self._scenarios)} of them"
+            raise FileFormatError(path, f"an attachment {self._task_messages.scenario_file!r}", found)
         fps = records["dataset_info"].get("fps")
-        if fps != str(RECORD_HZ):
-            raise FileFormatError(path, f"a recording at {RECORD_HZ} Hz", f"fps {fps!r}")
+        if fps != str(spec.record_hz):
+            raise FileFormatError(path, f"a recording at {spec.record_hz} Hz", f"fps {fps!r}")
         require_statistics(path, walk, self._messages + walk.counts[Opcode.MESSAGE])
         states, actions = self._motion(records[episode_records.RESULT].get("steps"))
         sums = self.check_sums
         sums.data = walk.data_verified
         if not sums.data:
             sums.start = require_start_digest(path, records)
-        config = MapConfig.from_json(*self._maps)
-        seen = {"physics": physics_text(physics), "obstacle_size": config.obstacle_size}
+        scenario = task.scenario_of_json(*self._scenarios)
+        seen = {"physics": physics_text(settings), **task.columns_of(scenario)}
         meta = replace(meta, source_sha256=walk.sha256, **seen)
         # What a recovered file could not verify in its source, its own check sums do not vouch for.
         earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")
         notes = (*filter(None, (earlier,)), *sums.notes())
-        return Episode(states[:-1], actions, states[-1], meta, config, RECORD_HZ, physics, notes)
+        final = states[-1]
+        return Episode(states[:-1], actions, final, meta, scenario, spec.record_hz, settings, notes, spec.name)
 
     def _motion(self, expected: str | None) -> tuple[np.ndarray, np.ndarray]:
-        """States `(T + 1, 7)` and actions `(T, 4)` by step, whatever the order of their messages.
+        """States `(T + 1, n)` and actions `(T, m)` by step, whatever the order of their messages.
 
         Args:
             expected: steps, as the result of the episode counts them.
         """
-        count = len(self._steps[TABLE_STATE.name]) - 1
+        spec, (state, *actions) = self.task.spec, self._motion_topics
+        count = len(self._steps[state.name]) - 1
         if expected != str(count):
             raise FileFormatError(self.path, f"states of {expected} steps and the final one", f"{count + 1} states")
         values = []
-        for topic, length in ((TABLE_STATE, count + 1), *((topic, count) for topic in ACTIONS)):
+        for topic, length in ((state, count + 1), *((topic, count) for topic in actions)):
             steps = np.asarray(self._steps[topic.name])
             order = np.argsort(steps, kind="stable")
             if not np.array_equal(steps[order], np.arange(length)):
                 gap = _first_gap(steps[order], length)
                 raise FileFormatError(self.path, f"steps 0 to {length - 1} in {topic.name}", gap)
-            values.append(np.asarray(self._values[topic.name]).reshape(length, 6 if topic is TABLE_STATE else 2)[order])
-        table, actions = values[0], np.hstack(values[1:])
-        if not np.isfinite(table).all():
+            width = len(spec.recorded if topic is state else spec.action)
+            values.append(np.asarray(self._values[topic.name]).reshape(length, width)[order])
+        recorded, joint = values[0], np.hstack(values[1:])
+        if not np.isfinite(recorded).all():
             raise FileFormatError(self.path, "finite states", "others")
-        if not (np.abs(actions) <= 1).all():
-            raise FileFormatError(self.path, "actions in [-1, 1]", "others")
-        return _state_vectors(table), actions
+        low, high = spec.joint_action.bounds
+        if not ((low <= joint) & (joint <= high)).all():
+            raise FileFormatError(self.path, f"actions in {spec.joint_action.range}", "others")
+        return self.task.states_of(recorded), joint
 
 
 def _first_gap(steps: np.ndarray, count: int) -> str:
@@ -235,14 +230,3 @@ def _first_gap(steps: np.ndarray, count: int) -> str:
         return f"{len(steps)} messages"
     index = int(np.flatnonzero(steps != np.arange(count))[0])
     return f"step {steps[index]} in place {index}"
-
-
-def _state_vectors(table: np.ndarray) -> np.ndarray:
-    """`(T, 6)` x, y, theta, velocity to `(T, 7)`, with the same cosine as `features.state_vector`, to the last bit."""
-    thetas = table[:, 2].tolist()
-    states = np.empty((len(table), 7))
-    states[:, :2] = table[:, :2]
-    states[:, 2] = [math.cos(theta) for theta in thetas]
-    states[:, 3] = [math.sin(theta) for theta in thetas]
-    states[:, 4:] = table[:, 3:]
-    return states

@@ -4,21 +4,15 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any, get_args
 
-from copolicy.tasks.table.physics import Physics
-
-from ..episode import EPISODE_COLUMNS, EpisodeMeta, Source, TerminationReason
+from ..episode import EPISODE_COLUMNS, EpisodeMeta, Source, termination_reasons
 from ..exceptions import InvalidValueError
-from ..features import ACTION, FEATURES, STATE
-from ..task import RECORD_HZ
+from ..task import PairTask, TaskSpec
 
 SCHEMA_VERSION = "1"
 """Version of what a recording holds; a reader refuses one that it does not know."""
-
-MAP_ATTACHMENT = "map_config.json"
-"""Name of the attachment with the map, `MapConfig.to_json`."""
 
 COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "session": ("session_id",),
@@ -48,42 +42,37 @@ COLUMNS_AT_END = (
 START_DIGEST = "start_sha256"
 """The entry of the record `dataset_info` that vouches for all records at the start (`start_digest`)."""
 
-_CHOICES = {"source": get_args(Source), "termination_reason": get_args(TerminationReason)}
+TASK, TASK_SPEC = "task", "task_spec"
+"""The entries of the record `dataset_info` with the name of the task and its spec; the table where there is none."""
 
 
-def dataset_info() -> dict[str, str]:
+def dataset_info(spec: TaskSpec) -> dict[str, str]:
     """What a converter needs to know about the numbers, so that it need not know the program that wrote them."""
     return {
         "schema_version": SCHEMA_VERSION,
-        "fps": str(RECORD_HZ),
-        "state_names": json.dumps(FEATURES[STATE]["names"]),
-        "state_units": "px, px, 1, 1, px/s, px/s, rad/s",
-        "action_names": json.dumps(FEATURES[ACTION]["names"]),
-        "action_units": "a player's full force, [-1, 1]",
+        "fps": str(spec.record_hz),
+        "state_names": json.dumps(spec.state.names),
+        "state_units": ", ".join(spec.state.units),
+        "action_names": json.dumps(spec.joint_action.names),
+        "action_units": f"{', '.join(dict.fromkeys(spec.action.units))}, {spec.action.range}",
         "alignment": "the action of step k was taken in the state of step k; one more state follows the last action",
+        TASK: spec.name,
+        TASK_SPEC: json.dumps(spec.to_dict(), sort_keys=True),
     }
 
 
-def encode_physics(physics: Physics) -> dict[str, str]:
-    """The record `physics`: every setting of the dynamics, in exact digits."""
-    return {name: repr(value) for name, value in asdict(physics).items()}
+def encode_settings(settings: Any) -> dict[str, str]:
+    """The record `physics`: every setting of the world, in exact digits."""
+    return {name: repr(value) for name, value in asdict(settings).items()}
 
 
-def decode_physics(records: Mapping[str, Mapping[str, str]]) -> Physics:
-    """The inverse of `encode_physics` over all records of a recording.
+def decode_settings(records: Mapping[str, Mapping[str, str]], task: PairTask) -> Any:
+    """The inverse of `encode_settings` over all records of a recording.
 
     Raises:
         InvalidValueError: a setting is missing or no number.
     """
-    entries = records.get("physics", {})
-    settings: dict[str, Any] = {}
-    for setting in fields(Physics):
-        text = entries.get(setting.name)
-        try:
-            settings[setting.name] = int(text or "") if setting.name == "step_limit" else float(text or "")
-        except ValueError:
-            raise InvalidValueError(f"metadata record 'physics', entry {setting.name!r}", "a number", text) from None
-    return Physics(**settings)
+    return task.settings_of(records.get("physics", {}), "metadata record 'physics', entry '{}'")
 
 
 def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
@@ -105,8 +94,8 @@ def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:
     return {name: _encode(getattr(meta, name)) for name in columns}
 
 
-def decode(records: Mapping[str, Mapping[str, str]]) -> EpisodeMeta:
-    """The inverse of `encode` over all records of a recording.
+def decode(records: Mapping[str, Mapping[str, str]], spec: TaskSpec) -> EpisodeMeta:
+    """The inverse of `encode` over all records of a recording of a task.
 
     Raises:
         InvalidValueError: a record or one of its entries is missing or is not of its column's type.
@@ -118,7 +107,7 @@ def decode(records: Mapping[str, Mapping[str, str]]) -> EpisodeMeta:
         for name in names:
             if name not in records[record]:
                 raise InvalidValueError(f"metadata record {record!r}", f"an entry {name!r}", sorted(records[record]))
-            columns[name] = _decode(name, records[record][name])
+            columns[name] = _decode(name, records[record][name], spec)
     version = records["dataset_info"].get("schema_version")
     if version != SCHEMA_VERSION:
         raise InvalidValueError("schema_version", SCHEMA_VERSION, version)
@@ -131,7 +120,7 @@ def _encode(value: object) -> str:
     return repr(float(value)) if isinstance(value, float) else str(value)
 
 
-def _decode(name: str, text: str) -> object:
+def _decode(name: str, text: str, spec: TaskSpec) -> object:
     kind = EPISODE_COLUMNS[name]
     try:
         if kind == "bool":
@@ -145,6 +134,7 @@ def _decode(name: str, text: str) -> object:
             return number
     except (KeyError, ValueError):
         raise InvalidValueError(f"metadata entry {name!r}", kind, text) from None
-    if name in _CHOICES and text not in _CHOICES[name]:
-        raise InvalidValueError(f"metadata entry {name!r}", f"one of {_CHOICES[name]}", text)
+    choices = {"source": get_args(Source), "termination_reason": termination_reasons(spec)}.get(name)
+    if choices and text not in choices:
+        raise InvalidValueError(f"metadata entry {name!r}", f"one of {choices}", text)
     return text

@@ -13,11 +13,13 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from ..episode import Episode
-from ..exceptions import CopolicyError, FileFormatError
+from ..exceptions import CopolicyError, FileFormatError, ForeignRecordingError, UnknownNameError
 from ..files.file_kinds import kind_of
+from ..task import PairTask, get_task, installed_tasks
+from . import episode_records
 from .contents import RecordingContents
 from .mcap_chunks import LARGEST_CHUNK, UnreadChunkError
-from .mcap_records import RecordWalk, metadata_records
+from .mcap_records import RecordWalk, metadata_records, walk_metadata
 from .messages.copolicy_pb2 import EpisodeEvent
 
 _LARGEST: dict[int, int] = {
@@ -49,17 +51,18 @@ def read_recording(path: Path | str) -> Recording:
     Reads the file once, one chunk at a time, decodes nothing but states, actions and events, and verifies all that
     can be: the check sums of chunks, attachments, data section and summary where there are any, the counts of the
     summary, that every step from 0 has one state and two actions and the last one a state after it, the metadata,
-    and the map. `meta.source_sha256` is the digest of the file, `meta.physics` and
-    `meta.obstacle_size` are those of its record `physics` and of its map; `notes` say what carries no check sum.
+    and the scenario. `meta.source_sha256` is the digest of the file, `meta.physics` and
+    `meta.obstacle_size` are those of its record `physics` and of its scenario; `notes` say what carries no check sum.
 
     Raises:
         FileFormatError: the file cannot be read, is damaged or incomplete.
-        ForeignRecordingError: it is another project's, or of a version that this reader does not know.
+        ForeignRecordingError: it is another project's, of a task that is not installed, or of a version
+            that this reader does not know.
     """
     path = Path(path)
     with _as_format_error(path), path.open("rb") as file:
         walk = RecordWalk(path, file, path.stat().st_size)
-        contents = RecordingContents(path)
+        contents = RecordingContents(path, recorded_task(path))
         unread = ""
         for opcode, body in walk.records(_LARGEST):
             try:
@@ -85,6 +88,25 @@ def read_episode(path: Path | str) -> Episode:
         FileFormatError: see `read_recording`.
     """
     return read_recording(path).episode
+
+
+def recorded_task(path: Path) -> PairTask:
+    """The task of a recording, finished or not, as its metadata name it; the table where they name none.
+
+    Raises:
+        ForeignRecordingError: the task is not installed.
+    """
+    name = "table"
+    # Whoever reads the whole file says what is damaged.
+    with contextlib.suppress(Exception):
+        records = (record.metadata for record in walk_metadata(path) if record.name == "dataset_info")
+        info = next(info for info in records if episode_records.START_DIGEST in info)
+        name = info.get(episode_records.TASK, name)
+    try:
+        return get_task(name)
+    except UnknownNameError:
+        installed = ", ".join(installed_tasks())
+        raise ForeignRecordingError(path, f"a recording of a task that is installed ({installed})", name) from None
 
 
 def read_metadata(path: Path | str) -> dict[str, dict[str, str]]:

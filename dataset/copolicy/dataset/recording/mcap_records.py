@@ -153,7 +153,11 @@ def metadata_records(path: Path) -> dict[str, dict[str, str]]:
     Raises:
         FileFormatError: no MCAP file.
     """
-    records: dict[str, dict[str, str]] = {}
+    return {record.name: record.metadata for record in walk_metadata(path)}
+
+
+def walk_metadata(path: Path) -> Iterator[Metadata]:
+    """The metadata records of a file in their order, as `metadata_records` finds them."""
     size = path.stat().st_size
     with path.open("rb") as file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -163,8 +167,6 @@ def metadata_records(path: Path) -> dict[str, dict[str, str]]:
             if opcode in (0, Opcode.DATA_END, Opcode.FOOTER) or length > size - file.tell():
                 break
             if opcode == Opcode.METADATA and length <= _LARGEST:
-                record = Metadata.read(ReadDataStream(BytesIO(file.read(length))))
-                records[record.name] = record.metadata
+                yield Metadata.read(ReadDataStream(BytesIO(file.read(length))))
             else:
                 file.seek(length, 1)
-    return records

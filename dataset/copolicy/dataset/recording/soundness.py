@@ -23,7 +23,6 @@ _TOPICS_SHOWN = 5
 _ENTRIES: dict[str, tuple[str, ...]] = {
     **episode_records.COLUMNS_AT_START,
     "dataset_info": ("fps", episode_records.START_DIGEST),
-    "physics": ("angular_acceleration_limit", "step_limit"),
     episode_records.RESULT: episode_records.COLUMNS_AT_END,
 }
 """Entries by which a metadata record is told from another project's of the same name."""
@@ -70,18 +69,24 @@ class CheckSums:
         return (*self.content_notes(), f"the data section carries no check sum: {metadata}")
 
 
-def sole_records(path: Path, records: Mapping[str, Sequence[dict[str, str]]]) -> dict[str, dict[str, str]]:
+def sole_records(
+    path: Path, records: Mapping[str, Sequence[dict[str, str]]], settings: Iterable[str]
+) -> dict[str, dict[str, str]]:
     """The metadata records of a file by name; of several of a name of ours, the one that has our entries.
 
     Another project may have a record of the same name beside ours.
 
+    Args:
+        settings: names of the settings of the task, the entries of the record `physics`.
+
     Raises:
         FileFormatError: several of a name are ours.
     """
+    known = {**_ENTRIES, "physics": tuple(settings)}
     chosen: dict[str, dict[str, str]] = {}
     for name, candidates in records.items():
-        if len(candidates) > 1 and name in _ENTRIES:
-            ours = [entries for entries in candidates if set(_ENTRIES[name]) <= set(entries)]
+        if len(candidates) > 1 and name in known:
+            ours = [entries for entries in candidates if set(known[name]) <= set(entries)]
             if len(ours) != 1:
                 raise FileFormatError(path, "one episode", f"a second metadata record {name!r}")
             candidates = ours

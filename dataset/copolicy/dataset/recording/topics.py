@@ -1,29 +1,25 @@
-"""The topics of a recording: their names, the message type of each, and what their channels say about units."""
+"""The topics of a recording: their names, the message type of each, and what their channels say about units.
+
+Those that depend on the task are in `task_messages`.
+"""
 
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from copolicy.tasks.table.map_config import MAX_OBSTACLES
-
 from ..task import PLAYERS
-from .messages.copolicy_pb2 import EpisodeEvent, Interaction, LoopTiming, PlayerAction, PlayerInput, TableState
+from .messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
 
 ENCODING = "protobuf"
 """Encoding of every message and of every schema."""
 
 SCHEMA_PACKAGE = "copolicy."
 """What the name of every message of ours begins with, in every version."""
-
-SCREEN_FRAME = "screen: origin top left, x right, y down, theta counter-clockwise on screen"
-SCENE_FRAME = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
 
 
 @dataclass(frozen=True)
@@ -40,51 +36,21 @@ class Topic:
         return self.message.DESCRIPTOR.full_name
 
 
-def _of_player(player: int) -> dict[str, str]:
+Record = tuple[Topic, bytes]
+"""A serialised message and its topic."""
+
+
+def of_player(player: int) -> dict[str, str]:
+    """What the metadata of a channel says of a player."""
     return {"player": str(player), "seat": PLAYERS[player]}
 
 
-TABLE_STATE = Topic(
-    "/table/state",
-    TableState,
-    {"units": "x, y: px; theta: rad; vx, vy: px/s; omega: rad/s; sim_time: s", "frame": SCREEN_FRAME},
-)
 INPUTS = tuple(
-    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **_of_player(player)})
+    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **of_player(player)})
     for player in range(2)
 )
-ACTIONS = tuple(
-    Topic(
-        f"/player/{player}/action",
-        PlayerAction,
-        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": SCREEN_FRAME, **_of_player(player)},
-    )
-    for player in range(2)
-)
-INTERACTION = Topic("/interaction", Interaction, {"units": "force: a player's full force; positive pulls apart"})
 LOOP_TIMING = Topic("/loop/timing", LoopTiming, {"units": "ns on the monotonic clock"})
 EVENT = Topic("/episode/event", EpisodeEvent)
-SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
-SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": SCENE_FRAME})
-
-# The same scene in the messages that Rerun's importer maps, which SceneUpdate is not one of.
-TABLE_FRAME = Topic("/scene/transform", FrameTransform, {"units": "m", "frame": SCENE_FRAME})
-MAP_SOLIDS = tuple(
-    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": SCENE_FRAME})
-    for name in ("goal", *(f"obstacle_{slot}" for slot in range(MAX_OBSTACLES)))
-)
-TABLE_SOLIDS = tuple(
-    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": "table: origin in its middle, turns with it"})
-    for name in ("table", *PLAYERS)
-)
-
-TOPICS = (
-    *(TABLE_STATE, *INPUTS, *ACTIONS, INTERACTION, LOOP_TIMING, EVENT),
-    *(SCENE_MAP, SCENE, TABLE_FRAME, *MAP_SOLIDS, *TABLE_SOLIDS),
-)
-"""Every topic of a recording, in the order of its channels."""
-
-_SCHEMA_NAMES = {(topic.name, topic.schema_name) for topic in TOPICS}
 
 
 @functools.cache
@@ -93,9 +59,10 @@ def schema_data(message: Any) -> bytes:
     return build_file_descriptor_set(message).SerializeToString(deterministic=True)
 
 
-def is_ours(channel: Channel, schema_name: str) -> bool:
-    """Whether a channel has the topic of one of ours, and its encoding and schema."""
-    return channel.message_encoding == ENCODING and (channel.topic, schema_name) in _SCHEMA_NAMES
+def is_ours(channel: Channel, schema_name: str, topics: Iterable[Topic]) -> bool:
+    """Whether a channel has one of some topics, its encoding and its schema."""
+    names = {(topic.name, topic.schema_name) for topic in topics}
+    return channel.message_encoding == ENCODING and (channel.topic, schema_name) in names
 
 
 def channel_difference(channel: Channel, schema: Schema | None, topic: Topic) -> str:

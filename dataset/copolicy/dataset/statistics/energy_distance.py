@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.stats import false_discovery_control
 
-from ..features import ACTION, BOUNDS, STATE
 from .estimate import Estimate, Null
 from .resampling import exchangeable, interval, permuted_within
 from .trajectories import Trajectories
@@ -52,10 +51,11 @@ def episode_distances(data: Trajectories, chosen: np.ndarray) -> np.ndarray:
     frames = np.concatenate(
         [np.linspace(data.starts[index], data.ends[index] - 1, each).round().astype(int) for index in chosen]
     )
+    spec = data.task.spec
     points = np.hstack(
         [
-            2 * (values[frames] - BOUNDS[key][0]) / (BOUNDS[key][1] - BOUNDS[key][0]) - 1
-            for key, values in ((STATE, data.states), (ACTION, data.actions))
+            2 * (values[frames] - low) / (high - low) - 1
+            for (low, high), values in ((spec.state.bounds, data.states), (spec.joint_action.bounds, data.actions))
         ]
     )
     result = np.empty((len(chosen), len(chosen)))

@@ -10,7 +10,6 @@ found for several numbers of neighbours and followed to a spread of zero.
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..features import BOUNDS, STATE
 from .estimate import Estimate
 from .resampling import Bootstrap, interval
 from .trajectories import Trajectories
@@ -30,7 +29,7 @@ def neighbour_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rando
     kept = np.unique(np.linspace(0, len(data.states) - 1, min(MAX_FRAMES, len(data.states))).astype(int))
     chosen = np.zeros(len(data.states), dtype=bool)
     chosen[rng.choice(kept, min(MAX_QUERIES, len(kept)), replace=False)] = True
-    low, high = BOUNDS[STATE]
+    low, high = data.task.spec.state.bounds
     scaled = (2 * (data.states - low) / (high - low) - 1).astype(np.float32)
     # Sums over the queries of each episode, for each number of neighbours.
     variances = np.zeros((len(NEIGHBOURS), len(data.rows), 4))

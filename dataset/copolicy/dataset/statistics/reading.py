@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import CopolicyError, FileFormatError, RunError
-from ..features import ACTION, ENVIRONMENT_STATE, FEATURES, STATE, map_of
+from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.tables import feature_values, read_parquet
 from .trajectories import EpisodeRow, Trajectories
@@ -16,7 +16,6 @@ _EPISODE_COLUMNS = (
     "episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class",
     "discarded", "obstacle_size",
 )  # fmt: skip
-_OBSTACLE_SIZE = 50  # px; of a map in no set, in a data set of an earlier version, which does not tell
 
 
 def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectories, dict[str, int]]:
@@ -35,7 +34,7 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
     info = folder.info
     rows = folder.rows(_EPISODE_COLUMNS)
-    states, actions, maps = _frames(folder)
+    states, actions, scenarios = _frames(folder)
     split_of = _splits(info.get("splits") or {}, len(rows))
     left_out = {"discarded": 0, "other_source": 0, "empty": 0}
     kept: list[tuple[np.ndarray, np.ndarray]] = []
@@ -54,22 +53,24 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
             left_out[reason] += 1
             continue
         kept.append((states[frames], actions[frames]))
-        kept_rows.append(_row(root, row, maps[index], split_of[index]))
+        kept_rows.append(_row(folder, row, scenarios[index], split_of[index]))
     if not kept:
         raise RunError(f"{root}: expected an episode to describe, found {len(rows)}, left out {left_out}")
-    return Trajectories.of(kept, kept_rows, int(info["fps"])), {name: n for name, n in left_out.items() if n}
+    return Trajectories.of(kept, kept_rows, int(info["fps"]), folder.task), {
+        name: n for name, n in left_out.items() if n
+    }
 
 
 def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States and actions of all frames, and the environment state of each episode."""
     parts: dict[str, list[np.ndarray]] = {STATE: [], ACTION: [], ENVIRONMENT_STATE: []}
     order: list[np.ndarray] = []
-    root, lengths = folder.root, folder.lengths
+    root, lengths, features = folder.root, folder.lengths, features_of(folder.task.spec)
     for path in folder.data_files:
         table = read_parquet(path, (*parts, "index"))
         order.append(feature_values(table, "index", (1,), path))
         for name in parts:
-            parts[name].append(feature_values(table, name, FEATURES[name]["shape"], path))
+            parts[name].append(feature_values(table, name, features[name]["shape"], path))
     places = np.concatenate(order)
     if len(places) != sum(lengths) or not np.array_equal(np.sort(places), np.arange(len(places))):
         raise FileFormatError(root / "data", f"{sum(lengths)} frames with index 0, 1, ..., each once", f"{len(places)}")
@@ -82,15 +83,13 @@ def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return states, actions, environment[firsts]
 
 
-def _row(root: Path, row: dict[str, Any], environment: np.ndarray, split: str) -> EpisodeRow:
-    guessed = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
-    size = row["obstacle_size"] or guessed
+def _row(folder: LeRobotFolder, row: dict[str, Any], vector: np.ndarray, split: str) -> EpisodeRow:
     try:
-        config = map_of(environment, size)
+        scenario = folder.task.scenario_of_vector(vector, row)
     except CopolicyError as error:
-        raise FileFormatError(root, f"a map in episode {row['episode_index']}", str(error)) from None
+        raise FileFormatError(folder.root, f"a map in episode {row['episode_index']}", str(error)) from None
     names = ("episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class")
-    return EpisodeRow(**{name: row[name] for name in names}, map_config=config, split=split)
+    return EpisodeRow(**{name: row[name] for name in names}, map_config=scenario, split=split)
 
 
 def _splits(splits: Mapping[str, str], episodes: int) -> list[str]:

@@ -1,16 +1,14 @@
 """The episodes of a data set as flat arrays, the form that all statistics start from."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from copolicy.tasks.table.map_config import MapConfig
-
-from ..exceptions import ShapeError
-from ..features import theta_of
-from ..interaction import interaction_force
+from ..exceptions import RunError, ShapeError
+from ..task import PairTask, get_task
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class EpisodeRow:
     source: str
     success: bool
     duration_s: float
-    map_config: MapConfig
+    map_config: Any  # the scenario
     route_class: str = ""
     split: str = ""
 
@@ -33,10 +31,11 @@ class Trajectories:
     """Episodes one after the other.
 
     Attributes:
-        states: `(N, 7)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s) of all frames.
-        actions: `(N, 4)` robot xy, human xy in [-1, 1].
+        states: `(N, n)` of all frames, by `TaskSpec.state`.
+        actions: `(N, m)`, by `TaskSpec.joint_action`.
         lengths: `(E,)` frames of each episode.
         fps: frames a second.
+        task: that the episodes are of.
     """
 
     states: np.ndarray
@@ -44,12 +43,13 @@ class Trajectories:
     lengths: np.ndarray
     rows: tuple[EpisodeRow, ...]
     fps: int
+    task: PairTask = field(default_factory=get_task)
 
     def __post_init__(self):
-        frames = int(self.lengths.sum())
+        frames, spec = int(self.lengths.sum()), self.task.spec
         for name, array, shape in (
-            ("Trajectories.states", self.states, (frames, 7)),
-            ("Trajectories.actions", self.actions, (frames, 4)),
+            ("Trajectories.states", self.states, (frames, len(spec.state))),
+            ("Trajectories.actions", self.actions, (frames, len(spec.joint_action))),
             ("Trajectories.lengths", self.lengths, (len(self.rows),)),
         ):
             if array.shape != shape:
@@ -57,15 +57,20 @@ class Trajectories:
 
     @classmethod
     def of(
-        cls, episodes: Sequence[tuple[np.ndarray, np.ndarray]], rows: Sequence[EpisodeRow], fps: int
+        cls,
+        episodes: Sequence[tuple[np.ndarray, np.ndarray]],
+        rows: Sequence[EpisodeRow],
+        fps: int,
+        task: PairTask | None = None,
     ) -> "Trajectories":
-        """From the states `(T, 7)` and actions `(T, 4)` of each episode."""
+        """From the states `(T, n)` and actions `(T, m)` of each episode of a task, the table by default."""
         return cls(
             np.concatenate([states for states, _ in episodes]),
             np.concatenate([actions for _, actions in episodes]),
             np.array([len(states) for states, _ in episodes]),
             tuple(rows),
             fps,
+            task or get_task(),
         )
 
     @cached_property
@@ -85,8 +90,15 @@ class Trajectories:
 
     @cached_property
     def force(self) -> np.ndarray:
-        """`(N,)` interaction force, in units of a player's full force; positive pulls apart."""
-        return interaction_force(theta_of(self.states), self.actions)
+        """`(N,)` the task's interaction measure; of the table in units of a player's full force, positive pulls apart.
+
+        Raises:
+            RunError: the task has none.
+        """
+        measured = self.task.interaction(self.states, self.actions)
+        if measured is None:
+            raise RunError(self.task.missing("interaction measure"))
+        return measured
 
     @cached_property
     def pairs(self) -> np.ndarray:
@@ -97,13 +109,14 @@ class Trajectories:
     def configurations(self) -> np.ndarray:
         """`(E,)` name of each episode's configuration: its map, and the obstacles where a name stands for several."""
         names = [row.map_id or f"map-{row.map_config.digest}" for row in self.rows]
-        first: dict[str, tuple] = {}
-        for name, row in zip(names, self.rows, strict=True):
-            first.setdefault(name, layout(row.map_config))
+        layouts = [self.task.layout(row.map_config) for row in self.rows]
+        first: dict[str, Any] = {}
+        for name, layout in zip(names, layouts, strict=True):
+            first.setdefault(name, layout)
         return np.array(
             [
-                name if first[name] == layout(row.map_config) else f"{name}-{row.map_config.digest}"
-                for name, row in zip(names, self.rows, strict=True)
+                name if first[name] == layout else f"{name}-{row.map_config.digest}"
+                for name, layout, row in zip(names, layouts, self.rows, strict=True)
             ]
         )
 
@@ -113,21 +126,19 @@ class Trajectories:
         return np.unique(self.configurations, return_inverse=True)[1]
 
     def groups(self, with_goal: bool) -> list[np.ndarray]:
-        """Episodes that share obstacles, and with `with_goal` the goal: the indices of each group."""
-        members: dict[tuple, list[int]] = {}
+        """Episodes that share a layout, and with `with_goal` the goal: the indices of each group."""
+        members: dict[Any, list[int]] = {}
         for index, row in enumerate(self.rows):
-            members.setdefault((layout(row.map_config), row.map_config.goal if with_goal else ()), []).append(index)
+            members.setdefault(self.task.layout(row.map_config, with_goal), []).append(index)
         return [np.array(group) for _, group in sorted(members.items())]
 
     def path(self, index: int) -> np.ndarray:
-        """`(T, 2)` the table's centre in an episode, px."""
-        return self.states[self.starts[index] : self.ends[index], :2]
+        """`(T, 2)` the point that the task tracks in an episode; of the table its centre, px."""
+        path = self.task.path(self.states[self.starts[index] : self.ends[index]])
+        if path is None:
+            raise RunError(self.task.missing("tracked point"))
+        return path
 
     def per_episode(self, values: np.ndarray) -> np.ndarray:
         """Sum of a value of the frames `(N,)` over each episode, `(E,)`."""
         return np.add.reduceat(values.astype(float), self.starts)
-
-
-def layout(config: MapConfig) -> tuple[tuple[float, float], ...]:
-    """The obstacles of a map, whatever their order."""
-    return tuple(sorted(config.obstacles))

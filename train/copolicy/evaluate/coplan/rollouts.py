@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from copolicy.dataset import clock
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE, environment_state
-from copolicy.dataset.interaction import interaction_force
+from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import RECORD_HZ
+from copolicy.tasks.table.features import environment_state
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import identify
 from copolicy.tasks.table.physics import Physics

@@ -9,10 +9,8 @@ import numpy as np
 from copolicy.collect.session import recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.features import theta_of
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.recording.log import Recording, read_recording
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task import RECORD_HZ, get_task
 
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX
@@ -64,7 +62,7 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
     episode = recording.episode
     meta = episode.meta
     after = np.vstack((episode.states[1:], episode.final_state))
-    force = np.abs(interaction_force(theta_of(after), episode.actions))
+    force = np.abs(get_task(episode.task).interaction(after, episode.actions))
     row: dict[str, Any] = {
         "participant": meta.pair_id,
         "trial": "",

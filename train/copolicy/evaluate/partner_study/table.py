@@ -5,10 +5,10 @@ import zlib
 import numpy as np
 
 from copolicy.dataset.clock import frame_actions
-from copolicy.dataset.features import environment_state
-from copolicy.dataset.interaction import interaction_force
 from copolicy.dataset.task import Outcome as End
 from copolicy.tasks.table.agents.partners import simulated_partner
+from copolicy.tasks.table.features import environment_state
+from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld

@@ -12,11 +12,16 @@ from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
+from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task import PLAYERS
 
 from ..map_config import WINDOW, MapConfig
 from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
 from ..physics import GOAL_SIZE
+
+FRAME_WORDS = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
+SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": FRAME_WORDS})
+SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": FRAME_WORDS})
 
 FRAME = "world"
 METRES_PER_PIXEL = 0.01

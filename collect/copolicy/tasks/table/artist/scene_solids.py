@@ -9,16 +9,17 @@ from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 
-from copolicy.collect.recording.episode_messages import Record
-from copolicy.dataset.recording.topics import MAP_SOLIDS, TABLE_FRAME, TABLE_SOLIDS
+from copolicy.dataset.recording.topics import Record, Topic
+from copolicy.dataset.task import PLAYERS
 
-from ..map_config import MapConfig
+from ..map_config import MAX_OBSTACLES, MapConfig
 from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from .scene import (
     BOARD_CENTRE,
     COLOURS,
     FRAME,
+    FRAME_WORDS,
     HEIGHT,
     METRES_PER_PIXEL,
     Pose,
@@ -28,6 +29,16 @@ from .scene import (
 )
 
 TABLE_FRAME_ID = "table"
+
+TABLE_FRAME = Topic("/scene/transform", FrameTransform, {"units": "m", "frame": FRAME_WORDS})
+MAP_SOLIDS = tuple(
+    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": FRAME_WORDS})
+    for name in ("goal", *(f"obstacle_{slot}" for slot in range(MAX_OBSTACLES)))
+)
+TABLE_SOLIDS = tuple(
+    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": "table: origin in its middle, turns with it"})
+    for name in ("table", *PLAYERS)
+)
 
 _INSET = 0.002  # m: inside the solids of the SceneUpdate, so that a viewer which draws both shows no flicker
 _CHANNELS = ("red", "green", "blue", "alpha")

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from copolicy.tasks.table.physics import Physics
+from .physics import Physics
 
 _FIXED_POINT_STEPS = 20  # the iteration contracts by at least 8 a step
 

@@ -1,0 +1,55 @@
+"""The numbers of the table and its map in data sets: state and scenario vectors, there and back."""
+
+import math
+
+import numpy as np
+
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import bounds_of, features_of
+
+from .map_config import MapConfig
+from .spec import SPEC
+
+STATE_NAMES, ENVIRONMENT_NAMES, ACTION_NAMES = SPEC.state.names, SPEC.scenario.names, SPEC.joint_action.names
+FEATURES, BOUNDS = features_of(SPEC), bounds_of(SPEC)
+TASK = SPEC.sentence
+
+
+def state_vector(pose: tuple[float, float, float], velocity: tuple[float, float, float]) -> np.ndarray:
+    """`(7,)` observation of the table from its pose (px, px, rad) and velocity (px/s, px/s, rad/s)."""
+    x, y, theta = pose
+    return np.array((x, y, math.cos(theta), math.sin(theta), *velocity))
+
+
+def theta_of(states: np.ndarray) -> np.ndarray:
+    """Orientation in [0, 2 pi) of states `(..., 7)`, rad."""
+    return np.arctan2(states[..., 3], states[..., 2]) % (2 * math.pi)
+
+
+def states_7(states: np.ndarray) -> np.ndarray:
+    """`(..., 6)` with theta to `(..., 7)` with its cosine and sine, whose last bit may not be that of `math.cos`."""
+    cosine, sine = np.cos(states[..., 2]), np.sin(states[..., 2])
+    return np.concatenate((states[..., :2], cosine[..., None], sine[..., None], states[..., 3:]), axis=-1)
+
+
+def environment_state(config: MapConfig) -> np.ndarray:
+    """`(11,)` observation of a map: start pose, goal, and obstacles padded with zeros."""
+    vector = np.zeros(len(ENVIRONMENT_NAMES))
+    values = (*config.start, *config.goal, *(value for centre in config.obstacles for value in centre))
+    vector[: len(values)] = values
+    return vector
+
+
+def map_of(vector: np.ndarray, obstacle_size: int) -> MapConfig:
+    """The map behind an `environment_state` vector `(11,)`; its zero padding tells the number of obstacles.
+
+    Raises:
+        InvalidValueError: an obstacle stands behind an empty slot.
+    """
+    values = [float(value) for value in vector]
+    slots = [(values[i], values[i + 1]) for i in range(5, len(values), 2)]
+    count = sum(slot != (0.0, 0.0) for slot in slots)
+    if any(slot == (0.0, 0.0) for slot in slots[:count]):
+        raise InvalidValueError("environment_state", "obstacles before the zero padding", slots)
+    x, y, theta, goal_x, goal_y = values[:5]
+    return MapConfig((x, y, theta), (goal_x, goal_y), tuple(slots[:count]), obstacle_size)
