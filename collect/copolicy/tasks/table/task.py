@@ -68,8 +68,8 @@ class TableTask(PairTask):
         return environment_state(scenario)
 
     def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> MapConfig:
-        """The map of an `environment_state`; the size of its obstacles is the episode column `obstacle_size`."""
-        return map_of(vector, columns["obstacle_size"])
+        """The map of an `environment_state`; the episode columns tell the size of its obstacles."""
+        return map_of(vector, columns["obstacle_size"], columns.get("obstacle_sizes", ""))
 
     def make_world(self, scenario: MapConfig, settings: Physics | None = None) -> "TableWorld":
         """A table at rest at the start of a map."""

@@ -8,7 +8,7 @@ import numpy as np
 from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, ForeignRecordingError
-from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state
+from ..features import ACTION, ENVIRONMENT_STATE, STATE, environment_state, sizes_text
 from ..files.listing import broken_links, distinct_files
 from ..recording.log import read_episode
 from ..task import RECORD_HZ
@@ -68,6 +68,8 @@ def recordings_table(
         name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[kind])
         for name, kind in EPISODE_COLUMNS.items()
     }
+    columns["obstacle_size"] = np.array([episode.map_config.obstacle_size for episode in episodes], np.int64)
+    columns["obstacle_sizes"] = np.array([sizes_text(episode.map_config) for episode in episodes], str)
     frames: dict[str, np.ndarray] = {}
     final_states = None
     if episodes:
@@ -88,6 +90,5 @@ def recordings_table(
         np.arange(len(episodes)),
         np.cumsum(lengths) - lengths,
         final_states,
-        np.array([episode.map_config.obstacle_size for episode in episodes], float),
         damage=damage,
     )

@@ -17,6 +17,7 @@ from copolicy.tasks.table.map_config import MapConfig
 
 from ..episode import Episode
 from ..exceptions import FileFormatError, ForeignRecordingError
+from ..features import sizes_text
 from ..physics_text import physics_text
 from ..task import RECORD_HZ
 from . import episode_records
@@ -199,6 +200,7 @@ class RecordingContents:
             sums.start = require_start_digest(path, records)
         config = MapConfig.from_json(*self._maps)
         seen = {"physics": physics_text(physics), "obstacle_size": config.obstacle_size}
+        seen["obstacle_sizes"] = sizes_text(config)
         meta = replace(meta, source_sha256=walk.sha256, **seen)
         # What a recovered file could not verify in its source, its own check sums do not vouch for.
         earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")

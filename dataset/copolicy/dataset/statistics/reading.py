@@ -14,7 +14,7 @@ from .trajectories import EpisodeRow, Trajectories
 
 _EPISODE_COLUMNS = (
     "episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class",
-    "discarded", "obstacle_size",
+    "discarded", "obstacle_size", "obstacle_sizes",
 )  # fmt: skip
 _OBSTACLE_SIZE = 50  # px; of a map in no set, in a data set of an earlier version, which does not tell
 
@@ -86,7 +86,7 @@ def _row(root: Path, row: dict[str, Any], environment: np.ndarray, split: str) -
     guessed = 45 if row["map_id"].startswith(("holdout", "unseen")) else _OBSTACLE_SIZE
     size = row["obstacle_size"] or guessed
     try:
-        config = map_of(environment, size)
+        config = map_of(environment, size, row["obstacle_sizes"])
     except CopolicyError as error:
         raise FileFormatError(root, f"a map in episode {row['episode_index']}", str(error)) from None
     names = ("episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class")

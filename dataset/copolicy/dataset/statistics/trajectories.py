@@ -128,6 +128,7 @@ class Trajectories:
         return np.add.reduceat(values.astype(float), self.starts)
 
 
-def layout(config: MapConfig) -> tuple[tuple[float, float], ...]:
-    """The obstacles of a map, whatever their order."""
-    return tuple(sorted(config.obstacles))
+def layout(config: MapConfig) -> tuple[tuple[float, float, int], ...]:
+    """The obstacles of a map, whatever their order: x, y, and the side where sides differ within the map, else 0."""
+    sizes = config.obstacle_sizes or (0,) * len(config.obstacles)
+    return tuple(sorted((x, y, size) for (x, y), size in zip(config.obstacles, sizes, strict=True)))
