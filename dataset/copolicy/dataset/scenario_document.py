@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 import yaml
@@ -63,7 +63,9 @@ class Document:
             raise FileFormatError(path, f"{_WHAT} of at most {_MOST_BYTES} bytes", f"{path.stat().st_size}")
         text = read_text(path)
         try:
-            self.content = json.loads(text) if path.suffix.lower() == ".json" else self._yaml(text)
+            self.content = (
+                json.loads(text, object_pairs_hook=_once) if path.suffix.lower() == ".json" else self._yaml(text)
+            )
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             line = "" if mark is None else f" in line {mark.line + 1}"
@@ -118,7 +120,7 @@ class Document:
                 problems.append(self.problem(place, f"expected a mapping, found {_kind(value)}"))
                 return value
             known = {field.name: field for field in msgspec.structs.fields(kind)}
-            for key in value.keys() - known.keys():
+            for key in (key for key in value if key not in known):
                 close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
                 hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
                 problems.append(self.problem(_joined(place, str(key)), f"unknown key; {hint}"))
@@ -127,8 +129,9 @@ class Document:
                     problems.append(self.problem(place, f"no {name}"))
             there = [name for name in known if name in value]
             return {name: self._held(value[name], known[name].type, _joined(place, name), problems) for name in there}
-        if get_origin(kind) is list and isinstance(value, list):
-            (item,) = get_args(kind)
+        plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        if get_origin(plain) is list and isinstance(value, list):
+            (item,) = get_args(plain)
             return [self._held(one, item, f"{place}[{index}]", problems) for index, one in enumerate(value)]
         try:
             msgspec.convert(value, kind)
@@ -157,6 +160,13 @@ class _Loader(yaml.SafeLoader):
             mark = self.peek_event().start_mark
             raise yaml.MarkedYAMLError(problem="an alias (*name), which is not read", problem_mark=mark)
         return super().compose_node(parent, index)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    keys = [key for key, _ in pairs]
+    if len(set(keys)) < len(keys):
+        raise ValueError(f"the key {next(key for key in keys if keys.count(key) > 1)!r} twice in one mapping")
+    return dict(pairs)
 
 
 def _joined(place: str, key: str) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .exceptions import UnknownNameError
 
 if TYPE_CHECKING:
-    import argparse
+    from .scenario_document import Problem
 
 SUFFIXES = (".yaml", ".yml", ".json")
 """Endings of scenario files."""
@@ -52,50 +52,42 @@ class ScenarioSet:
 
     Attributes:
         task: name of the task that they are of.
-        version: `1` for a set that comes with the task.
-        scenarios: each once, but where a set repeats one.
-        names: of the scenarios.
+        version: as the file states it; `1` for a set that comes with the task.
+        scenarios: each once, but where a set that comes with the task repeats one.
         weights: how often each comes up beside one of weight 1.
         splits: indices of the scenarios of each named split.
         split: name of the split that this is, empty for the whole set.
-        digest: sixteen hexadecimal digits over names, scenarios, weights and splits of the whole set.
         from_file: the set is not one that comes with the task.
+        digest: sixteen hexadecimal digits over scenarios, weights and splits of the whole set.
     """
 
     task: str
     name: str
     version: str
     scenarios: tuple[Any, ...]
-    names: tuple[str, ...]
     weights: tuple[int, ...]
     splits: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     split: str = ""
-    digest: str = ""
     from_file: bool = False
+    digest: str = ""
 
     def __post_init__(self):
         if not self.digest:
-            object.__setattr__(self, "digest", self._digest())
-
-    def _digest(self) -> str:
-        rows = zip(self.names, self.scenarios, self.weights, strict=True)
-        content = [[name, json.loads(one.to_json()), weight] for name, one, weight in rows]
-        text = json.dumps([content, {name: list(indices) for name, indices in self.splits.items()}], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+            rows = [[one.to_json(), weight] for one, weight in zip(self.scenarios, self.weights, strict=True)]
+            text = json.dumps([rows, {name: list(indices) for name, indices in self.splits.items()}], sort_keys=True)
+            object.__setattr__(self, "digest", hashlib.sha256(text.encode()).hexdigest()[:16])
 
     def part(self, split: str) -> "ScenarioSet":
-        """The scenarios of a named split, in the order of the set.
+        """The scenarios of a named split, in the order that the split has them.
 
         Raises:
             UnknownNameError: the set has no such split.
         """
         if split not in self.splits:
             raise UnknownNameError(f"split of {self.name}", split, self.splits or ["none"])
-        scenarios, names, weights = (
-            tuple(column[index] for index in self.splits[split])
-            for column in (self.scenarios, self.names, self.weights)
-        )
-        return replace(self, scenarios=scenarios, names=names, weights=weights, splits={}, split=split)
+        places = self.splits[split]
+        scenarios, weights = (tuple(column[place] for place in places) for column in (self.scenarios, self.weights))
+        return replace(self, scenarios=scenarios, weights=weights, splits={}, split=split)
 
     @property
     def label(self) -> str:
@@ -109,33 +101,20 @@ class ScenarioSet:
         return tuple(scenario for scenario, weight in pairs for _ in range(weight))
 
     def describe(self) -> dict[str, str]:
-        """Name, version and digest, as results keep them."""
+        """Name, version and digest, as results have them."""
         return {"name": self.label, "version": self.version, "digest": self.digest}
 
 
-@dataclass(frozen=True)
-class Problem:
-    """Something wrong in a scenario file.
-
-    Attributes:
-        place: where in the file, such as `maps[2].start`.
-    """
-
-    place: str
-    message: str
-
-    def __str__(self) -> str:
-        return f"{self.place}: {self.message}" if self.place else self.message
-
-
 class ScenarioFiles(ABC):
-    """How a task keeps scenarios in files; the optional part of a task behind `--maps FILE` and `maps`.
+    """How a task writes scenarios into files: the part of a task behind `--maps FILE` and `copolicy-collect maps`.
 
     Attributes:
         schema: JSON schema of a file.
+        bounds: within which `make` draws, lowest and highest value by name, where nothing else is asked for.
     """
 
     schema: Mapping[str, Any]
+    bounds: Mapping[str, tuple[float, float]]
 
     @abstractmethod
     def read(self, path: Path) -> ScenarioSet:
@@ -146,7 +125,7 @@ class ScenarioFiles(ABC):
         """
 
     @abstractmethod
-    def problems(self, path: Path) -> list[Problem]:
+    def problems(self, path: Path) -> "list[Problem]":
         """Everything that is wrong with a file; empty where it can be used.
 
         Raises:
@@ -155,18 +134,21 @@ class ScenarioFiles(ABC):
 
     @abstractmethod
     def draw(self, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
-        """Draws every scenario of a set into one PNG, whose size in px it returns."""
-
-    @abstractmethod
-    def add_make_flags(self, command: "argparse.ArgumentParser") -> None:
-        """The flags of `maps make` that say within which bounds scenarios are drawn."""
-
-    @abstractmethod
-    def make(self, name: str, count: int, seed: int, arguments: "argparse.Namespace") -> str:
-        """The text of a file with scenarios drawn at random, the same for the same arguments; `problems` finds none.
+        """Draws every scenario of a set into one PNG, whose width and height in px it returns.
 
         Raises:
-            RunError: the bounds leave no room for so many.
+            OutputExistsError: the file exists.
+        """
+
+    @abstractmethod
+    def make(self, name: str, count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+        """The content of a file with scenarios drawn at random, in which `problems` finds nothing.
+
+        Args:
+            bounds: all of them, those of `ScenarioFiles.bounds` among them.
+
+        Raises:
+            RunError: they leave no room for so many.
         """
 
 

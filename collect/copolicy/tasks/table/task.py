@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from copolicy.dataset.features import environment_state, map_of
+from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask, TaskSpec, Vector
 
 from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
-from .maps import MAP_SETS, identify
+from .maps import MAP_SETS, identify, turned
 from .physics import Physics
 
 if TYPE_CHECKING:
+    from .map_files import MapFiles
     from .world import TableWorld
 
 _WIDTH, _HEIGHT = (float(side) for side in WINDOW)
@@ -90,3 +92,18 @@ class TableTask(PairTask):
     def identify(self, scenario: MapConfig) -> tuple[str, str]:
         """Name of a map and of its set, whatever the order of its obstacles; see `maps.identify`."""
         return identify(scenario)
+
+    def name_of(self, scenario: MapConfig) -> ScenarioName:
+        """The name that a map of a file has with it, or that of a map of a set."""
+        return scenario.named or super().name_of(scenario)
+
+    @property
+    def scenario_files(self) -> "MapFiles":
+        """Map files."""
+        from .map_files import MapFiles  # PyYAML
+
+        return MapFiles()
+
+    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
+        """See `maps.turned`."""
+        return turned(chosen)
