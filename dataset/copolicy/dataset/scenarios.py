@@ -101,8 +101,9 @@ class ScenarioSet:
         return tuple(scenario for scenario, weight in pairs for _ in range(weight))
 
     def describe(self) -> dict[str, str]:
-        """Name, version and digest, as results have them."""
-        return {"name": self.label, "version": self.version, "digest": self.digest}
+        """Name, version and digest, as results have them, and whether they are of a `file` or of the `task`."""
+        origin = "file" if self.from_file else "task"
+        return {"name": self.label, "version": self.version, "digest": self.digest, "from": origin}
 
 
 class ScenarioFiles(ABC):
