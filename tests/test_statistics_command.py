@@ -12,7 +12,8 @@ from copolicy.dataset.cli import main
 from copolicy.dataset.command_line.commands import _lines
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
-from copolicy.dataset.statistics.command import summary, write_document
+from copolicy.dataset.files.staging import replace_json
+from copolicy.dataset.statistics.command import summary
 from copolicy.dataset.statistics.reading import read_trajectories
 from copolicy.tasks.table.routes import route_class
 
@@ -92,9 +93,9 @@ def test_a_target_that_is_a_folder_is_refused_before_the_work(folder, tmp_path, 
 
 def test_a_document_that_cannot_be_written_leaves_the_old_file(tmp_path):
     path = tmp_path / "statistics.json"
-    write_document({"a": 1}, path)
+    replace_json(path, {"a": 1}, allow_nan=False)
     with pytest.raises(ValueError, match="nan"):
-        write_document({"a": float("nan")}, path)
+        replace_json(path, {"a": float("nan")}, allow_nan=False)
     assert json.loads(path.read_text(encoding="utf-8")) == {"a": 1}
     assert list(tmp_path.iterdir()) == [path]
 

@@ -64,7 +64,7 @@ def test_visitation_of_eight_cells_alike_is_three_bits():
 
 
 def test_cells_in_an_obstacle_are_not_free():
-    assert free_cells(ONE.obstacles, 50).sum() == 48 * 24 - 4
+    assert free_cells(ONE.squares).sum() == 48 * 24 - 4
 
 
 def test_pairs_on_separate_cells_diverge_by_a_bit_and_alike_by_none():

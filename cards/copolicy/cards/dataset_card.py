@@ -140,6 +140,13 @@ def _physics(facts: DatasetFacts) -> str:
 
 def _episodes(facts: DatasetFacts) -> str:
     total = len(facts.episodes)
+    sets: dict[str, list[dict]] = {name: [] for name in facts.values("map_set")}
+    for episode in facts.episodes:
+        if episode["map_set_digest"]:
+            file = f"version {episode['map_set_version']}, {episode['map_set_digest']}"
+            sets.setdefault(f"{episode['map_set']} ({file})", []).append(episode)
+        elif episode["map_set"]:
+            sets[episode["map_set"]].append(episode)
     maps = [
         (
             name,
@@ -147,8 +154,8 @@ def _episodes(facts: DatasetFacts) -> str:
             len(members),
             share(sum(e["success"] for e in members), len(members)),
         )
-        for name in facts.values("map_set")
-        if (members := [e for e in facts.episodes if e["map_set"] == name])
+        for name, members in sorted(sets.items())
+        if members
     ]
     reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
     routes = [(route or "none", count) for route, count in facts.counts("route_class").items()]

@@ -62,11 +62,10 @@ def _by_obstacles(facts: DatasetFacts) -> tuple[int, list[tuple[str, list[tuple[
     """How many sets of obstacles there are; title and members of the most frequent, fewest obstacles first."""
     groups: dict[tuple, list[tuple[dict, EpisodeFrames]]] = defaultdict(list)
     for episode, frames in zip(facts.episodes, read_frames(facts), strict=True):
-        config = frames.map_config
-        groups[config.obstacle_size, tuple(sorted(config.obstacles))].append((episode, frames))
+        groups[frames.map_config.obstacle_size, frames.map_config.layout].append((episode, frames))
     largest = sorted(groups, key=lambda key: -len(groups[key]))[:_MOST_PANELS]
     return len(groups), [
-        (" ".join(f"({x:.0f}, {y:.0f})" for x, y in key[1]) or "no obstacle", groups[key])
+        (" ".join(f"({x:.0f}, {y:.0f})" for (x, y), _ in key[1]) or "no obstacle", groups[key])
         for key in sorted(largest, key=lambda key: (len(key[1]), key))
     ]
 
@@ -95,8 +94,7 @@ def _panel(axis, title: str, members: Sequence[tuple[dict, EpisodeFrames]]) -> N
     for x, y in {frames.map_config.goal for _, frames in members}:
         corner = (x - GOAL_SIZE / 2, y - GOAL_SIZE / 2)
         axis.add_patch(Rectangle(corner, GOAL_SIZE, GOAL_SIZE, fill=False, edgecolor=_GOAL))
-    for x, y in config.obstacles:
-        size = config.obstacle_size
+    for (x, y), size in config.squares:
         axis.add_patch(Rectangle((x - size / 2, y - size / 2), size, size, color=_OBSTACLE))
     for episode, frames in members:
         x, y = frames.states[:, 0], frames.states[:, 1]

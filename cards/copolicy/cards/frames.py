@@ -73,7 +73,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
                 named = f"episode {episode['episode_index']} with {episode['length']} frames" if episode else "its end"
                 raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
             try:
-                config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode))
+                config = map_of(columns[ENVIRONMENT_STATE][start], _obstacle_size(episode), episode["obstacle_sizes"])
             except CopolicyError as error:
                 raise FileFormatError(path, f"a map in episode {found[0]}", str(error)) from None
             yield EpisodeFrames(found[0], columns[STATE][start:end], columns[ACTION][start:end], config)

@@ -46,6 +46,7 @@ def _result(evaluation: Mapping[str, Any]) -> EvalResult:
     arguments |= {key: evaluation["policy"][key] for key in _POLICY if evaluation["policy"].get(key) is not None}
     if settings.get("partners"):
         arguments["partners"] = sorted(settings["partners"])
+    maps = settings.get("map_set") or {}
     return EvalResult(
         task_type="robotics",
         task_name=f"table carrying, {evaluation['study']} (simulation)",
@@ -53,6 +54,7 @@ def _result(evaluation: Mapping[str, Any]) -> EvalResult:
         dataset_name=f"{settings['maps']} maps{'' if whole else ', a part of them'}",
         dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
         dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else 'maps'}",
+        dataset_revision=f"{maps['version']}-{maps['digest']}" if maps.get("from") == "file" else None,
         dataset_args=arguments,
         metric_type="success_rate",
         metric_name=f"success rate over {success['episodes']} episodes",

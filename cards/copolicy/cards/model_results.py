@@ -41,7 +41,7 @@ def _plain_row(evaluation: dict[str, Any]) -> tuple[object, ...]:
     planning = number((summary.get("planning_ms_per_call") or {}).get("p50"))
     return (
         evaluation["study"],
-        _maps(settings),
+        _maps(settings) + _turned(settings),
         _sampler(evaluation["policy"]),
         *_success(summary["success"]),
         settings.get("seed", "not stated"),
@@ -76,7 +76,7 @@ def _partners(evaluation: dict[str, Any]) -> str:
         )
     about = (
         f"With simulated partners on {settings.get('configurations', settings.get('map_count'))} starts of the "
-        f"{settings['maps']} maps, {settings.get('actions_per_plan', 'a number not stated of')} action(s) a plan, "
+        f"{_maps(settings)} maps, {settings.get('actions_per_plan', 'a number not stated of')} action(s) a plan, "
         f"{_sampler(evaluation['policy'])}, evaluation seed {settings.get('seed', 'not stated')}. The last columns are "
         "the success with each kind of partner."
     )
@@ -94,9 +94,14 @@ def _percent(success: dict[str, Any] | None) -> str:
 
 
 def _maps(settings: dict[str, Any]) -> str:
+    """Name of the set, and version and digest of one from a file."""
+    maps = settings.get("map_set") or {}
+    return settings["maps"] + (f" (version {maps['version']}, {maps['digest']})" if maps.get("from") == "file" else "")
+
+
+def _turned(settings: dict[str, Any]) -> str:
     part = "" if settings.get("complete_set", True) else f", first {settings['map_count']}"
-    turned = ", four start orientations" if settings.get("orientations") else ""
-    return settings["maps"] + part + turned
+    return part + (", four start orientations" if settings.get("orientations") else "")
 
 
 def _sampler(policy: dict[str, Any]) -> str:

@@ -9,12 +9,13 @@ from typing import Any
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number, workers
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
-from copolicy.tasks.table.maps import MAP_SETS
 
 from .demonstration.command import add_demo_command
+from .map_commands import add_maps_command
 from .play.command import add_play_command
 from .replay.command import add_replay_command
 from .simulate.recipes import RECIPES
@@ -41,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--workers", type=workers(), help="processes (default: one for each processor)")
     # None where a flag is not given, so that a recipe can refuse it instead of passing over it.
     command.add_argument("--seed", type=seed(), help="of the schedule and of the pilots (default 0)")
-    command.add_argument("--maps", choices=sorted(MAP_SETS), dest="map_set", help="set of maps (default training)")
+    add_maps_flag(command, "training", "map_set", given=False)
     command.add_argument(
         "--orientations", action="store_true", default=None, help="each map with four start orientations"
     )
@@ -65,6 +66,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--damaged", action="store_true", help="also recover the intact beginning of damaged finished recordings"
     )
+    add_maps_command(commands)
     add_replay_command(commands)
     add_demo_command(commands)
     command = add_command(

@@ -51,7 +51,11 @@ class EpisodeMeta:
     software_version: str = ""
     source_sha256: str = ""
     physics: str = ""  # see physics_text
-    obstacle_size: int = 0  # px, 0 where it is not known
+    obstacle_size: int = 0  # px, 0 where it is not known; of the largest where they differ
+    obstacle_sizes: str = ""  # px of each, comma separated, where they differ
+    map_set_version: str = ""  # of a set from a file
+    map_set_digest: str = ""
+    map_weight: int = 1  # how often the map comes up beside one of weight 1
 
     def __post_init__(self):
         for column in fields(self):
@@ -68,7 +72,13 @@ def _type_name(column) -> str:
 EPISODE_COLUMNS: dict[str, str] = {column.name: _type_name(column) for column in fields(EpisodeMeta)}
 """Name and type (`str`, `int`, `float`, `bool`) of every episode column, in order."""
 
-LATER_COLUMNS: tuple[str, ...] = ("physics", "obstacle_size")
+SET_COLUMNS: tuple[str, ...] = ("map_set_version", "map_set_digest", "map_weight")
+"""Episode columns of maps from a file; recordings and content hashes have them only where they say something."""
+
+UNHASHED_DEFAULTS: tuple[str, ...] = ("obstacle_sizes", *SET_COLUMNS)
+"""Episode columns that the content hash leaves out where they have their default."""
+
+LATER_COLUMNS: tuple[str, ...] = ("physics", "obstacle_size", *UNHASHED_DEFAULTS)
 """Episode columns that data sets of earlier versions lack; readers take the default of `EpisodeMeta` for them."""
 
 LATER_DEFAULTS: dict[str, Any] = {

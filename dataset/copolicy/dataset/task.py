@@ -14,11 +14,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
+from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, is_file_name
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -317,6 +319,42 @@ class PairTask(ABC):
                 if known.digest == scenario.digest:
                     return f"{set_name}-{index:02d}", set_name
         return f"custom-{scenario.digest}", "custom"
+
+    def name_of(self, scenario: Any) -> ScenarioName:
+        """Name of a scenario, of its set, and of the file that it is from; its `columns` go into recordings."""
+        return ScenarioName(*self.identify(scenario))
+
+    @property
+    def scenario_files(self) -> ScenarioFiles | None:
+        """How scenarios are written into files."""
+        return None
+
+    def scenario_set(self, text: str) -> ScenarioSet:
+        """The scenarios behind `--maps`: the name of a set, a file, or one of its splits as `FILE#split`.
+
+        Raises:
+            UnknownNameError: no such set or split.
+            FileFormatError: the file is none, has a problem, or is of another task.
+            InvalidValueError: the task has no scenario files.
+        """
+        if text in self.scenario_sets:
+            scenarios = tuple(self.scenario_sets[text])
+            return ScenarioSet(self.spec.name, text, "1", scenarios, (1,) * len(scenarios))
+        if not is_file_name(text):
+            raise UnknownNameError("map set", text, [*self.scenario_sets, "FILE.yaml"])
+        if self.scenario_files is None:
+            raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
+        path, _, split = text.partition("#")
+        chosen = self.scenario_files.read(Path(path))
+        return chosen.part(split) if split else chosen
+
+    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
+        """A set with each scenario in several start orientations.
+
+        Raises:
+            InvalidValueError: the task has none.
+        """
+        raise InvalidValueError("--orientations", "no such flag", self.missing("start orientations"))
 
     def missing(self, part: str) -> str:
         """The sentence with which a command leaves out what needs a part that the task does not offer."""

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.files.staging import require_new
-from copolicy.tasks.table.maps import MAP_SETS, map_set
+from copolicy.dataset.task import get_task
 
 from .comparison import add_compare_command
 from .human_study import add_human_command
@@ -29,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         study_needs,
     )
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    coplan.add_argument("--maps", default="holdout", choices=sorted(MAP_SETS), help="map set (default: holdout)")
+    add_maps_flag(coplan, "holdout")
     coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     coplan.add_argument(
         "--repeats", type=whole_number("--repeats", 1, 10_000), default=1, help="episodes a map (default: 1)"
@@ -49,13 +50,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _coplan(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
+    chosen = get_task().scenario_set(arguments.maps)
+    if arguments.orientations:
+        chosen = get_task().turned(chosen)
+    maps = chosen.scenarios[: arguments.limit]
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .coplan.figure import save_trajectories
     from .coplan.rollouts import coplan
     from .summary import summarise
 
     planner = planner_of(arguments.policy, arguments)
-    maps = map_set(arguments.maps, arguments.orientations)[: arguments.limit]
     protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
     with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
         outcomes = coplan(
@@ -74,7 +78,8 @@ def _coplan(arguments: argparse.Namespace) -> dict:
         "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
         "policy": planner.describe(),
         "settings": {
-            "maps": arguments.maps,
+            "maps": chosen.label,
+            "map_set": chosen.describe(),
             "orientations": arguments.orientations,
             "map_count": len(maps),
             "complete_set": arguments.limit is None,
@@ -87,9 +92,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     success = summary["success"]
     percent = f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %"
-    save_trajectories(
-        outcomes, picture, f"co-planning on {arguments.maps}: {percent} of {success['episodes']} episodes"
-    )
+    save_trajectories(outcomes, picture, f"co-planning on {chosen.label}: {percent} of {success['episodes']} episodes")
     write_json(arguments.out, result)  # last, so that a result is there whole or not at all
     return {
         "success": percent,

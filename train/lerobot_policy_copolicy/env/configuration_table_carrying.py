@@ -9,7 +9,7 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs import EnvConfig
 
 from copolicy.dataset.clock import stride
-from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import (
     ACTION,
     ENVIRONMENT_STATE,
@@ -19,8 +19,8 @@ from copolicy.dataset.features import (
     SCENE_SIDES,
     SCENE_SIZE,
 )
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.features import FEATURES
-from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 
 FEATURES_MAP = {**OBSERVATION_KEYS, SCENE_IMAGE: SCENE_IMAGE, ACTION: ACTION}
@@ -54,6 +54,7 @@ class TableCarryingEnvConfig(EnvConfig):
 
     Raises:
         UnknownNameError: no such map set.
+        FileFormatError: a file of maps that cannot be used.
         InvalidValueError: `fps` does not divide 30, a limit that is not positive, or a size that no image of a data
             set has.
     """
@@ -73,8 +74,7 @@ class TableCarryingEnvConfig(EnvConfig):
 
     def __post_init__(self):
         stride(self.fps)
-        if self.map_set not in MAP_SETS:
-            raise UnknownNameError("map set", self.map_set, MAP_SETS)
+        get_task().scenario_set(self.map_set)
         Physics(self.angular_acceleration_limit, self.step_limit)
         shape = require_image_size(self.observation_width, self.observation_height)
         self.features.pop(SCENE_IMAGE, None)  # a stored configuration may come with another choice of `pixels`

@@ -11,11 +11,10 @@ from gymnasium.envs.registration import EnvSpec
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE
-from copolicy.dataset.task import RUNNING
+from copolicy.dataset.task import RUNNING, get_task
 from copolicy.tasks.table.features import BOUNDS, environment_state, theta_of
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import WINDOW, MapConfig
-from copolicy.tasks.table.maps import map_set as maps_of
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
 
@@ -59,7 +58,7 @@ class TableCarryingEnv(gymnasium.Env):
 
     Args:
         fps: actions a second, a divisor of 30.
-        map_set: name of a set of maps.
+        map_set: name of a set of maps, a file of maps, or one of its splits as `FILE#split`.
         orientations: start each map in four orientations.
         step_limit: steps of 1/30 s after which an episode is truncated.
         angular_acceleration_limit: rad/s^2.
@@ -92,7 +91,8 @@ class TableCarryingEnv(gymnasium.Env):
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self.render_mode = render_mode
         self.task, self.task_description = _TASK, "Carry the table to the goal together."
-        self.maps = maps_of(map_set, orientations)
+        chosen = get_task().scenario_set(map_set)
+        self.maps = (get_task().turned(chosen) if orientations else chosen).scenarios
         self.physics = Physics(angular_acceleration_limit, step_limit)
         self.partner = partner
         self._spec: EnvSpec | None = None

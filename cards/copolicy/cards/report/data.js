@@ -7,7 +7,7 @@ const HEIGHT = data.window[1];
 const FRAME_SECONDS = data.frame_step / data.fps;
 
 const frameValues = decodeFrames(data.frames);
-const sizes = new Set(data.episodes.map((row) => row.map.size));
+const sides = new Set(data.episodes.flatMap((row) => row.map.sizes));
 const episodes = data.episodes.map((row) => ({
   ...row,
   layout: layoutName(row.map),
@@ -31,10 +31,11 @@ function column(episode, name) {
   return values;
 }
 
-function layoutName({ obstacles, size }) {
+function layoutName({ obstacles, sizes }) {
   if (!obstacles.length) return "no obstacle";
   const places = obstacles.map(([x, y]) => `(${x.toFixed(0)}, ${y.toFixed(0)})`).join(" ");
-  const wide = sizes.size > 1 ? ` of ${size} px` : "";
+  const own = [...new Set(sizes)].length > 1 ? sizes : sizes.slice(0, 1);
+  const wide = sides.size > 1 ? ` of ${own.join(", ")} px` : "";
   return `${obstacles.length} obstacle${obstacles.length > 1 ? "s" : ""}${wide} at ${places}`;
 }
 

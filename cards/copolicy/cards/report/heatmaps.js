@@ -64,11 +64,11 @@ function drawHeat(canvas, members, share, label) {
   });
   context.lineWidth = 3;
   for (const [, some] of groupBy(members, (episode) => episode.layout)) {
-    for (const [x, y] of some[0].map.obstacles) {
-      const side = some[0].map.size;
+    some[0].map.obstacles.forEach(([x, y], k) => {
+      const side = some[0].map.sizes[k];
       context.strokeStyle = colour("--ink");
       context.strokeRect(x - side / 2, y - side / 2, side, side);
-    }
+    });
   }
   context.strokeStyle = GOAL_COLOUR;
   for (const goal of new Set(members.map((episode) => String(episode.map.goal)))) {

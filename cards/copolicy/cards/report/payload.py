@@ -59,8 +59,8 @@ def build_payload(
                 "map": {
                     "start": config.start,
                     "goal": config.goal,
-                    "obstacles": sorted(config.obstacles),
-                    "size": config.obstacle_size,
+                    "obstacles": [centre for centre, _ in config.layout],
+                    "sizes": [size for _, size in config.layout],
                 },
                 "from": start,
                 "frames": len(block),

@@ -33,7 +33,10 @@ function drawStart(context, map) {
 
 function drawObstacles(context, map) {
   context.fillStyle = colour("--obstacle");
-  for (const [x, y] of map.obstacles) context.fillRect(x - map.size / 2, y - map.size / 2, map.size, map.size);
+  map.obstacles.forEach(([x, y], k) => {
+    const side = map.sizes[k];
+    context.fillRect(x - side / 2, y - side / 2, side, side);
+  });
 }
 
 /** Position on screen of a point of the table; theta turns counter-clockwise on screen. */

@@ -8,10 +8,10 @@ from typing import Any
 from copolicy.dataset.command_line.commands import add_command, progress
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task import RECORD_HZ, get_task
 from copolicy.tasks.table.agents import PAIRS
-from copolicy.tasks.table.maps import MAP_SETS
 
 from ..agents.checkpoint_folder import PRETRAINED
 
@@ -30,7 +30,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--policy", default=PRETRAINED, help="checkpoint folder (default: pretrained, the model of the package)"
     )
-    command.add_argument("--maps", choices=sorted(MAP_SETS), default="unseen", help="set of maps (default unseen)")
+    add_maps_flag(command, "unseen")
     command.add_argument(
         "--map",
         type=whole_number("--map", None),
@@ -48,7 +48,8 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
-    maps, path = MAP_SETS[arguments.maps], arguments.gif
+    chosen, path = get_task().scenario_set(arguments.maps), arguments.gif
+    maps = chosen.scenarios
     for name, value, least, most in (
         ("seed", arguments.seed, 0, 2**32 - 1),
         ("fps", arguments.fps, 1, 50),
@@ -86,7 +87,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         "learned": planner.conditions.to_json(),
         "partner": f"simulated, human of {arguments.partner}",
         "episodes": [
-            f"{arguments.maps} {place}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
+            f"{chosen.label} {place}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
             for place, track in zip(arguments.map, tracks, strict=True)
         ],
     }

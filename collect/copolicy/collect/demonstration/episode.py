@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.task import RUNNING
+from copolicy.dataset.task import RUNNING, get_task
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import identify
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
 
@@ -50,17 +49,16 @@ def demonstrate(
                 controller.executed(action)
     finally:
         robot.close()
-    map_id, map_set = identify(map_config)
+    name = get_task().name_of(map_config)
     meta = EpisodeMeta(
         "",
         controller_0=robot.name,
         controller_1=human.name,
-        map_id=map_id,
-        map_set=map_set,
+        **name.columns,
         seed=seed,
         source="simulated",
         success=outcome.success,
         termination_reason=outcome.reason,
     )
     episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config, settings=physics)
-    return track_of(Path(map_id), episode)
+    return track_of(Path(name.scenario), episode)

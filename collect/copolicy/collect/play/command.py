@@ -10,8 +10,8 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 
 from .settings import PilotSpec, PlaySettings
@@ -47,7 +47,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "that comes with the package; A begins on the robot's seat, unless B alone is a policy "
         "(default: the joysticks that are plugged in, the keyboard beside them)",
     )
-    command.add_argument("--maps", choices=sorted(MAP_SETS), default="training", help="set of maps (default training)")
+    add_maps_flag(command, "training")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument(
         "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"

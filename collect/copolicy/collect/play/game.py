@@ -7,10 +7,9 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task import RECORD_HZ, get_task
 from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import identify
 
 from ..recording.wall_clock import WallClockAnchor
 from ..screen.hud import Hud, SeatStatus
@@ -108,7 +107,6 @@ class Game:
         self._planned = planned
         seating = planned ^ self.swapped
         robot, human = self.players[seating], self.players[1 - seating]
-        map_id, map_set = identify(config)
         attempt = len(self.results) + self.folder.counts.tried.total()
         entropy = [self.settings.seed, *self.settings.pair.encode(), *self.folder.session_id.encode(), attempt]
         consents = [player.consent for player in (robot, human) if player.consent]
@@ -120,8 +118,7 @@ class Game:
             player_1_id=human.player_id,
             controller_0=robot.controller.name,
             controller_1=human.controller.name,
-            map_id=map_id,
-            map_set=map_set,
+            **get_task().name_of(config).columns,
             seed=int(np.random.SeedSequence(entropy).generate_state(1)[0]),
             source="human" if robot.person or human.person else "simulated",
             consent_id=",".join(consents),

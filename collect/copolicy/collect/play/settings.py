@@ -1,14 +1,16 @@
 """What a session is, as the command line says it."""
 
+import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.publication.licences import checked_licence
+from copolicy.dataset.scenarios import ScenarioSet
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.agents import PAIRS
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import MAP_SETS, map_set
 from copolicy.tasks.table.physics import Physics
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -56,7 +58,7 @@ class PlaySettings:
         pair: pseudonym of the pair; its players are `PAIR-a` and `PAIR-b`.
         out: folder of all sessions.
         pilots: of player a and b; None for what is plugged in.
-        maps: set of maps.
+        maps: set of maps, a file of maps, or one of its splits as `FILE#split`.
         orientations: each map with four start orientations.
         episodes: to be kept.
         practice: episodes to try things out before.
@@ -100,8 +102,7 @@ class PlaySettings:
         ):
             if value < least:
                 raise InvalidValueError(name, f"at least {least}", value)
-        if self.maps not in MAP_SETS:
-            raise UnknownNameError("map set", self.maps, MAP_SETS)
+        self.map_configs()
         if self.window is not None and not all(320 <= side <= 16384 for side in self.window):
             raise InvalidValueError("window", "WxH of at least 320x320", "{}x{}".format(*self.window))
         if not 0 <= self.countdown_s <= 60:
@@ -114,14 +115,21 @@ class PlaySettings:
         """Settings of the dynamics."""
         return Physics(angular_acceleration_limit=self.angular_limit)
 
+    @functools.cached_property
+    def scenarios(self) -> ScenarioSet:
+        """The maps to choose from, as a set."""
+        chosen = get_task().scenario_set(self.maps)
+        return get_task().turned(chosen) if self.orientations else chosen
+
     def map_configs(self) -> tuple[MapConfig, ...]:
         """The maps to choose from."""
-        return map_set(self.maps, self.orientations)
+        return self.scenarios.scenarios
 
     def fixed(self) -> dict:
         """What must not change within a session."""
         return {
-            "maps": self.maps,
+            "maps": self.scenarios.label,
+            **({"maps_digest": self.scenarios.digest} if self.scenarios.from_file else {}),
             "orientations": self.orientations,
             "seed": self.seed,
             "angular_limit": self.angular_limit,

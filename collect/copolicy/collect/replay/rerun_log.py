@@ -118,7 +118,7 @@ def _log_map(rr: Any, recording: Any, track: Track) -> None:
     goal = rr.Boxes2D(centers=[config.goal], sizes=[(GOAL_SIZE, GOAL_SIZE)], colors=[GREEN], labels=["goal"])
     recording.log("world/goal", goal, static=True)
     if config.obstacles:
-        sizes = [(config.obstacle_size, config.obstacle_size)] * len(config.obstacles)
+        sizes = [(size, size) for size in config.sizes]
         obstacles = rr.Boxes2D(centers=list(config.obstacles), sizes=sizes, colors=[mix(OBSTACLE, _GRAY, 0.5)])
         recording.log("world/obstacles", obstacles, static=True)
     for player, colour in zip(PLAYERS, SEATS, strict=True):

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import identify
 
 Configuration = tuple[str, int]
 """Map id, and who sits where: 0 with player a on the robot's seat, 1 with player b there."""
@@ -42,14 +42,16 @@ class Balance:
     def __init__(self, maps: Sequence[MapConfig], episodes: int, seed: int, pair: str, swap: bool, seating: int = 0):
         """
         Args:
-            maps: to choose from; repeated ones count once.
+            maps: to choose from; repeated ones count once, one of a file as often as its weight says.
             episodes: that the session is to keep.
             seed: of the choice among equals.
             pair: its name, so that pairs begin differently.
             swap: seats change in the middle; otherwise they stay as they are.
             seating: who sits where if they stay, see `Configuration`.
         """
-        self._maps = {identify(config)[0]: config for config in maps}
+        names = {get_task().name_of(config): config for config in maps}
+        self._maps = {name.scenario: config for name, config in names.items()}
+        self._weights = {name.scenario: name.weight for name in names}
         self._places = {name: (config.start, config.goal) for name, config in self._maps.items()}
         self._episodes = episodes
         self._entropy = [seed, *pair.encode()]
@@ -67,15 +69,16 @@ class Balance:
         names = list(self._maps)
         chance = np.random.default_rng([*self._entropy, counts.tried.total()]).permutation(len(names))
 
-        def burden(index: int) -> tuple[int, ...]:
+        def burden(index: int) -> tuple[float, ...]:
             name = names[index]
             own, other = (name, seating), (name, 1 - seating)
             start, goal = self._places[name]
+            weight = self._weights[name]
             return (
-                counts.kept[own],
-                counts.tried[own],
-                counts.tried[other],
-                counts.kept[other],
+                counts.kept[own] / weight,
+                counts.tried[own] / weight,
+                counts.tried[other] / weight,
+                counts.kept[other] / weight,
                 starts[start] + goals[goal],
                 int(chance[index]),
             )

@@ -19,11 +19,10 @@ from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
 from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.task import get_task
 from copolicy.dataset.worker_pool import WorkerPool
 from copolicy.tasks.table.agents import PAIRS
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import identify
-from copolicy.tasks.table.maps import map_set as maps_of
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.start_pose import displaced_start
 
@@ -55,7 +54,7 @@ def simulate(
         out: the folder; made if missing.
         episodes: how many.
         seed: of the schedule and of the pilots.
-        map_set: one of `MAP_SETS`.
+        map_set: name of a set of maps, a file of maps, or one of its splits as `FILE#split`.
         workers: processes; by default one for each processor.
         orientations: each map with four start orientations.
         pairs: names out of `PAIRS`; by default all.
@@ -71,6 +70,7 @@ def simulate(
     Raises:
         OutputExistsError: the folder holds recordings already, or is none; nothing was written.
         UnknownNameError: no such map set or pair.
+        FileFormatError: a file of maps that cannot be used.
         InvalidValueError: less than one episode or worker, or a negative seed.
         OSError: the disk refuses; no recording of this call is left.
     """
@@ -80,7 +80,9 @@ def simulate(
     for name, (value, bound) in least.items():
         if value < bound:
             raise InvalidValueError(name, f"at least {bound}", value)
-    maps = maps_of(map_set, orientations)
+    task = get_task()
+    chosen = task.scenario_set(map_set)
+    maps = (task.turned(chosen) if orientations else chosen).scheduled
     pairs = tuple(PAIRS) if pairs is None else tuple(pairs)
     for pair in pairs:
         if pair not in PAIRS:
@@ -88,7 +90,9 @@ def simulate(
     _refuse_recordings(out)
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
-    variant = f"{map_set}{'-orientations' if orientations else ''}"
+    # Other maps, other episodes: a file may have the name of another one.
+    variant = f"{chosen.label}-{chosen.digest}" if chosen.from_file else map_set
+    variant += f"{'-orientations' if orientations else ''}"
     variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
     variant += "" if clearance is None else f"-clearance_{clearance:g}"
     physics = physics or Physics()
@@ -112,7 +116,6 @@ def simulate(
 
 
 def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
-    map_id, map_set = identify(map_config)
     software = version("lerobot_policy_copolicy")
     return EpisodeMeta(
         episode_uuid=str(uuid.uuid5(uuid.NAMESPACE_OID, f"copolicy {software} {variant} {pair} {seed} {index}")),
@@ -122,8 +125,7 @@ def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int)
         player_1_id=f"{pair}-human",
         controller_0="scripted",
         controller_1="scripted",
-        map_id=map_id,
-        map_set=map_set,
+        **get_task().name_of(map_config).columns,
         seed=int(np.random.SeedSequence((seed, index)).generate_state(1)[0]),
         source="simulated",
         software_version=software,
@@ -154,7 +156,7 @@ def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[Episo
     by_plan: dict[tuple, list[EpisodeJob]] = defaultdict(list)
     for job in jobs:
         config = job.map_config
-        by_plan[config.goal, config.obstacles, config.obstacle_size].append(job)
+        by_plan[config.goal, config.squares].append(job)
     parts = -(-workers // len(by_plan))
     return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
 

@@ -40,8 +40,12 @@ def environment_state(config: MapConfig) -> np.ndarray:
     return vector
 
 
-def map_of(vector: np.ndarray, obstacle_size: int) -> MapConfig:
+def map_of(vector: np.ndarray, obstacle_size: int, obstacle_sizes: str = "") -> MapConfig:
     """The map behind an `environment_state` vector `(11,)`; its zero padding tells the number of obstacles.
+
+    Args:
+        obstacle_size: the episode column.
+        obstacle_sizes: the episode column, empty where all obstacles are of `obstacle_size`.
 
     Raises:
         InvalidValueError: an obstacle stands behind an empty slot.
@@ -52,4 +56,21 @@ def map_of(vector: np.ndarray, obstacle_size: int) -> MapConfig:
     if any(slot == (0.0, 0.0) for slot in slots[:count]):
         raise InvalidValueError("environment_state", "obstacles before the zero padding", slots)
     x, y, theta, goal_x, goal_y = values[:5]
-    return MapConfig((x, y, theta), (goal_x, goal_y), tuple(slots[:count]), obstacle_size)
+    return MapConfig((x, y, theta), (goal_x, goal_y), tuple(slots[:count]), obstacle_size, sizes_of(obstacle_sizes))
+
+
+def sizes_text(config: MapConfig) -> str:
+    """The episode column `obstacle_sizes` of a map."""
+    return ",".join(map(str, config.obstacle_sizes))
+
+
+def sizes_of(text: str) -> tuple[int, ...]:
+    """The inverse of `sizes_text`.
+
+    Raises:
+        InvalidValueError: no whole numbers.
+    """
+    try:
+        return tuple(int(size) for size in text.split(",")) if text else ()
+    except ValueError:
+        raise InvalidValueError("obstacle_sizes", "whole numbers of px, comma separated", text) from None

@@ -7,10 +7,13 @@ original program, as positions in fractions of the window; the varied layouts ar
 import functools
 import math
 import random
+import re
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 from copolicy.dataset.exceptions import UnknownNameError
+from copolicy.dataset.scenarios import ScenarioSet
 
 from .map_config import WINDOW, MapConfig
 
@@ -36,6 +39,7 @@ _HOLDOUT = (
     "10 102 120 2 21 1 021 0 102 210 2 012 12 12 210 102 1 2 12 21 0 02 0 210 102 01 021 102 201 02 1 210 01 10 20 "
     "0 02 1 0 120 210 0 1 20 12 10"
 ).split()
+_ANGLE = re.compile(r"-\d+deg$")
 _ORIENTATIONS = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
 
 
@@ -113,8 +117,10 @@ def identify(config: MapConfig) -> tuple[str, str]:
     Returns:
         `("training-17", "training")` for a map of a set (a repeated map has the name of its first place,
         a map of the paper's 36 its name in the training family), `("training-17-90deg", "training")` for one of its
-        start orientations, `("custom-1a2b3c4d", "custom")` for any other.
+        start orientations, that of its file for a map of one, `("custom-1a2b3c4d", "custom")` for any other.
     """
+    if config.named is not None:
+        return config.named[:2]
     name = _names().get(config.digest)
     return (name, name.split("-")[0]) if name else (f"custom-{config.digest}", "custom")
 
@@ -131,5 +137,23 @@ def _names() -> dict[str, str]:
     return names
 
 
+def turned(chosen: ScenarioSet) -> ScenarioSet:
+    """A set with each map in the four start orientations; those that a map of a file has of its own do not count."""
+    bases: dict[Any, tuple[MapConfig, int]] = {}
+    for place, (config, weight) in enumerate(zip(chosen.scenarios, chosen.weights, strict=True)):
+        bases.setdefault(place if config.named is None else _ANGLE.sub("", config.named.scenario), (config, weight))
+    scenarios = tuple(one for config, _ in bases.values() for one in _orientations(config))
+    return replace(chosen, scenarios=scenarios, weights=tuple(weight for _, weight in bases.values() for _ in range(4)))
+
+
+def start_at(config: MapConfig, theta: float) -> MapConfig:
+    """A map with another start orientation, rad; a name from a file says which, in degrees."""
+    name = config.named
+    if name is not None:
+        base = _ANGLE.sub("", name.scenario)
+        name = name._replace(scenario=f"{base}-{round(math.degrees(theta)) % 360}deg")
+    return replace(config, start=(*config.start[:2], theta), named=name)
+
+
 def _orientations(config: MapConfig) -> list[MapConfig]:
-    return [replace(config, start=(*config.start[:2], theta)) for theta in _ORIENTATIONS]
+    return [start_at(config, theta) for theta in _ORIENTATIONS]

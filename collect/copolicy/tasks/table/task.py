@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask
 
 from .dynamics import integrate
-from .features import environment_state, map_of, states_7, theta_of
+from .features import environment_state, map_of, sizes_text, states_7, theta_of
 from .interaction import interaction_force
 from .map_config import MapConfig
-from .maps import MAP_SETS, identify
+from .maps import MAP_SETS, identify, turned
 from .physics import Physics
 from .reward import reward
 from .routes import route_class
 from .spec import SPEC
 
 if TYPE_CHECKING:
+    from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
 
@@ -48,16 +50,17 @@ class TableTask(PairTask):
         return environment_state(scenario)
 
     def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> MapConfig:
-        """The map of an `environment_state`; the size of its obstacles is the episode column `obstacle_size`.
+        """The map of an `environment_state`; the episode columns tell the size of its obstacles.
 
         Data sets of earlier versions lack it: there the name of the map tells, and 50 px is that of no set.
         """
         paper = str(columns.get("map_id", "")).startswith(("holdout", "unseen"))
-        return map_of(vector, columns.get("obstacle_size") or (45 if paper else MapConfig.obstacle_size))
+        size = columns.get("obstacle_size") or (45 if paper else MapConfig.obstacle_size)
+        return map_of(vector, size, columns.get("obstacle_sizes") or "")
 
     def columns_of(self, scenario: MapConfig) -> dict[str, Any]:
-        """The size of the obstacles."""
-        return {"obstacle_size": scenario.obstacle_size}
+        """The size of the obstacles, and that of each where they differ."""
+        return {"obstacle_size": scenario.obstacle_size, "obstacle_sizes": sizes_text(scenario)}
 
     def make_world(self, scenario: MapConfig, settings: Physics | None = None) -> "TableWorld":
         """A table at rest at the start of a map."""
@@ -102,7 +105,10 @@ class TableTask(PairTask):
 
     def layout(self, scenario: MapConfig, with_goal: bool = False) -> tuple:
         """The obstacles, whatever their order, and the goal."""
-        return tuple(sorted(scenario.obstacles)), scenario.goal if with_goal else ()
+        # Without the size where it is the same for all: it then tells the map sets apart, which is not meant here.
+        sizes = scenario.obstacle_sizes or (0,) * len(scenario.obstacles)
+        obstacles = sorted((x, y, size) for (x, y), size in zip(scenario.obstacles, sizes, strict=True))
+        return tuple(obstacles), scenario.goal if with_goal else ()
 
     def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
         """See `route_class`."""
@@ -133,3 +139,18 @@ class TableTask(PairTask):
     def identify(self, scenario: MapConfig) -> tuple[str, str]:
         """Name of a map and of its set, whatever the order of its obstacles; see `maps.identify`."""
         return identify(scenario)
+
+    def name_of(self, scenario: MapConfig) -> ScenarioName:
+        """The name that a map of a file has with it, or that of a map of a set."""
+        return scenario.named or super().name_of(scenario)
+
+    @property
+    def scenario_files(self) -> "MapFiles":
+        """Map files."""
+        from .map_files import MapFiles  # PyYAML
+
+        return MapFiles()
+
+    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
+        """See `maps.turned`."""
+        return turned(chosen)

@@ -76,9 +76,7 @@ class TableWorld:
         self._space = pymunk.Space()
         self._table = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         self._parts = tuple(zip(table_shapes(self._table), PART_BOUNDS, strict=True))
-        solids = [(centre, map_config.obstacle_size) for centre in map_config.obstacles] + [
-            (map_config.goal, GOAL_SIZE)
-        ]
+        solids = [*map_config.squares, (map_config.goal, GOAL_SIZE)]
         shapes = [square_shape(self._space.static_body, centre, size) for centre, size in solids]
         self._space.add(self._table, *shapes)
         self._goal_shape = shapes[-1]

@@ -37,7 +37,8 @@ class Mixtures:
             counts[name] = Counter(str(row.get(name) or "none") for row in rows)
         sizes: dict[str, Counter[str]] = {}
         for row in rows:
-            if size := row.get("obstacle_size"):
+            # Maps of a file have obstacles of any size.
+            if (size := row.get("obstacle_size")) and not row.get("map_set_digest"):
                 sizes.setdefault(str(row.get("map_set") or "none"), Counter())[f"{size} px"] += 1
         counts |= {f"obstacles of map set {name}": found for name, found in sizes.items()}
         lines = [f"{name}: {_listed(found)}" for name, found in counts.items() if len(found) > 1]

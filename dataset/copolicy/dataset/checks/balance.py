@@ -3,7 +3,7 @@
 import functools
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
@@ -19,8 +19,9 @@ _VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
 
 
 def _maps(table: EpisodeTable) -> Iterator[Finding]:
+    stated = _stated_weights(table)
     for name, counts in _by_set(table).items():
-        weights = _weights(name, counts)
+        weights = _weights(name, counts, stated)
         maps, episodes = sorted(weights), sum(counts.values())
         share = np.array([weights[one] for one in maps]) / sum(weights.values())
         found = np.array([counts[one] for one in maps])
@@ -75,14 +76,21 @@ def _base_maps(table: EpisodeTable) -> np.ndarray:
     return np.array([_VARIANT.sub("", name) for name in table.columns["map_id"].tolist()], str)
 
 
-def _weights(name: str, counts: Counter[str]) -> dict[str, int]:
+def _stated_weights(table: EpisodeTable) -> dict[str, int]:
+    """Of the maps of files, by map."""
+    if "map_weight" not in table.columns:
+        return {}
+    return dict(zip(_base_maps(table).tolist(), table.columns["map_weight"].tolist(), strict=True))
+
+
+def _weights(name: str, counts: Counter[str], stated: Mapping[str, int]) -> dict[str, int]:
     """How often each map of a family should be there: as often as the set that was recorded repeats it.
 
     Several sets have maps of one family (the paper's 36 carry the names of the training maps): of those with all the
     maps that are there, the one with the fewest others, and of these the one that fits best.
     """
     if name not in MAP_SETS:
-        return dict.fromkeys(counts, 1)
+        return {map_id: max(1, stated.get(map_id, 1)) for map_id in counts}
     sets = [Counter(map_id for map_id, family in maps if family == name) for maps in _named_sets()]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
     return min(fitting, key=lambda weights: (len(weights), _misfit(weights, counts)), default=dict.fromkeys(counts, 1))

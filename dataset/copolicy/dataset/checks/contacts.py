@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from copolicy.tasks.table.features import sizes_of
 from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
 from copolicy.tasks.table.physics import GOAL_SIZE
 
@@ -34,22 +35,16 @@ def _goal(table: EpisodeTable) -> Iterator[Finding]:
 def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
     margin = limit("contact_margin")
     maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
-    smallest = largest = np.broadcast_to(np.array(_SIZES, float), (len(table.starts), 2))
-    smallest, largest = smallest[:, 0], largest[:, 1]
-    if table.obstacle_sizes is not None:
-        smallest = largest = table.obstacle_sizes.astype(float)
-    elif "obstacle_size" in table.columns:
-        stored = table.of_framed("obstacle_size").astype(float)
-        smallest, largest = (np.where(stored > 0, stored, guessed) for guessed in (smallest, largest))
+    smallest, largest = _obstacle_sides(table)
     deepest = np.full(len(table.starts), -np.inf)
     nearest = np.full(len(table.starts), np.inf)
     error = 0.0
     for slot in range(MAX_OBSTACLES):
         centres = maps[:, 5 + 2 * slot : 7 + 2 * slot]
         there = (centres != 0).any(axis=1)
-        halves = np.repeat(smallest / 2, table.counts)
+        halves = np.repeat(smallest[:, slot] / 2, table.counts)
         depth = _deepest(table, np.repeat(centres, table.counts, axis=0), halves)
-        gap, error = _final_gap(table, centres, largest / 2)
+        gap, error = _final_gap(table, centres, largest[:, slot] / 2)
         deepest = np.where(there, np.maximum(deepest, depth), deepest)
         nearest = np.where(there, np.minimum(nearest, gap), nearest)
     message = "the table went this many px into an obstacle of its map before the episode ended"
@@ -60,6 +55,21 @@ def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
     yield from each(
         table, collided & ~(nearest <= bound), "obstacle_contact", nearest, bound, "error", message, table.framed
     )
+
+
+def _obstacle_sides(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
+    """`(F, 3)` the smallest and the largest side that each obstacle can have, px."""
+    shape = (len(table.starts), MAX_OBSTACLES)
+    smallest, largest = (np.full(shape, float(size)) for size in _SIZES)
+    if "obstacle_size" in table.columns:
+        stored = np.broadcast_to(table.of_framed("obstacle_size").astype(float)[:, None], shape)
+        smallest, largest = (np.where(stored > 0, stored, guessed) for guessed in (smallest, largest))
+    if "obstacle_sizes" in table.columns:
+        texts = table.of_framed("obstacle_sizes")
+        for place in np.flatnonzero(texts != ""):
+            own = sizes_of(str(texts[place]))[:MAX_OBSTACLES]
+            smallest[place, : len(own)] = largest[place, : len(own)] = own
+    return smallest, largest
 
 
 def _wall(table: EpisodeTable) -> Iterator[Finding]:

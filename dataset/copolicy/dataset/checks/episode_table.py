@@ -29,7 +29,6 @@ class EpisodeTable:
         info: `meta/info.json` of a LeRobot data set.
         files: how the data files describe the columns of the frames: name to (type, width).
         damage: what kept a part of the data from being read, or contradicts the rest of it.
-        obstacle_sizes: `(F,)` side of the obstacles, px, where it was stored.
         episodes: the rows of meta/episodes in the order of `labels`, as they are stored.
         data_files: the episodes that each data file has rows of, by its path below the folder.
         task: that they are of.
@@ -44,7 +43,6 @@ class EpisodeTable:
     framed: np.ndarray
     starts: np.ndarray
     final_states: np.ndarray | None = None
-    obstacle_sizes: np.ndarray | None = None
     info: dict[str, Any] = field(default_factory=dict)
     files: dict[str, tuple[str, int]] = field(default_factory=dict)
     damage: tuple[Finding, ...] = ()

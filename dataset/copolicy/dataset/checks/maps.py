@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -35,10 +36,13 @@ def _constant(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _named(table: EpisodeTable) -> Iterator[Finding]:
-    for label, name, group in zip(
-        table.labels, table.columns["map_id"].tolist(), table.columns["map_set"].tolist(), strict=True
-    ):
+    columns = (table.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
+    for label, name, group, digest in zip(table.labels, *columns, strict=True):
         family = name.split("-")[0]
+        if digest:  # of a file, whose maps bear its name
+            if group in MAP_SETS or not name.startswith(f"{group}-"):
+                yield Finding(label, "map_name", name, f"{group}-...", "error", "map_set is not the file of map_id")
+            continue
         if not name:
             yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
         elif family != "custom" and named_map(name) is None:
@@ -57,19 +61,34 @@ def _named(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding(table.labels[place], "map_name", None, None, "warning", message)
 
 
+def _files(table: EpisodeTable) -> Iterator[Finding]:
+    contents: dict[str, Counter[str]] = {}
+    columns = (table.columns[name].tolist() for name in ("map_set", "map_set_version", "map_set_digest"))
+    for group, version, digest in zip(*columns, strict=True):
+        contents.setdefault(group, Counter())[f"version {version or 'none'}, digest {digest or 'none'}"] += 1
+    for group, counts in contents.items():
+        if len(counts) > 1:
+            listed = "; ".join(f"{count} of {text}" for text, count in counts.most_common())
+            message = f"episodes of several files of maps that are all named {group}: {listed}"
+            yield Finding("", "map_files", len(counts), 1, "warning", message)
+
+
 def _rows(table: EpisodeTable) -> Iterator[Finding]:
     rows = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     bound = limit("map_position")
+    files: dict[tuple[str, str], MapConfig] = {}
     for place, row in zip(table.framed, rows, strict=True):
-        name = str(table.columns["map_id"][place])
-        expected = named_map(name)
-        if expected is None:
+        name, digest = (str(table.columns[column][place]) for column in ("map_id", "map_set_digest"))
+        expected = None if digest else named_map(name)
+        if expected is None and not digest:
             continue
         try:
-            found = map_of(row, expected.obstacle_size)
+            found = map_of(row, MapConfig.obstacle_size)
         except CopolicyError as error:
             yield Finding(table.labels[place], "map_rows", None, None, "error", str(error))
             continue
+        if expected is None:  # the file is not here: the first episode on a map says what it is
+            expected = files.setdefault((digest, name), found)
         distance = map_distance(found, expected, start=not name.endswith(DISPLACED))
         if not distance <= bound:
             figure = "other obstacles" if distance == _UNLIKE else distance
@@ -89,9 +108,10 @@ def _start(table: EpisodeTable) -> Iterator[Finding]:
 def map_distance(found: MapConfig, expected: MapConfig, start: bool = True) -> float:
     """Largest distance in px between the parts of two maps, whatever the order of their obstacles; a turned start
     counts with the way of the table's end. Infinite where the number of obstacles differs."""
-    if len(found.obstacles) != len(expected.obstacles):
+    own, other = sorted(found.squares), sorted(expected.squares)
+    if len(own) != len(other):
         return _UNLIKE
-    ends = [(found.goal, expected.goal), *zip(sorted(found.obstacles), sorted(expected.obstacles), strict=True)]
+    ends = [(found.goal, expected.goal), *((a, b) for (a, _), (b, _) in zip(own, other, strict=True))]
     distances = [math.dist(one, other) for one, other in ends]
     if start:
         turn = math.remainder(found.start[2] - expected.start[2], 2 * math.pi)
@@ -113,8 +133,10 @@ def named_map(name: str) -> MapConfig | None:
 
 RULES = (
     Rule("map_constant", "one map an episode", _constant, (ENVIRONMENT_STATE,)),
-    Rule("map_names", "map_id and map_set name a known map", _named, (), ("map_id", "map_set")),
+    Rule("map_names", "map_id and map_set name a known map", _named, (), ("map_id", "map_set", "map_set_digest")),
+    Rule("map_files", "maps of one name are of one file", _files, (),
+         ("map_set", "map_set_version", "map_set_digest"), whole=True),
     Rule("map_rows", "start, goal and obstacles of the rows are the named map's", _rows, (ENVIRONMENT_STATE,),
-         ("map_id",)),
+         ("map_id", "map_set_digest")),
     Rule("map_start", "episodes begin at their map's start", _start, (STATE, ENVIRONMENT_STATE)),
 )  # fmt: skip

@@ -31,10 +31,10 @@ def _physics(table: EpisodeTable) -> Iterator[Finding]:
 
 def _obstacle_sizes(table: EpisodeTable) -> Iterator[Finding]:
     sizes: dict[str, Counter[str]] = {}
-    columns = (table.columns[name].tolist() for name in ("map_set", "map_id", "obstacle_size"))
-    for label, group, name, size in zip(table.labels, *columns, strict=True):
-        if size <= 0:
-            continue  # a data set of an earlier version
+    columns = (table.columns[name].tolist() for name in ("map_set", "map_id", "obstacle_size", "map_set_digest"))
+    for label, group, name, size, digest in zip(table.labels, *columns, strict=True):
+        if size <= 0 or digest:
+            continue  # a data set of an earlier version; a map of a file, where each obstacle has a size of its own
         sizes.setdefault(group, Counter())[f"of {size} px"] += 1
         expected = named_map(name)
         if expected is not None and expected.obstacle_size != size:
@@ -69,7 +69,7 @@ def _listed(counts: Mapping[str, int]) -> str:
 RULES = (
     Rule("physics", "all episodes were recorded under one physics", _physics, (), ("physics",), whole=True),
     Rule("obstacle_sizes", "obstacles of one size in a map set, the size of its maps", _obstacle_sizes, (),
-         ("map_set", "map_id", "obstacle_size"), whole=True),
+         ("map_set", "map_id", "obstacle_size", "map_set_digest"), whole=True),
     Rule("software", "recorded by one version of the software", _software, (), ("software_version",), whole=True),
     Rule("sources", "episodes of one source", _sources, (), ("source",), whole=True),
 )  # fmt: skip

@@ -51,7 +51,7 @@ def read_lerobot(root: Path) -> EpisodeTable:
             message = f"meta/info.json has another {name} than the files"
             damage.append(Finding("", "rows", number, info[name], "error", message))
     return EpisodeTable(
-        root, "lerobot", float(info["fps"]), labels, columns, frames, framed, starts, None, None, info, files,
+        root, "lerobot", float(info["fps"]), labels, columns, frames, framed, starts, None, info, files,
         tuple(damage), meta.take(pa.array(order)), episodes_of_files, task_of(info),
     )  # fmt: skip
 

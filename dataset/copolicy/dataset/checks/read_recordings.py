@@ -92,7 +92,6 @@ def recordings_table(
         np.arange(len(episodes)),
         np.cumsum(lengths) - lengths,
         final_states,
-        np.array([task.columns_of(episode.scenario).get("obstacle_size", 0) for episode in episodes], float),
         damage=damage,
         task=task,
     )

@@ -52,6 +52,7 @@ class EvaluationSettingsDocument(TypedDict):
     """The protocol of a study."""
 
     maps: str
+    map_set: NotRequired[dict[str, str] | None]
     map_count: NotRequired[int]
     complete_set: NotRequired[bool]
     orientations: NotRequired[bool]

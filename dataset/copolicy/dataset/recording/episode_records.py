@@ -7,7 +7,14 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, get_args
 
-from ..episode import EPISODE_COLUMNS, EpisodeMeta, Source, termination_reasons
+from ..episode import (
+    EPISODE_COLUMNS,
+    LATER_DEFAULTS,
+    SET_COLUMNS,
+    EpisodeMeta,
+    Source,
+    termination_reasons,
+)
 from ..exceptions import InvalidValueError
 from ..task import PairTask, TaskSpec
 
@@ -16,7 +23,7 @@ SCHEMA_VERSION = "1"
 
 COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "session": ("session_id",),
-    "episode": ("episode_uuid", "map_id", "map_set", "seed", "source"),
+    "episode": ("episode_uuid", "map_id", "map_set", "seed", "source", *SET_COLUMNS),
     "players": ("pair_id", "player_0_id", "player_1_id", "controller_0", "controller_1"),
     "devices": (),
     "software": ("software_version",),
@@ -24,7 +31,10 @@ COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "physics": (),
     "dataset_info": (),
 }
-"""The metadata records at the start of a recording and the episode columns that each holds."""
+"""The metadata records at the start of a recording and the episode columns that each holds.
+
+Those of `SET_COLUMNS` are there only where the map is of a file.
+"""
 
 RESULT = "episode_result"
 COLUMNS_AT_END = (
@@ -91,7 +101,9 @@ def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
 
 def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:
     """The texts of some columns; `true` and `false` for a bool, the shortest exact digits for a float."""
-    return {name: _encode(getattr(meta, name)) for name in columns}
+    values = {name: getattr(meta, name) for name in columns}
+    said = (name for name in columns if name not in SET_COLUMNS or values[name] != LATER_DEFAULTS[name])
+    return {name: _encode(values[name]) for name in said}
 
 
 def decode(records: Mapping[str, Mapping[str, str]], spec: TaskSpec) -> EpisodeMeta:
@@ -106,6 +118,8 @@ def decode(records: Mapping[str, Mapping[str, str]], spec: TaskSpec) -> EpisodeM
             raise InvalidValueError("metadata", f"a record {record!r}", sorted(records))
         for name in names:
             if name not in records[record]:
+                if name in SET_COLUMNS:
+                    continue
                 raise InvalidValueError(f"metadata record {record!r}", f"an entry {name!r}", sorted(records[record]))
             columns[name] = _decode(name, records[record][name], spec)
     version = records["dataset_info"].get("schema_version")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mcap.opcode import Opcode
 
+from ..episode import SET_COLUMNS
 from ..exceptions import FileFormatError, ForeignRecordingError
 from . import episode_records
 from .mcap_records import RecordWalk
@@ -21,7 +22,7 @@ _THEY = _USED.format(verb="are", pronoun="they stand")
 _IT = _USED.format(verb="is", pronoun="it stands")
 _TOPICS_SHOWN = 5
 _ENTRIES: dict[str, tuple[str, ...]] = {
-    **episode_records.COLUMNS_AT_START,
+    **{name: tuple(set(columns) - set(SET_COLUMNS)) for name, columns in episode_records.COLUMNS_AT_START.items()},
     "dataset_info": ("fps", episode_records.START_DIGEST),
     episode_records.RESULT: episode_records.COLUMNS_AT_END,
 }

@@ -14,7 +14,7 @@ from .trajectories import EpisodeRow, Trajectories
 
 _EPISODE_COLUMNS = (
     "episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class",
-    "discarded", "obstacle_size",
+    "discarded", "obstacle_size", "obstacle_sizes",
 )  # fmt: skip
 
 

@@ -40,11 +40,10 @@ def decision_zone(data: Trajectories) -> np.ndarray:
         if not row.map_config.obstacles:
             continue
         origin, along = _axis(row.map_config)
-        first = min(float((np.array(centre) - origin) @ along) for centre in row.map_config.obstacles)
+        squares = row.map_config.squares
+        first = min(float((np.array(centre) - origin) @ along) - size / 2 for centre, size in squares)
         station = (data.path(index) - origin) @ along
-        zone[data.starts[index] : data.ends[index]] = (
-            np.maximum.accumulate(station) < first - row.map_config.obstacle_size / 2
-        )
+        zone[data.starts[index] : data.ends[index]] = np.maximum.accumulate(station) < first
     return zone
 
 

@@ -25,11 +25,11 @@ def visitation_counts(data: Trajectories) -> csr_matrix:
     return csr_matrix((ones, (data.episode, cell)), shape=(len(data.rows), _COLUMNS * _ROWS))
 
 
-def free_cells(obstacles: tuple[tuple[float, float], ...], size: float) -> np.ndarray:
-    """`(cells,)` whether the middle of a cell lies outside every obstacle."""
+def free_cells(squares: tuple[tuple[tuple[float, float], float], ...]) -> np.ndarray:
+    """`(cells,)` whether the middle of a cell lies outside every obstacle, given by centre and side."""
     y, x = np.mgrid[0:_ROWS, 0:_COLUMNS] * CELL_PX + CELL_PX / 2
     inside = np.zeros((_ROWS, _COLUMNS), dtype=bool)
-    for centre_x, centre_y in obstacles:
+    for (centre_x, centre_y), size in squares:
         inside |= np.maximum(np.abs(x - centre_x), np.abs(y - centre_y)) < size / 2
     return ~inside.ravel()
 
@@ -39,10 +39,7 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     counts = visitation_counts(data)
     groups = data.groups(with_goal=False)
     weights = np.array([data.lengths[group].sum() for group in groups], dtype=float)
-    free = [
-        free_cells(data.rows[group[0]].map_config.obstacles, data.rows[group[0]].map_config.obstacle_size)
-        for group in groups
-    ]
+    free = [free_cells(data.rows[group[0]].map_config.squares) for group in groups]
     pooled = [np.asarray(counts[group].sum(axis=0)).ravel() for group in groups]
     bits = np.array([miller_madow(row) for row in pooled])
     seen = np.array([(row[cells] > 0).mean() for row, cells in zip(pooled, free, strict=True)])

@@ -7,6 +7,9 @@ The content hash `copolicy-content-1:sha256:HEX` is the sha256 of `canonical.enc
 * `episodes`: the digest of each episode in order, the sha256 of `canonical.encode` of its length, its episode columns
   (exclusions are among them) and the digests of its features (`frames.frame_digests`, `videos.video_digest`)
 
+An episode column of later versions (`UNHASHED_DEFAULTS`) counts only where it says something, so that a data set has
+one hash with and without it.
+
 Left out on purpose: where things lie (chunk, file, row group, compression, order of columns and of rows, the running
 numbers of frames and episodes), what is computed from the frames (statistics), and what describes (the card, the
 figures, `meta/copolicy.json`). A manifest covers those.
@@ -17,7 +20,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ..episode import EPISODE_COLUMNS
+from ..episode import EPISODE_COLUMNS, LATER_DEFAULTS, UNHASHED_DEFAULTS
 from ..exceptions import FileFormatError
 from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
@@ -59,7 +62,11 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
             path, start, end = video_span(root, info, row, name)
             features[name] = video_digest(path, start, end, info["fps"])
     columns = {
-        name: digest(value) for name, value in row.items() if name not in _POSITION and not name.startswith(_LAYOUT)
+        name: digest(value)
+        for name, value in row.items()
+        if name not in _POSITION
+        and not name.startswith(_LAYOUT)
+        and (name not in UNHASHED_DEFAULTS or value not in (None, LATER_DEFAULTS[name]))
     }
     return EpisodeContent(
         row["episode_uuid"],

@@ -97,7 +97,9 @@ def _require_same_protocol(first: Result, run: Result) -> None:
         raise FileFormatError(run.path, f"the study {first.study!r} as in {first.path}", repr(run.study))
     for name in sorted(first.settings.keys() | run.settings.keys()):
         expected, found = first.settings.get(name), run.settings.get(name)
-        if expected != found:
+        if name == "map_set":
+            _require_same_maps(first, run)
+        elif expected != found:
             if isinstance(expected, dict) and isinstance(found, dict):  # of partners: say which, not all their habits
                 differing = [k for k in {**expected, **found} if expected.get(k) != found.get(k)]
                 expected, found = f"the same {name}", f"others: {', '.join(differing)}"
@@ -105,6 +107,18 @@ def _require_same_protocol(first: Result, run: Result) -> None:
     if run.values.keys() != first.values.keys():
         odd = next(iter(run.values.keys() ^ first.values.keys()))
         raise FileFormatError(run.path, f"the episodes of {first.path}", f"others, such as {odd}")
+
+
+def _require_same_maps(first: Result, run: Result) -> None:
+    """Two files of maps may have one name; a result of an earlier version does not say what was in its."""
+    one, other = first.settings.get("map_set"), run.settings.get("map_set")
+    if one and other and one != other:
+        name, version, digest = (one[key] for key in ("name", "version", "digest"))
+        raise FileFormatError(
+            run.path,
+            f"the maps {name}, version {version}, digest {digest} as in {first.path}",
+            f"{other['name']} of other content, version {other['version']}, digest {other['digest']}",
+        )
 
 
 def subset(run: Result, column: str, value: Any) -> dict[Key, Values]:

@@ -24,7 +24,7 @@ def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> No
     """Draws all outcomes into a PNG."""
     panels: dict[tuple, list[Outcome]] = defaultdict(list)
     for outcome in outcomes:
-        panels[tuple(sorted(outcome.map_config.obstacles))].append(outcome)
+        panels[outcome.map_config.layout].append(outcome)
     columns = min(4, len(panels))
     rows = math.ceil(len(panels) / columns)
     figure = Figure(figsize=(4.2 * columns, 2.5 * rows + 0.7), dpi=110, layout="constrained")
@@ -47,8 +47,7 @@ def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> No
 
 
 def _panel(axis, obstacles, outcomes: Sequence[Outcome]) -> None:
-    size = outcomes[0].map_config.obstacle_size
-    for x, y in obstacles:
+    for (x, y), size in obstacles:
         axis.add_patch(Rectangle((x - size / 2, y - size / 2), size, size, color=_OBSTACLE))
     for x, y in {outcome.map_config.goal for outcome in outcomes}:
         axis.add_patch(Rectangle((x - GOAL_SIZE / 2, y - GOAL_SIZE / 2), GOAL_SIZE, GOAL_SIZE, fill=False, ec=_GOAL))

@@ -8,12 +8,13 @@ from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.publication.licences import checked_licence
-from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.dataset.task import get_task
 
 from ..result_file import write_json
 from ..study_flags import add_protocol_flags, policy_settings, protocol_of
@@ -51,7 +52,7 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
         default=5,
         help="how many people (default: 5, the paper's)",
     )
-    command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
+    add_maps_flag(command, "unseen")
     command.add_argument(
         "--configurations",
         type=whole_number("--configurations", None),
@@ -126,6 +127,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
     from .plan import Robot, make_plan
 
     require_new(arguments.out, overwrite=arguments.overwrite)
+    chosen = get_task().scenario_set(arguments.maps)
     robots = []
     for text in arguments.policies:
         name, path = split_name(text)
@@ -136,8 +138,8 @@ def _plan(arguments: argparse.Namespace) -> dict:
     physics = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders]).physics
     plan = make_plan(
         robots,
-        arguments.maps,
-        study_configurations(arguments.maps, arguments.configurations),
+        chosen.label,
+        study_configurations(chosen, arguments.configurations),
         arguments.participants,
         arguments.episodes_per_robot,
         arguments.seed,
@@ -208,7 +210,11 @@ def _summarise(arguments: argparse.Namespace) -> dict:
     planned = sum(len(trials) for trials in plan.trials.values()) if plan else None
     about = {"episodes": len(rows), "planned": planned, "left_out": left_out}
     if arguments.out:
-        settings = {} if plan is None else {"plan_id": plan.plan_id, "maps": plan.maps, "step_limit": plan.step_limit}
+        settings = (
+            {}
+            if plan is None
+            else {"plan_id": plan.plan_id, "maps": plan.maps, **plan.map_set, "step_limit": plan.step_limit}
+        )
         write_json(
             arguments.out,
             {"study": "human", "settings": settings, **summary, **about, "rows": rows, "answers": ratings},

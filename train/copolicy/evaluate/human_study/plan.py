@@ -3,8 +3,8 @@
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,9 @@ import numpy as np
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
+from copolicy.dataset.scenarios import ScenarioName
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import identify
 from copolicy.tasks.table.physics import Physics
 
 from .latin_square import williams_square
@@ -90,6 +91,14 @@ class StudyPlan:
         """Settings of the world."""
         return Physics(self.angular_acceleration_limit, self.step_limit)
 
+    @property
+    def map_set(self) -> dict[str, dict[str, str]]:
+        """Name, version and digest of a file that the starts are from, as settings of a result."""
+        name = self.configurations[0].named
+        if name is None:
+            return {}
+        return {"map_set": {"name": self.maps, "version": name.version, "digest": name.digest, "from": "file"}}
+
     def of(self, participant: str) -> tuple[PlannedTrial, ...]:
         """The trials of a participant.
 
@@ -104,7 +113,7 @@ class StudyPlan:
         """The file of the plan."""
         content = asdict(self)
         content["configurations"] = [
-            {"map_id": identify(config)[0], **json.loads(config.to_json())} for config in self.configurations
+            {**_columns(config), **json.loads(config.to_json())} for config in self.configurations
         ]
         return {
             "study_plan": _VERSION,
@@ -124,7 +133,7 @@ class StudyPlan:
                 raise FileFormatError(path, f"{_WHAT}, version {_VERSION}", f"version {content['study_plan']}")
             fields = {name: content[name] for name in cls.__dataclass_fields__}
             fields["robots"] = tuple(Robot(**one) for one in content["robots"])
-            fields["configurations"] = tuple(MapConfig.from_json(json.dumps(one)) for one in content["configurations"])
+            fields["configurations"] = tuple(_configuration(one) for one in content["configurations"])
             fields["trials"] = {
                 name: tuple(PlannedTrial(**one) for one in trials) for name, trials in content["trials"].items()
             }
@@ -191,6 +200,23 @@ def weights_digest(checkpoint: str) -> str:
     return hashlib.sha256((checkpoint_folder(checkpoint) / "model.safetensors").read_bytes()).hexdigest()
 
 
+def _columns(config: MapConfig) -> dict[str, Any]:
+    """How the file of the plan names a start; of a map from a file all that recordings say of it."""
+    name = get_task().name_of(config)
+    return {"map_id": name.scenario} if config.named is None else name.columns
+
+
+def _configuration(entry: dict[str, Any]) -> MapConfig:
+    config = MapConfig.from_json(json.dumps(entry))
+    if "map_set_digest" not in entry:
+        return config
+    return replace(config, named=ScenarioName(*(entry[name] for name in ScenarioName("", "").columns)))
+
+
 def _digest(plan: StudyPlan) -> str:
-    content: Mapping[str, Any] = {**asdict(plan), "plan_id": ""}
+    content: dict[str, Any] = {**asdict(plan), "plan_id": ""}
+    for one in content["configurations"]:
+        for later in ("obstacle_sizes", "named"):  # of later versions: plans without them keep their digest
+            if not one[later]:
+                del one[later]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]

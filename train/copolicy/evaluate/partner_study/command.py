@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.agents.partners import PARTNERS
-from copolicy.tasks.table.maps import MAP_SETS
 
 from ..result_file import write_json
 from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
@@ -44,7 +45,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         "simulated pilot), on the same starts with the same partners (default: passive never-yields)",
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
-    command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
+    add_maps_flag(command, "unseen")
     command.add_argument(
         "--configurations",
         type=whole_number("--configurations", None),
@@ -79,13 +80,14 @@ def _partner(arguments: argparse.Namespace) -> dict:
     for kind in partners:
         if kind not in PARTNERS:
             raise UnknownNameError("kind of partner", kind, PARTNERS)
+    chosen = get_task().scenario_set(arguments.maps)
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .configurations import study_configurations
     from .figure import save_partner_figure
     from .study import carry_with_partners
     from .summary import DEFINITIONS, differences, summarise_with_partners
 
-    maps = study_configurations(arguments.maps, arguments.configurations)
+    maps = study_configurations(chosen, arguments.configurations)
     robots = [make_robot(text, arguments) for text in (arguments.policy, *arguments.baseline)]
     names = [robot.name for robot in robots]
     if len(set(names)) < len(names):
@@ -130,10 +132,11 @@ def _partner(arguments: argparse.Namespace) -> dict:
         "label": LABEL,
         **described[0],
         "settings": {
-            "maps": arguments.maps,
+            "maps": chosen.label,
+            "map_set": chosen.describe(),
             "configurations": len(maps),
             "map_count": len(maps),
-            "complete_set": len(maps) == 4 * len({config.digest for config in MAP_SETS[arguments.maps]}),
+            "complete_set": len(maps) == len({config.digest for config in get_task().turned(chosen).scenarios}),
             "orientations": True,
             "partners": {kind: asdict(PARTNERS[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
@@ -146,7 +149,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     }
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     by_name = dict(zip(names, summaries, strict=True))
-    title = f"simulated partners on {arguments.maps}: {len(maps)} starts, {episodes} episodes a robot, no person"
+    title = f"simulated partners on {chosen.label}: {len(maps)} starts, {episodes} episodes a robot, no person"
     save_partner_figure(by_name, picture, title)
     write_json(arguments.out, result)
     return {

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
+from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.maps import MAP_SETS, identify
+from copolicy.dataset.task import RECORD_HZ, get_task
 
 from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs
 
@@ -30,7 +30,7 @@ def add_plans_command(commands: argparse._SubParsersAction) -> None:
         study_needs,
     )
     command.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    command.add_argument("--maps", default="unseen", choices=sorted(MAP_SETS), help="map set (default: unseen)")
+    add_maps_flag(command, "unseen")
     command.add_argument(
         "--map",
         required=True,
@@ -53,7 +53,8 @@ def _plans(arguments: argparse.Namespace) -> dict:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
-    maps = MAP_SETS[arguments.maps]
+    chosen = get_task().scenario_set(arguments.maps)
+    maps = chosen.scenarios
     if not 0 <= arguments.map < len(maps):
         raise InvalidValueError("--map", f"0 to {len(maps) - 1}", arguments.map)
     if not (math.isfinite(arguments.seconds) and arguments.seconds >= 0):
@@ -74,7 +75,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         fps=protocol.fps,
         seed=arguments.seed,
     )
-    map_id = identify(decision.map_config)[0]
+    map_id = get_task().identify(decision.map_config)[0]
     seconds = (len(decision.way) - 1) / RECORD_HZ
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     save_plans(
@@ -85,6 +86,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     )
     return {
         "map": map_id,
+        "map_set": chosen.describe(),
         "seconds": seconds,
         "samples": len(decision.samples),
         "fps": protocol.fps,

@@ -90,8 +90,8 @@ def _forces(axis: Axes, decision: Decision, colours: dict[str | None, str]) -> N
 
 def _furniture(axis: Axes, decision: Decision) -> None:
     config = decision.map_config
-    for x, y in config.obstacles:
-        half = config.obstacle_size / 2
+    for (x, y), size in config.squares:
+        half = size / 2
         axis.add_patch(Rectangle((x - half, y - half), 2 * half, 2 * half, color=_OBSTACLE))
     x, y = config.goal
     axis.add_patch(Rectangle((x - GOAL_SIZE / 2, y - GOAL_SIZE / 2), GOAL_SIZE, GOAL_SIZE, fill=False, hatch="///"))

@@ -57,23 +57,24 @@ def routes(config: MapConfig, clearance: float) -> tuple[Route, ...]:
     ahead = (config.goal[0] - config.start[0], config.goal[1] - config.start[1])
     axis = 0 if abs(ahead[0]) >= abs(ahead[1]) else 1
     forward = 1 if ahead[axis] >= 0 else -1
-    obstacles = tuple(sorted(config.obstacles, key=lambda centre: math.atan2(centre[1], centre[0])))
-    return _routes(config.goal, obstacles, config.obstacle_size, clearance, axis, forward)
+    obstacles = tuple(sorted(config.squares, key=lambda square: math.atan2(square[0][1], square[0][0])))
+    return _routes(config.goal, obstacles, clearance, axis, forward)
 
 
 @functools.lru_cache(maxsize=48)  # 0.6 to 2.5 MB each
-def _routes(goal, obstacles, size: int, clearance: float, axis: int, forward: int) -> tuple[Route, ...]:
-    effort, free = _effort(obstacles, size, clearance)
+def _routes(goal, obstacles, clearance: float, axis: int, forward: int) -> tuple[Route, ...]:
+    effort, free = _effort(obstacles, clearance)
     moves = grid.moves()
     weight = moves.length * (effort[moves.source] + effort[moves.target]) * 0.5
     touching = (square_clearance(*grid.poses(), goal, GOAL_SIZE).ravel() <= 0) & free
     goals = np.flatnonzero(touching)
     if not len(goals):
-        raise InvalidValueError("map", "a goal that the table can touch", (goal, obstacles))
+        centres = tuple(centre for centre, _ in obstacles)
+        raise InvalidValueError("map", "a goal that the table can touch", (goal, centres))
     found = []
     for sides in itertools.product("LR", repeat=len(obstacles)):
         fenced = weight.copy()
-        for centre, side in zip(obstacles, sides, strict=True):
+        for (centre, _), side in zip(obstacles, sides, strict=True):
             fenced[_fence(centre, axis, (forward if side == "R" else -forward) * (1 if axis == 0 else -1))] += _BARRIER
         graph = csr_matrix((fenced, moves.target, moves.pointer), shape=(grid.COUNT, grid.COUNT))
         cost, following, _ = dijkstra(graph, indices=goals, min_only=True, return_predecessors=True)
@@ -85,14 +86,14 @@ def _routes(goal, obstacles, size: int, clearance: float, axis: int, forward: in
     return tuple(found)
 
 
-def _effort(obstacles, size: int, clearance: float) -> tuple[np.ndarray, np.ndarray]:
+def _effort(obstacles, clearance: float) -> tuple[np.ndarray, np.ndarray]:
     """Cost of a px of way in each cell `(COUNT,)`, and which cells touch nothing."""
     x, y, theta = grid.poses()
     tight = _TIGHT * clearance
     space = wall_clearance(x, y, theta)
     unease = _unease(space, _WALL_TIGHT, _WALL_WIDE)
     free = space > 0
-    for centre in obstacles:
+    for centre, size in obstacles:
         space = square_clearance(x, y, theta, centre, size)
         unease = np.maximum(unease, _unease(space, tight, _WIDE * clearance))
         free = free & (space > 0)

@@ -51,8 +51,8 @@ def map_scene(map_config: MapConfig, time_ns: int) -> bytes:
     """
     update = SceneUpdate()
     squares = [("goal", "goal", map_config.goal, GOAL_SIZE)]
-    for index, centre in enumerate(map_config.obstacles):
-        squares.append((f"obstacle_{index}", "obstacle", centre, map_config.obstacle_size))
+    for index, (centre, size) in enumerate(map_config.squares):
+        squares.append((f"obstacle_{index}", "obstacle", centre, size))
     for name, kind, centre, size in squares:
         cube = _entity(update, name, time_ns).cubes.add(color=COLOURS[kind])
         _place(cube.pose, *metres(centre), z=HEIGHT / 2)

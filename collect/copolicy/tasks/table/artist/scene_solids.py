@@ -49,7 +49,7 @@ _TRIANGLE_BOX = tuple(choose(point[axis] for point in TRIANGLE) for choose in (m
 def solid_records(map_config: MapConfig, time_ns: int) -> list[Record]:
     """Goal, obstacles, table and both ends as serialised VoxelGrids with their topics."""
     places = [(map_config.goal, GOAL_SIZE, "goal")]
-    places += [(centre, map_config.obstacle_size, "obstacle") for centre in map_config.obstacles]
+    places += [(centre, size, "obstacle") for centre, size in map_config.squares]
     records = [
         (topic, _box(FRAME, metres(centre), (size, size), colour, time_ns))
         for topic, (centre, size, colour) in zip(MAP_SOLIDS, places, strict=False)

@@ -115,8 +115,8 @@ class TableView:
         start_x, start_y, _ = self.map_config.start
         with SmoothPatch(floor, [(start_x * scale, start_y * scale)], 14 * scale) as patch:
             patch.circle(mix(FLOOR, INK, 0.25), (start_x * scale, start_y * scale), 10 * scale, 3 * scale)
-        for x, y in self.map_config.obstacles:
-            _draw_obstacle(floor, (x * scale, y * scale), self.map_config.obstacle_size * scale)
+        for (x, y), side in self.map_config.squares:
+            _draw_obstacle(floor, (x * scale, y * scale), side * scale)
         pygame.draw.rect(floor, mix(FLOOR, INK, 0.55), floor.get_rect(), max(2, round(4 * scale)))
         return floor
 

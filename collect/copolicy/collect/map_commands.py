@@ -1,0 +1,157 @@
+"""`copolicy-collect maps check | show | make | schema`."""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.flag_numbers import seed, whole_number
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.files.staging import new_file, require_new
+from copolicy.dataset.scenarios import SUFFIXES, ScenarioFiles
+from copolicy.dataset.task import PairTask, get_task
+
+_MOST_MAPS = 10_000
+
+
+def add_maps_command(commands: argparse._SubParsersAction) -> None:
+    """Adds `maps` with its steps to the commands of `copolicy-collect`."""
+    maps = commands.add_parser(
+        "maps",
+        help="files of one's own maps: check, show and make them; every --maps takes such a file",
+        description="Files of one's own maps, in YAML or JSON, for every --maps.",
+        epilog="example:\n  copolicy-collect maps make --count 20 --seed 1 --out lab.yaml\n"
+        "  copolicy-collect maps check lab.yaml\n  copolicy-collect maps show lab.yaml --out lab.png\n"
+        "  copolicy-collect simulate --maps lab.yaml --episodes 100 --out recordings/lab",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    steps = maps.add_subparsers(dest="step", required=True, metavar="STEP")
+    command = add_command(
+        steps, "check", _check, "say in one line each what is wrong with a file", "copolicy-collect maps check lab.yaml"
+    )
+    command.add_argument("file", type=Path, metavar="FILE", help="maps in YAML or JSON")
+    _add_task(command)
+    command = add_command(
+        steps,
+        "show",
+        _show,
+        "draw every map of a set or file on one sheet",
+        "copolicy-collect maps show unseen --out unseen.png\n  copolicy-collect maps show lab.yaml#test --out test.png",
+    )
+    command.add_argument("maps", metavar="NAME|FILE[#SPLIT]", help="a set, a file of maps, or one of its splits")
+    command.add_argument("--out", type=Path, required=True, help="the sheet to write, a PNG")
+    command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    command.add_argument("--width", type=whole_number("--width", 300, 10_000), default=1800, help="px (default 1800)")
+    _add_task(command)
+    command = add_command(
+        steps,
+        "make",
+        _make,
+        "draw maps at random and write them into a file that passes `check`",
+        "copolicy-collect maps make --count 50 --seed 1 --bounds obstacles=2:3 obstacle_size=40:80 --out lab.yaml",
+    )
+    command.add_argument("--count", type=whole_number("--count", 1, _MOST_MAPS), required=True, help="how many maps")
+    command.add_argument("--seed", type=seed(), default=0, help="the same seed and bounds, the same maps (default 0)")
+    command.add_argument(
+        "--bounds", nargs="+", default=[], metavar="NAME=LOW:HIGH",
+        help="within which maps are drawn, or NAME=VALUE for one value; the summary says all of them, with the "
+        "defaults of those that are not given",
+    )  # fmt: skip
+    command.add_argument("--name", help="of the set (default: the name of the file)")
+    command.add_argument("--out", type=Path, required=True, help="the file to write, .yaml or .json")
+    _add_task(command)
+    command = add_command(
+        steps, "schema", _schema, "print the JSON schema of a file", "copolicy-collect maps schema > maps.schema.json"
+    )
+    _add_task(command)
+
+
+def _add_task(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--task", default="table", help="of the maps (default: table)")
+
+
+def _files(task: PairTask) -> ScenarioFiles:
+    if task.scenario_files is None:
+        raise InvalidValueError("--task", "a task with scenario files", task.missing("scenario files"))
+    return task.scenario_files
+
+
+def _check(arguments: argparse.Namespace) -> dict[str, Any]:
+    files = _files(get_task(arguments.task))
+    problems = [str(problem) for problem in files.problems(arguments.file)]
+    about: dict[str, Any] = {"file": str(arguments.file), "problems": problems if arguments.json else len(problems)}
+    if problems:
+        if not arguments.json:
+            print("\n".join(problems))
+            sys.stdout.flush()
+        return {**about, "passed": False, "exit_status": 1}
+    chosen = files.read(arguments.file)
+    splits = {name: len(places) for name, places in chosen.splits.items()}
+    return {
+        **about, **chosen.describe(), "maps": len(chosen.scenarios), **({"splits": splits} if splits else {}),
+        "passed": True,
+    }  # fmt: skip
+
+
+def _show(arguments: argparse.Namespace) -> dict[str, Any]:
+    if arguments.out.suffix.lower() != ".png":
+        raise InvalidValueError("--out", "a name that ends with .png", str(arguments.out))
+    require_new(arguments.out)
+    task = get_task(arguments.task)
+    files, chosen = _files(task), task.scenario_set(arguments.maps)
+    if arguments.orientations:
+        chosen = task.turned(chosen)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    size = files.draw(chosen, arguments.out, arguments.width)
+    return {**chosen.describe(), "maps": len(chosen.scenarios), "out": str(arguments.out), "size": list(size)}
+
+
+def _make(arguments: argparse.Namespace) -> dict[str, Any]:
+    path: Path = arguments.out
+    if path.suffix.lower() not in SUFFIXES:
+        raise InvalidValueError("--out", f"a name that ends with {', '.join(SUFFIXES)}", str(path))
+    require_new(path)
+    files = _files(get_task(arguments.task))
+    bounds = {**files.bounds, **_bounds(arguments.bounds, files.bounds)}
+    content = files.make(arguments.name or path.stem, arguments.count, arguments.seed, bounds)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with new_file(path) as partial:
+        partial.write_text(_text(content, path.suffix.lower() == ".json"), encoding="utf-8")
+    return {"out": str(path), **files.read(path).describe(), "maps": arguments.count, "bounds": _bounds_text(bounds)}
+
+
+def _text(content: Mapping[str, Any], as_json: bool) -> str:
+    if as_json:
+        return json.dumps(content, indent=1) + "\n"
+    import yaml  # what no other command needs
+
+    return yaml.safe_dump(dict(content), sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+
+
+def _bounds(texts: Sequence[str], known: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    bounds = {}
+    for text in texts:
+        name, equals, values = text.partition("=")
+        if equals and name not in known:
+            raise UnknownNameError("bound", name, known)
+        low, colon, high = values.partition(":")
+        try:
+            pair = float(low), float(high if colon else low)
+        except ValueError:
+            raise InvalidValueError("--bounds", "NAME=LOW:HIGH or NAME=VALUE, in numbers", text) from None
+        if not (-1e6 < pair[0] <= pair[1] < 1e6):
+            raise InvalidValueError("--bounds", "a lowest value that is not above the highest", text)
+        bounds[name] = pair
+    return bounds
+
+
+def _bounds_text(bounds: Mapping[str, tuple[float, float]]) -> list[str]:
+    return [f"{name}={low:g}:{high:g}" if low < high else f"{name}={low:g}" for name, (low, high) in bounds.items()]
+
+
+def _schema(arguments: argparse.Namespace) -> dict[str, Any]:
+    print(json.dumps(_files(get_task(arguments.task)).schema, indent=1))
+    return {}

@@ -1,0 +1,240 @@
+"""Map files: a lab's own maps, in YAML or JSON that a person writes."""
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.publication.licences import checked_licence
+from copolicy.dataset.scenario_document import Document, Problem
+from copolicy.dataset.scenarios import ScenarioFiles, ScenarioName, ScenarioSet
+
+from .map_config import MAX_OBSTACLES, MapConfig
+from .maps import MAP_SETS, start_at
+
+_SET_NAME = "[a-z][a-z0-9_-]{0,39}"
+_MAP_NAME = "[a-z][a-z0-9_]{0,39}"
+_DEGREES = re.compile(r"-?\d+(?:\.\d+)?deg")
+_MOST_WEIGHT, _MOST_MAPS = 1000, 10_000
+
+_X = Annotated[float, Meta(description="px, to the right; the window is 1200 wide")]
+_Y = Annotated[float, Meta(description="px, down; the window is 600 high")]
+_Angle = Annotated[
+    float | str, Meta(description="rad, or degrees as a text such as 90deg; counter-clockwise on screen")
+]
+
+
+class Start(Struct, forbid_unknown_fields=True):
+    """Where the table's centre is at rest, and how the table lies there."""
+
+    x: _X
+    y: _Y
+    theta: _Angle | None = None
+    orientations: Annotated[
+        list[_Angle] | None, Meta(description="instead of theta: the map is there once in each, as a map of its own")
+    ] = None
+
+
+class Goal(Struct, forbid_unknown_fields=True):
+    """Centre of the goal square of 92 px."""
+
+    x: _X
+    y: _Y
+
+
+class Obstacle(Struct, forbid_unknown_fields=True):
+    """A solid square, by its centre."""
+
+    x: _X
+    y: _Y
+    size: Annotated[int, Meta(ge=1, le=600, description="side, px")]
+
+
+class Map(Struct, forbid_unknown_fields=True):
+    """One map."""
+
+    start: Start
+    goal: Goal
+    obstacles: Annotated[list[Obstacle], Meta(description=f"at most {MAX_OBSTACLES}")] = []
+    name: Annotated[
+        str, Meta(pattern=f"^(|{_MAP_NAME})$", description="for splits and recordings (default: its number, from 00)")
+    ] = ""
+    weight: Annotated[
+        int, Meta(ge=1, le=_MOST_WEIGHT, description="how often it comes up beside a map of weight 1")
+    ] = 1
+
+
+class MapFile(Struct, forbid_unknown_fields=True):
+    """Maps of the table-carrying task of copolicy."""
+
+    name: Annotated[str, Meta(pattern=f"^{_SET_NAME}$", description="of the set: map_set of recordings")]
+    version: Annotated[str | int | float, Meta(description="of the set; change it whenever a map changes")]
+    maps: list[Map]
+    task: Annotated[str, Meta(pattern="^table$")] = "table"
+    author: str = ""
+    license: Annotated[str, Meta(description="identifier of the Hub, such as cc-by-4.0")] = ""
+    description: str = ""
+    splits: Annotated[
+        dict[str, list[str | int]], Meta(description="maps of each split, by name or number from 0; --maps FILE#split")
+    ] = {}
+
+
+class MapFiles(ScenarioFiles):
+    """Reads, checks, draws and makes map files."""
+
+    schema: Mapping[str, Any] = msgspec.json.schema(MapFile)
+    bounds: Mapping[str, tuple[float, float]] = {
+        "start_x": (240, 240), "start_y": (100, 500), "start_theta": (180, 180), "goal_x": (960, 960),
+        "goal_y": (150, 450), "obstacles": (1, 3), "obstacle_x": (400, 800), "obstacle_y": (50, 550),
+        "obstacle_size": (50, 50),
+    }  # fmt: skip
+
+    def read(self, path: Path) -> ScenarioSet:
+        """See `ScenarioFiles.read`."""
+        chosen, problems = self._read(path)
+        if chosen is None or problems:
+            more = f" (and {len(problems) - 1} more: copolicy-collect maps check)" if len(problems) > 1 else ""
+            raise FileFormatError(path, "maps that can be used", f"{problems[0]}{more}")
+        return chosen
+
+    def problems(self, path: Path) -> list[Problem]:
+        """See `ScenarioFiles.problems`."""
+        return self._read(path)[1]
+
+    def draw(self, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
+        """See `ScenarioFiles.draw`."""
+        from .artist.map_sheet import write_map_sheet  # pygame
+
+        return write_map_sheet(chosen, path, width)
+
+    def make(self, name: str, count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+        """See `ScenarioFiles.make`."""
+        from .random_maps import random_maps  # scipy and pymunk
+
+        if not re.fullmatch(_SET_NAME, name) or name in (*MAP_SETS, "custom"):
+            raise InvalidValueError("--name", "lower-case letters, digits, - or _, and no set of the package", name)
+        maps = [_plain(config) for config in random_maps(count, seed, bounds)]
+        text = ", ".join(f"{key}={low:g}:{high:g}" for key, (low, high) in bounds.items())
+        return {
+            "name": name, "version": "1", "task": "table", "description": f"{count} random maps, seed {seed}, {text}",
+            "maps": maps,
+        }  # fmt: skip
+
+    def _read(self, path: Path) -> tuple[ScenarioSet | None, list[Problem]]:
+        from .map_problems import map_problems  # scipy and pymunk
+
+        document = Document(path)
+        content, problems = document.typed(MapFile)
+        if content is None:
+            return None, problems
+        _check_texts(document, content, problems)
+        maps: list[list[MapConfig]] = []
+        for index, entry in enumerate(content.maps):
+            maps.append(_configs(document, f"maps[{index}]", entry, f"{index:02d}", problems))
+        splits = _splits(document, content, maps, problems)
+        problems += [document.problem(*one) for one in map_problems(maps)]
+        if problems:
+            return None, problems
+        weights = tuple(entry.weight for entry, own in zip(content.maps, maps, strict=True) for _ in own)
+        configs = tuple(config for own in maps for config in own)
+        chosen = ScenarioSet("table", content.name, str(content.version), configs, weights, splits, from_file=True)
+        named = tuple(_named(config, chosen, weight) for config, weight in zip(configs, weights, strict=True))
+        return ScenarioSet("table", content.name, chosen.version, named, weights, splits, "", True, chosen.digest), []
+
+
+def _check_texts(document: Document, content: MapFile, problems: list[Problem]) -> None:
+    if content.name in (*MAP_SETS, "custom"):
+        problems.append(document.problem("name", f"{content.name} is the name of a set of the package"))
+    if not 1 <= len(content.maps) <= _MOST_MAPS:
+        problems.append(document.problem("maps", f"expected 1 to {_MOST_MAPS} maps, found {len(content.maps)}"))
+    if not 1 <= len(str(content.version)) <= 64:
+        problems.append(document.problem("version", f"expected up to 64 characters, found {content.version!r}"))
+    try:
+        checked_licence(content.license, "license")
+    except InvalidValueError as error:
+        problems.append(document.problem("license", str(error).removeprefix("license: ")))
+    names: dict[str, int] = {}
+    for index, entry in enumerate(content.maps):
+        if entry.name and names.setdefault(entry.name, index) != index:
+            message = f"{entry.name} is the name of maps[{names[entry.name]}] too"
+            problems.append(document.problem(f"maps[{index}].name", message))
+
+
+def _configs(document: Document, place: str, entry: Map, number: str, problems: list[Problem]) -> list[MapConfig]:
+    """The map in each of its orientations, under the name that it has within its file."""
+    start = entry.start
+    if (start.theta is None) == (start.orientations is None):
+        problems.append(document.problem(f"{place}.start", "expected either theta or orientations"))
+        return []
+    if len(entry.obstacles) > MAX_OBSTACLES:
+        message = f"expected at most {MAX_OBSTACLES} obstacles, found {len(entry.obstacles)}"
+        problems.append(document.problem(f"{place}.obstacles", message))
+        return []
+    angles: list[float] = []
+    for angle in [start.theta] if start.orientations is None else start.orientations:
+        if isinstance(angle, str) and not _DEGREES.fullmatch(angle):
+            message = f"expected rad as a number, or degrees such as 90deg, found {angle!r}"
+            problems.append(document.problem(f"{place}.start", message))
+        else:
+            radians = math.radians(float(angle[:-3])) if isinstance(angle, str) else float(angle or 0.0)
+            angles.append(radians % (2 * math.pi))
+    whole = [round(math.degrees(angle)) % 360 for angle in angles]
+    if start.orientations is not None and (not angles or len(set(whole)) < len(whole)):
+        message = "expected orientations that differ by a degree at least"
+        problems.append(document.problem(f"{place}.start.orientations", message))
+        return []
+    named = ScenarioName(entry.name or number, "")
+    obstacles = tuple((one.x, one.y) for one in entry.obstacles)
+    sizes = tuple(one.size for one in entry.obstacles)
+    configs = [
+        MapConfig((start.x, start.y, angle), (entry.goal.x, entry.goal.y), obstacles, obstacle_sizes=sizes, named=named)
+        for angle in angles
+    ]
+    return configs if start.orientations is None else [start_at(config, config.start[2]) for config in configs]
+
+
+def _splits(
+    document: Document, content: MapFile, maps: list[list[MapConfig]], problems: list[Problem]
+) -> dict[str, tuple[int, ...]]:
+    """Places of the maps of each split, all orientations of a map together."""
+    first = [sum(len(own) for own in maps[:index]) for index in range(len(maps))]
+    numbers: dict[str | int, int] = {entry.name: index for index, entry in enumerate(content.maps) if entry.name}
+    splits: dict[str, tuple[int, ...]] = {}
+    for name, members in content.splits.items():
+        place = f"splits.{name}"
+        if not re.fullmatch(_MAP_NAME, name):
+            problems.append(document.problem(place, "expected lower-case letters, digits or _ as the name of a split"))
+        chosen = [numbers.get(one, one if isinstance(one, int) else -1) for one in members]
+        for one, index in zip(members, chosen, strict=True):
+            if not 0 <= index < len(maps):
+                problems.append(document.problem(place, f"there is no map {one!r}"))
+        if not members or len(set(chosen)) < len(chosen):
+            problems.append(document.problem(place, "expected at least one map, and each once"))
+        inside = [index for index in chosen if 0 <= index < len(maps)]
+        splits[name] = tuple(first[index] + k for index in inside for k in range(len(maps[index])))
+    return splits
+
+
+def _named(config: MapConfig, chosen: ScenarioSet, weight: int) -> MapConfig:
+    assert config.named is not None
+    name = ScenarioName(
+        f"{chosen.name}-{config.named.scenario}", chosen.name, chosen.version, chosen.digest, weight
+    )  # fmt: skip
+    return MapConfig(
+        config.start, config.goal, config.obstacles, config.obstacle_size, config.obstacle_sizes, named=name
+    )
+
+
+def _plain(config: MapConfig) -> dict[str, Any]:
+    """A map as a file has it."""
+    x, y, theta = config.start
+    return {
+        "start": {"x": x, "y": y, "theta": theta},
+        "goal": dict(zip("xy", config.goal, strict=True)),
+        "obstacles": [{"x": x, "y": y, "size": size} for (x, y), size in config.squares],
+    }
