@@ -151,6 +151,7 @@ class TaskSpec:
         scenario: the vector of a scenario in a data set.
         action: one player's action.
         reasons: how a world can end an episode.
+        successes: which of them mean success.
         record_hz: steps a second.
         players: names of the seats.
         title: what it is called in messages; its name where none is given.
@@ -166,9 +167,12 @@ class TaskSpec:
     record_hz: int = RECORD_HZ
     players: tuple[str, str] = PLAYERS
     title: str = ""
+    successes: tuple[str, ...] = ("goal",)
 
     def __post_init__(self):
         object.__setattr__(self, "title", self.title or self.name)
+        if not set(self.successes) <= set(self.reasons):
+            raise InvalidValueError(f"TaskSpec.successes of {self.name!r}", f"some of {self.reasons}", self.successes)
 
     def to_dict(self) -> dict[str, Any]:
         """The spec as data sets and recordings carry it, JSON-able."""

@@ -12,7 +12,7 @@ import numpy as np
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, VECTORS, features_of
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
@@ -205,7 +205,8 @@ def _frames(path: Path, task: PairTask) -> dict[str, np.ndarray]:
     columns = {"episode_index": feature_values(table, "episode_index", (1,), path)}
     features = features_of(task.spec)
     for name in names:
-        columns[name] = feature_values(table, name, features[name]["shape"], path)
+        values = feature_values(table, name, features[name]["shape"], path)
+        columns[name] = values.reshape(len(values), -1) if name in VECTORS else values
         if not np.isfinite(columns[name]).all():
             raise FileFormatError(path, f"finite numbers of {name}", "nan or inf")
     return columns

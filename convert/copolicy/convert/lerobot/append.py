@@ -183,6 +183,7 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
     record, part = stored_record(whole), stored_record(added)
     notes = {**record.get("notes", {}), **part.pop("notes", {})}
+    part.pop("task", None)  # that of the whole
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
     _renew_minimal_card(whole)

@@ -70,7 +70,8 @@ def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         table = read_parquet(path, (*parts, "index"))
         order.append(feature_values(table, "index", (1,), path))
         for name in parts:
-            parts[name].append(feature_values(table, name, features[name]["shape"], path))
+            shape = features[name]["shape"]
+            parts[name].append(feature_values(table, name, shape, path).reshape(-1, *shape))
     places = np.concatenate(order)
     if len(places) != sum(lengths) or not np.array_equal(np.sort(places), np.arange(len(places))):
         raise FileFormatError(root / "data", f"{sum(lengths)} frames with index 0, 1, ..., each once", f"{len(places)}")
