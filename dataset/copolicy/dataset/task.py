@@ -243,7 +243,7 @@ class PairTask(ABC):
             scenarios = tuple(self.scenario_sets[text])
             return ScenarioSet(self.spec.name, text, "1", scenarios, (1,) * len(scenarios))
         if not is_file_name(text):
-            raise UnknownNameError("map set", text, [*self.scenario_sets, "FILE.yaml"])
+            raise UnknownNameError("map set", text, self.scenario_sets)
         if self.scenario_files is None:
             raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
         path, _, split = text.partition("#")

@@ -181,6 +181,9 @@ def _configs(document: Document, place: str, entry: Map, number: str, problems: 
             message = f"expected rad as a number, or degrees such as 90deg, found {angle!r}"
             problems.append(document.problem(f"{place}.start", message))
         else:
+            if not isinstance(angle, str) and abs(angle or 0.0) > 2 * math.pi + 1e-6:
+                message = f"expected rad from -2 pi to 2 pi, found {angle:g}; degrees are written {angle:g}deg"
+                problems.append(document.problem(f"{place}.start", message))
             radians = math.radians(float(angle[:-3])) if isinstance(angle, str) else float(angle or 0.0)
             angles.append(radians % (2 * math.pi))
     whole = [round(math.degrees(angle)) % 360 for angle in angles]
