@@ -153,6 +153,12 @@ class ScenarioFiles(ABC):
         """
 
 
+def set_label(row: Mapping[str, Any]) -> str:
+    """The map set in an episode's columns, with version and digest where it is of a file."""
+    file = f" (version {row['map_set_version']}, {row['map_set_digest']})" if row["map_set_digest"] else ""
+    return f"{row['map_set']}{file}"
+
+
 def is_file_name(text: str) -> bool:
     """Whether `--maps` names a file, not a set that comes with the task."""
     path = text.partition("#")[0]

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
 
-from copolicy.tasks.table.maps import MAP_SETS, identify
-
+from ..task import get_task
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit
@@ -88,9 +87,10 @@ def _weights(name: str, counts: Counter[str], stated: Mapping[str, int]) -> dict
     Several sets have maps of one family (the paper's 36 carry the names of the training maps): of those with all the
     maps that are there, the one with the fewest others, and of these the one that fits best.
     """
-    if name not in MAP_SETS:
+    task = get_task()
+    if name not in task.scenario_sets:
         return {map_id: max(1, stated.get(map_id, 1)) for map_id in counts}
-    named = [[identify(config) for config in maps] for maps in MAP_SETS.values()]
+    named = [[task.identify(config) for config in maps] for maps in task.scenario_sets.values()]
     sets = [Counter(map_id for map_id, family in maps if family == name) for maps in named]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
     return min(fitting, key=lambda weights: (len(weights), _misfit(weights, counts)), default=dict.fromkeys(counts, 1))
