@@ -176,3 +176,34 @@ def test_co_planning_on_a_split_of_a_file(walked, capsys):
     err = capsys.readouterr().err
     assert f"found lab-doors#train of other content, version 1, digest {'0' * 16}" in err
     assert err.count("\n") == 1
+
+
+def test_the_plan_of_a_human_study_keeps_the_names_of_a_file(tmp_path):
+    pytest.importorskip("lerobot")
+    from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan
+    from copolicy.evaluate.partner_study.configurations import study_configurations
+
+    chosen = get_task().scenario_set(str(write_lab(tmp_path)))
+    starts = study_configurations(chosen, 8)
+    robots = [Robot("A", "a", "0" * 64), Robot("B", "b", "1" * 64)]
+    plan = make_plan(robots, chosen.label, starts, 2, 4, 0)
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(plan.to_json()), encoding="utf-8")
+    read = StudyPlan.read(path)
+    assert [config.named for config in read.configurations] == [config.named for config in starts]
+    assert [config.sizes for config in read.configurations] == [config.sizes for config in starts]
+    assert read.map_set["map_set"]["digest"] == chosen.digest
+
+
+def test_the_environment_starts_on_the_maps_of_a_split(tmp_path):
+    pytest.importorskip("lerobot")
+    from copolicy.dataset.exceptions import CopolicyError
+    from lerobot_policy_copolicy.env.configuration_table_carrying import TableCarryingEnvConfig
+    from lerobot_policy_copolicy.env.table_carrying import TableCarryingEnv
+
+    path = write_lab(tmp_path)
+    assert TableCarryingEnvConfig(map_set=f"{path}#train").map_set == f"{path}#train"
+    assert len(TableCarryingEnv(map_set=f"{path}#train").maps) == 3
+    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).maps) == 8
+    with pytest.raises(CopolicyError, match="unknown split"):
+        TableCarryingEnvConfig(map_set=f"{path}#valid")

@@ -54,6 +54,12 @@ def test_splits_and_orientations(tmp_path):
         get_task().scenario_set(f"{path}#valid")
 
 
+def test_a_path_may_hold_the_mark_of_a_split(tmp_path):
+    path = write_lab(tmp_path, name="lab#2.yaml")
+    assert len(get_task().scenario_set(str(path)).scenarios) == 4
+    assert len(get_task().scenario_set(f"{path}#train").scenarios) == 3
+
+
 def test_json_says_the_same(tmp_path):
     import yaml
 
@@ -160,6 +166,9 @@ def test_random_maps_pass_and_depend_on_seed_and_bounds_alone():
         assert entry["start"]["x"] == 240
     with pytest.raises(RunError, match="expected room for 3 maps, found 0"):
         FILES.make("lab", 3, 0, {**bounds, "start_x": (10, 20)})
+    for name, bound in (("obstacles", (2, 4)), ("obstacles", (1.2, 1.8)), ("obstacle_size", (0, 50))):
+        with pytest.raises(InvalidValueError, match=f"--bounds: expected {name} with a whole number in it"):
+            FILES.make("lab", 1, 0, {**bounds, name: bound})
     with pytest.raises(InvalidValueError, match="no set of the package"):
         FILES.make("training", 1, 0, bounds)
 

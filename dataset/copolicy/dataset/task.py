@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
-from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, is_file_name
+from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 
 RECORD_HZ = 30
 """Steps of simulation and recording per second."""
@@ -246,7 +246,7 @@ class PairTask(ABC):
             raise UnknownNameError("map set", text, self.scenario_sets)
         if self.scenario_files is None:
             raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
-        path, _, split = text.partition("#")
+        path, split = file_and_split(text)
         chosen = self.scenario_files.read(Path(path))
         return chosen.part(split) if split else chosen
 

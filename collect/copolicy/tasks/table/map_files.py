@@ -118,6 +118,11 @@ class MapFiles(ScenarioFiles):
 
         if not re.fullmatch(_SET_NAME, name) or name in (*MAP_SETS, "custom"):
             raise InvalidValueError("--name", "lower-case letters, digits, - or _, and no set of the package", name)
+        for key, least, most in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
+            low, high = bounds[key]
+            if not least <= math.ceil(low) <= math.floor(high) <= most:
+                expected = f"{key} with a whole number in it, from {least} to {most}"
+                raise InvalidValueError("--bounds", expected, f"{key}={low:g}:{high:g}")
         maps = [_plain(config) for config in random_maps(count, seed, bounds)]
         text = ", ".join(f"{key}={low:g}:{high:g}" for key, (low, high) in bounds.items())
         return {
