@@ -7,6 +7,7 @@ from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
 from copolicy.dataset.publication.repo_id import checked_repo_id
+from copolicy.dataset.scenarios import set_label
 
 from .artefacts import newest_release
 from .datasheet import datasheet
@@ -140,13 +141,9 @@ def _physics(facts: DatasetFacts) -> str:
 
 def _episodes(facts: DatasetFacts) -> str:
     total = len(facts.episodes)
-    sets: dict[str, list[dict]] = {name: [] for name in facts.values("map_set")}
+    sets: dict[str, list[dict]] = {}
     for episode in facts.episodes:
-        if episode["map_set_digest"]:
-            file = f"version {episode['map_set_version']}, {episode['map_set_digest']}"
-            sets.setdefault(f"{episode['map_set']} ({file})", []).append(episode)
-        elif episode["map_set"]:
-            sets[episode["map_set"]].append(episode)
+        sets.setdefault(set_label(episode), []).append(episode)
     maps = [
         (
             name,
@@ -155,7 +152,7 @@ def _episodes(facts: DatasetFacts) -> str:
             share(sum(e["success"] for e in members), len(members)),
         )
         for name, members in sorted(sets.items())
-        if members
+        if name
     ]
     reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
     routes = [(route or "none", count) for route, count in facts.counts("route_class").items()]

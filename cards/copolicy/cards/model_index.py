@@ -50,7 +50,7 @@ def _result(evaluation: Mapping[str, Any]) -> EvalResult:
     return EvalResult(
         task_type="robotics",
         task_name=f"table carrying, {evaluation['study']} (simulation)",
-        dataset_type=f"copolicy-maps-{settings['maps']}",
+        dataset_type=f"copolicy-maps-{settings['maps'].replace('#', '-')}",
         dataset_name=f"{settings['maps']} maps{'' if whole else ', a part of them'}",
         dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
         dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else 'maps'}",

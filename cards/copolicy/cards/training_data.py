@@ -1,7 +1,10 @@
 """What a policy was trained on, from the data set's own metadata or from the recipe of an exported policy."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
+
+from copolicy.dataset.scenarios import set_label
 
 from .facts import DatasetFacts
 
@@ -38,6 +41,7 @@ class TrainingData:
     def from_data_set(cls, facts: DatasetFacts, settings: dict[str, Any]) -> "TrainingData":
         """From the data set's folder, and what the training says about it."""
         chosen = settings.get("episodes")
+        sets = Counter(set_label(episode) for episode in facts.episodes)
         return cls(
             repo_id=str(settings.get("repo_id") or ""),
             revision=settings.get("revision"),
@@ -46,7 +50,7 @@ class TrainingData:
             frames=facts.info["total_frames"],
             fps=facts.info["fps"],
             sources=facts.counts("source"),
-            map_sets=facts.counts("map_set"),
+            map_sets=dict(sorted(sets.items(), key=lambda item: (-item[1], item[0]))),
             licences=facts.counts("license"),
             pairs=facts.counts("pair_id"),
         )

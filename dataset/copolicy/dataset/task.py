@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
-from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, is_file_name
+from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -345,10 +345,10 @@ class PairTask(ABC):
             scenarios = tuple(self.scenario_sets[text])
             return ScenarioSet(self.spec.name, text, "1", scenarios, (1,) * len(scenarios))
         if not is_file_name(text):
-            raise UnknownNameError("map set", text, [*self.scenario_sets, "FILE.yaml"])
+            raise UnknownNameError("map set", text, self.scenario_sets)
         if self.scenario_files is None:
             raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
-        path, _, split = text.partition("#")
+        path, split = file_and_split(text)
         chosen = self.scenario_files.read(Path(path))
         return chosen.part(split) if split else chosen
 

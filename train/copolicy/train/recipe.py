@@ -13,6 +13,7 @@ from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
+from copolicy.dataset.scenarios import set_label
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -126,7 +127,10 @@ def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[s
     """How many of the used episodes have each value of an episode column."""
     if column not in folder.episodes.column_names:
         return {}
-    values = folder.episodes.column(column).to_pylist()
+    if column == "map_set":
+        values = [set_label(row) for row in folder.rows((column, "map_set_version", "map_set_digest"))]
+    else:
+        values = folder.episodes.column(column).to_pylist()
     counts = Counter(str(value) for episode, value in enumerate(values) if episode in used)
     return dict(counts.most_common())
 

@@ -86,7 +86,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     )
     return {
         "map": map_id,
-        "map_set": chosen.describe(),
+        **({"map_set": chosen.describe()} if chosen.from_file else {}),
         "seconds": seconds,
         "samples": len(decision.samples),
         "fps": protocol.fps,
