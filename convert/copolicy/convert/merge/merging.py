@@ -13,7 +13,7 @@ from typing import Any
 
 from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
-from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
@@ -128,7 +128,7 @@ def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.T
                 {
                     name: _without_nan(name, table.column(name).cast(kind))
                     if name in table.column_names
-                    else pa.array([LATER_DEFAULTS.get(name)] * table.num_rows, kind)
+                    else pa.array([UNKNOWN_VALUES[name] if name in LATER_COLUMNS else None] * table.num_rows, kind)
                     for name, kind in types.items()
                 }
             )

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from ..features import ACTION, STATE
+from ..lerobot_folder.info import split_range
 from .duplicates import motion_digests
 from .episode_table import EpisodeTable
 from .finding import Finding, Severity
@@ -31,14 +32,13 @@ def splits(table: EpisodeTable) -> tuple[list[Part], list[Finding]]:
     entries = table.info.get("splits")
     indices = {label: place for place, label in enumerate(table.labels)}
     for name, text in (entries if isinstance(entries, dict) else {}).items():
-        begin, colon, end = str(text).partition(":")
-        if not (colon and begin.isdecimal() and end.isdecimal()):
+        if (span := split_range(text)) is None:
             findings.append(Finding("", "splits", str(text), "FIRST:END", "error", f"split {name} is no range"))
             continue
-        if int(end) > len(table.labels) or int(begin) > int(end):
+        if span.stop > len(table.labels) or span.start > span.stop:
             message = f"split {name} is not a range of the {len(table.labels)} episodes"
             findings.append(Finding("", "splits", str(text), f"0:{len(table.labels)}", "error", message))
-        places = [indices[str(index)] for index in range(int(begin), int(end)) if str(index) in indices]
+        places = [place for label, place in indices.items() if int(label) in span]
         parts.append(Part(str(name), table, places))
     for one, other in combinations(parts, 2):
         shared = len(set(one.places) & set(other.places))

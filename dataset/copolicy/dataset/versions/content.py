@@ -42,7 +42,7 @@ def read_content(root: Path) -> Content:
     folder = LeRobotFolder.open(root)
     info, rows = folder.info, _read_episodes(folder)
     tasks = read_tasks(root)
-    frames = frame_digests(root, info, [row["length"] for row in rows], tasks)
+    frames = frame_digests(folder, tasks)
     episodes = tuple(_episode(root, info, row, features) for row, features in zip(rows, frames, strict=True))
     return Content(
         float(info["fps"]),

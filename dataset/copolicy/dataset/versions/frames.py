@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..files.listing import visible_files
 from ..files.meta_files import INFO_FILE, TASKS_FILE
+from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.tables import column_types, feature_values, read_parquet
 from .canonical import encode
 
@@ -17,7 +17,7 @@ POSITION_COLUMNS = ("index", "episode_index")
 """Frame columns that only say where a frame stands; verified instead of hashed, as a merge moves them."""
 
 
-def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[int, str]) -> list[dict[str, str]]:
+def frame_digests(folder: LeRobotFolder, tasks: dict[int, str]) -> list[dict[str, str]]:
     """For each episode the sha256 of each of its features but the positions and videos.
 
     Numbers are hashed as little-endian values of the feature's declared type, row by row, with one NaN for all;
@@ -25,17 +25,13 @@ def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[in
     at a time.
 
     Args:
-        info: `meta/info.json`.
-        lengths: frames of each episode, in order.
         tasks: sentence of each task's number.
 
     Raises:
         FileFormatError: files that contradict the features, the lengths, or the order of the frames.
     """
-    files = visible_files(root / "data", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "at least one Parquet file under data", "none")
-    features = {name: feature for name, feature in info["features"].items() if feature["dtype"] != "video"}
+    root, files, lengths = folder.root, folder.data_files, folder.lengths
+    features = {name: feature for name, feature in folder.info["features"].items() if feature["dtype"] != "video"}
     for path in files:
         names = column_types(path)
         if set(names) != set(features):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...exceptions import FileFormatError, MissingExtraError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
+from ...lerobot_folder.info import split_range
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
 from ...lerobot_folder.tables import read_parquet
 from ...publication.minimal_card import minimal_card
@@ -83,10 +84,9 @@ def kept_splits(info: Mapping[str, Any], numbers: Sequence[int]) -> dict[str, st
     splits: dict[str, str] = {}
     entries = info.get("splits")
     for name, text in (entries if isinstance(entries, dict) else {}).items():
-        first, colon, end = str(text).partition(":")
-        if not (colon and first.isdecimal() and end.isdecimal()):
+        if (span := split_range(text)) is None:
             return {"train": f"0:{len(numbers)}"}
-        inside = [place for place, number in enumerate(numbers) if int(first) <= number < int(end)]
+        inside = [place for place, number in enumerate(numbers) if number in span]
         if inside:
             splits[name] = f"{inside[0]}:{inside[-1] + 1}"
     return splits or {"train": f"0:{len(numbers)}"}
