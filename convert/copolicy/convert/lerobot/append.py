@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.clock import Hold
-from copolicy.dataset.edit.subset.numbered_files import Place, numbered_files
 from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
@@ -19,6 +18,7 @@ from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_F
 from copolicy.dataset.files.staging import about, sync_folder, sync_tree
 from copolicy.dataset.lerobot_folder.info import read_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
+from copolicy.dataset.lerobot_folder.references import Place, numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, minimal_card
 from copolicy.dataset.recording.log import read_metadata

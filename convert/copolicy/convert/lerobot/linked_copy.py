@@ -4,11 +4,11 @@ import os
 import shutil
 from pathlib import Path
 
-from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.episode import LATER_COLUMNS, UNKNOWN_VALUES
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.listing import broken_links
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER
+from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 from .shifted_tables import write_like

@@ -11,13 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.edit.subset.numbered_files import numbered_files
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
 from copolicy.dataset.versions.content import read_content
@@ -26,8 +26,7 @@ from copolicy.dataset.versions.digests import Content
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures, converter_versions
 from ..lerobot.stored_rewards import foreign_rewards
-from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
-from .source import read_source, require_alike
+from .source import LOCAL_NAMES, read_source, renamed, require_alike, require_prefixes, require_strangers
 
 try:
     import pyarrow as pa

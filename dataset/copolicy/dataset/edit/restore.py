@@ -13,8 +13,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..checks.duplicates import motion_digests
 from ..checks.episode_table import EpisodeTable
+from ..checks.leakage import motion_digests
 from ..checks.read_lerobot import read_lerobot
 from ..clock import Hold, frame_actions, frame_states
 from ..command_line.commands import progress
@@ -158,7 +158,7 @@ def _of_recordings(path: Path, root: Path) -> Originals:
 
 
 def _motion(episode: Episode, fps: int, hold: Hold) -> str:
-    """The digest that the frames of a recording have in a data set (`checks.duplicates.motion_digests`)."""
+    """The digest that the frames of a recording have in a data set (`checks.leakage.motion_digests`)."""
     columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
     rows = np.hstack([column.astype(np.float32) for column in columns])
     return hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest()

@@ -22,10 +22,8 @@ from ..exceptions import FileFormatError
 from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.references import read_tasks, video_span
-from .canonical import digest
-from .digests import Content, EpisodeContent
-from .frames import frame_digests
-from .videos import video_digest
+from .digests import Content, EpisodeContent, digest
+from .frames import frame_digests, video_digest
 
 _LAYOUT = ("data/", "meta/episodes/", "videos/", "stats/")
 _POSITION = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}

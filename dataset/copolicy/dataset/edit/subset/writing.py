@@ -11,12 +11,11 @@ import numpy as np
 from ...exceptions import FileFormatError, MissingExtraError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
 from ...lerobot_folder.info import split_range
-from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
+from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
 from ...lerobot_folder.tables import read_parquet
 from ...publication.minimal_card import minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
-from .numbered_files import Place, next_place, numbered
 from .stored_set import StoredSet
 from .video_cuts import cut_videos
 
