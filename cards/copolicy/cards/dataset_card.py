@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable
 
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from huggingface_hub import DatasetCardData
+
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.exclusions import FLAG
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
@@ -15,11 +17,6 @@ from .facts import DatasetFacts
 from .findings import findings
 from .markdown import share, table
 from .multimodality import multimodality
-
-try:
-    from huggingface_hub import DatasetCardData
-except ModuleNotFoundError:
-    raise MissingExtraError("huggingface_hub") from None
 
 SOURCES = {
     "human": "People played these episodes, two at a time, with one controller each.",

@@ -10,16 +10,13 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import pyarrow as pa
+from lerobot.datasets.feature_utils import features_equal_for_merge
+
 from copolicy.dataset.edit.subset.stored_set import StoredSet
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER, INFO_FILE
-
-try:
-    import pyarrow as pa
-    from lerobot.datasets.feature_utils import features_equal_for_merge
-except ImportError as error:
-    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
 LOCAL_NAMES = ("session_id", "pair_id", "player_0_id", "player_1_id", "consent_id")
 """The episode columns whose names a lab gives for itself."""
@@ -109,7 +106,7 @@ def require_strangers(sources: Sequence[StoredSet]) -> None:
         seen |= names
 
 
-def renamed(episodes: "pa.Table", prefix: str) -> "pa.Table":
+def renamed(episodes: pa.Table, prefix: str) -> pa.Table:
     """Rows of meta/episodes with `prefix-` before every name that the lab gave for itself."""
     simulated = episodes.column("source").to_pylist()
     for column in LOCAL_NAMES:

@@ -11,20 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from datatrove.executor import LocalPipelineExecutor, RayPipelineExecutor, SlurmPipelineExecutor
+from datatrove.pipeline.base import PipelineStep
+from loguru import logger
+
 from copolicy.dataset.command_line.commands import progress
-from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.worker_pool import WorkerPool
 
 from ..lerobot.prepare import DamagedEpisodeError
 from .plan import ShardPlan
-
-try:
-    from datatrove.executor import LocalPipelineExecutor, RayPipelineExecutor, SlurmPipelineExecutor
-    from datatrove.pipeline.base import PipelineStep
-    from loguru import logger
-except ModuleNotFoundError as error:
-    raise MissingExtraError((error.name or "datatrove").split(".")[0], "scale") from None
 
 SUMMARY_FILE = "summary.json"
 

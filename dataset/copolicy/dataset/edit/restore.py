@@ -23,11 +23,11 @@ from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION
 from ..files.listing import visible_files
 from ..files.meta_files import RECORD_FILE
+from ..files.replace_folder import finish_interrupted
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
 from ..recording.log import read_episode
 from .amend import today
-from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import record_text, stored_record
 
 _SHOWN = 5

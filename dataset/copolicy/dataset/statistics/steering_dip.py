@@ -3,17 +3,12 @@
 from typing import cast
 
 import numpy as np
+from diptest import diptest
 from scipy.stats import false_discovery_control
 
-from ..exceptions import MissingExtraError
 from .estimate import Estimate, Null
 from .resampling import Bootstrap
 from .trajectories import Trajectories
-
-try:
-    from diptest import diptest
-except ModuleNotFoundError:
-    raise MissingExtraError("diptest") from None
 
 MIN_EPISODES = 8
 """Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""
