@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.json_file import require_type
+from copolicy.dataset.files.json_file import read_optional_json, require_type
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.policies.documents import (
     EvaluationDocument,
@@ -18,7 +18,6 @@ from copolicy.dataset.policies.documents import (
 )
 from copolicy.dataset.policies.training_run import find_policy_folder
 
-from .artefacts import read_json
 from .facts import DatasetFacts
 
 WEIGHTS = "model.safetensors"
@@ -130,12 +129,12 @@ class Checkpoint:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
         """
         folder = _folder(path)
-        config = read_json(folder / "config.json", dict, "a policy's configuration") or {}
+        config = read_optional_json(folder / "config.json", dict, "a policy's configuration") or {}
         if "type" not in config:
             raise FileFormatError(folder / "config.json", "a policy's configuration with its type", "none")
         require_type(config, PolicyConfigDocument, "a policy's configuration", folder / "config.json")
-        training = read_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
-        recipe = read_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
+        training = read_optional_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
+        recipe = read_optional_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
         root = dataset_root or _training_root(settings)
         if root is not None:
@@ -165,7 +164,7 @@ class Checkpoint:
         """
         if not paths:
             kept = self.folder / EVALUATIONS
-            stored = read_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
+            stored = read_optional_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
             results = stored.get("evaluations") or []
             return [self._checked(kept, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
@@ -173,7 +172,7 @@ class Checkpoint:
         return [self._evaluation(path) for path in paths]
 
     def _evaluation(self, path: Path) -> dict[str, Any]:
-        result = read_json(path, dict, _RESULT)
+        result = read_optional_json(path, dict, _RESULT)
         if result is None:
             raise FileFormatError(path, _RESULT, "no such file")
         return self._checked(path, result)

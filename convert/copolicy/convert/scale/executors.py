@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from datatrove.executor import LocalPipelineExecutor, RayPipelineExecutor, SlurmPipelineExecutor
 from datatrove.pipeline.base import PipelineStep
@@ -24,9 +24,6 @@ from ..lerobot.prepare import DamagedEpisodeError
 from .plan import ShardPlan
 
 SUMMARY_FILE = "summary.json"
-
-
-ExecutorName = Literal["local", "slurm", "ray"]
 
 
 class _Step(PipelineStep):

@@ -153,17 +153,6 @@ class LeRobotFolder:
                 self.root / INFO_FILE, "a data set of carrying a table (copolicy-convert)", difference
             )
 
-    def require_frames(self, features: Sequence[str]) -> None:
-        """Checks that every data file has the columns of some features.
-
-        Raises:
-            FileFormatError: a file is no complete Parquet file, or lacks a column.
-        """
-        for path in self.data_files:
-            missing = [name for name in features if name not in column_types(path)]
-            if missing:
-                raise FileFormatError(path, "the columns of this task", f"none named {', '.join(missing)}")
-
 
 def data_files(root: Path) -> list[Path]:
     """The Parquet files of frames, in the order of their paths."""
