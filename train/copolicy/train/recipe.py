@@ -46,12 +46,8 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     }
     training = read_optional_json(folder / "train_config.json", TrainingDocument, "the settings of a training")
     if training:
-        reached = (
-            read_optional_json(
-                folder.parent / "training_state" / "training_step.json", ReachedStep, "a training's step"
-            )
-            or {}
-        )
+        step_file = folder.parent / "training_state" / "training_step.json"
+        reached = read_optional_json(step_file, ReachedStep, "a training's step") or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},
