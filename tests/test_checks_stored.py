@@ -17,8 +17,8 @@ from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.files.meta_files import CHECK_FILE
 from copolicy.dataset.transfer.publish import verify_release
-from copolicy.dataset.versions.canonical import digest
 from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.digests import digest
 from copolicy.dataset.versions.release import release
 
 

@@ -18,8 +18,7 @@ from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.recording.log import read_episode
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.human_study.latin_square import williams_square
-from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan
+from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
 from copolicy.evaluate.human_study.questionnaire import read_ratings
 from copolicy.evaluate.human_study.repeated_measures import anova, rank_test, tukey
 from copolicy.evaluate.human_study.schedule import BlindPlanner

@@ -9,12 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from copolicy.dataset.exceptions import MissingExtraError
-
-try:
-    from huggingface_hub import EvalResult
-except ModuleNotFoundError:
-    raise MissingExtraError("huggingface_hub") from None
+from huggingface_hub import EvalResult
 
 _SETTINGS = (
     "map_count", "configurations", "orientations", "repeats", "actions_per_plan", "fps", "step_limit",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from .coplan.rollouts import Outcome
 from .planner import Planner
@@ -15,13 +16,11 @@ def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
     """Share of successes with its binomial standard error and Wilson's 95 % interval."""
     n = len(successes)
     p = sum(successes) / n
-    z = 1.959963984540054
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    interval = binomtest(sum(successes), n).proportion_ci(method="wilson")
     return {
         "mean": p,
         "standard_error": math.sqrt(p * (1 - p) / n),
-        "wilson_95": [max(0.0, centre - half), min(1.0, centre + half)],
+        "wilson_95": [float(interval.low), float(interval.high)],
         "episodes": n,
     }
 

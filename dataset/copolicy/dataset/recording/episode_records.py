@@ -7,14 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, get_args
 
-from ..episode import (
-    EPISODE_COLUMNS,
-    LATER_DEFAULTS,
-    SET_COLUMNS,
-    EpisodeMeta,
-    Source,
-    termination_reasons,
-)
+from ..episode import EPISODE_COLUMNS, LATER_DEFAULTS, SET_COLUMNS, EpisodeMeta, Source, termination_reasons
 from ..exceptions import InvalidValueError
 from ..task import PairTask, TaskSpec
 

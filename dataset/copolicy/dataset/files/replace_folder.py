@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...files.staging import sync_folder, sync_tree
+from .staging import about, sync_folder, sync_tree
 
 _BEFORE = "before-edit"
 _DELETED = "deleted"
@@ -26,19 +26,24 @@ def replaced_folder(root: Path) -> Iterator[Path]:
     target = root.resolve()
     partial = target.parent / f".{target.name}.{secrets.token_hex(4)}.partial"
     try:
-        yield partial
-        sync_tree(partial)
-        target.rename(_before(target))
-        partial.rename(target)
-        sync_folder(target.parent)
-    except BaseException as error:
+        with about(root, partial):
+            yield partial
+            before = take_place(partial, target)
+    except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         finish_interrupted(root)
-        if isinstance(error, OSError) and error.errno is not None:
-            # Nobody finds the hidden folder when they read this.
-            error.filename = str(error.filename or root).replace(str(partial), str(root))
         raise
-    shutil.rmtree(_before(target))
+    shutil.rmtree(before)
+
+
+def take_place(whole: Path, place: Path) -> Path:
+    """Puts a complete folder in the place of another one; returns where the old one lies, to be deleted."""
+    sync_tree(whole)
+    before = place.parent / f".{place.name}.{_BEFORE}"
+    place.rename(before)
+    whole.rename(place)
+    sync_folder(place.parent)
+    return before
 
 
 def finish_interrupted(root: Path) -> None:
@@ -74,7 +79,3 @@ def finish_all_interrupted(folder: Path) -> None:
 def is_unfinished(name: str) -> bool:
     """Whether a folder of this name is in the making, or is what a killed command left of one."""
     return _UNFINISHED.fullmatch(name) is not None
-
-
-def _before(place: Path) -> Path:
-    return place.parent / f".{place.name}.{_BEFORE}"
