@@ -14,7 +14,7 @@ from torch.utils.data import BatchSampler, DataLoader, Subset, default_collate
 from training_table import LENGTHS, assert_same_batch, windows
 
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.features import STATE, TASK
+from copolicy.dataset.features import STATE
 from copolicy.tasks.table.features import TASK
 from copolicy.train.memory_dataset import DeferredBatch, MemoryDataset
 from copolicy.train.memory_training import WholeEpochSampler, _make_datasets

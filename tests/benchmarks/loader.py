@@ -19,7 +19,6 @@ import torch
 from lerobot.datasets import EpisodeAwareSampler, LeRobotDataset
 from torch.utils.data import DataLoader
 
-from copolicy.dataset.features import TASK
 from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.train.memory_dataset import MemoryDataset
 from copolicy.train.memory_training import WholeEpochSampler

@@ -16,7 +16,7 @@ import numpy as np
 
 from copolicy.dataset.clock import frames
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import ACTION, BOUNDS, GYM_ID, OBSERVATION_KEYS, TASK
+from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_folder
 from copolicy.tasks.table.features import BOUNDS, TASK
 from copolicy.tasks.table.physics import Physics

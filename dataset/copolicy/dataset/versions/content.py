@@ -20,7 +20,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ..episode import EPISODE_COLUMNS, LATER_DEFAULTS, UNHASHED_DEFAULTS
+from ..episode import EPISODE_COLUMNS, UNHASHED_DEFAULTS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
@@ -64,7 +64,7 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
         for name, value in row.items()
         if name not in _POSITION
         and not name.startswith(_LAYOUT)
-        and (name not in UNHASHED_DEFAULTS or value not in (None, LATER_DEFAULTS[name]))
+        and (name not in UNHASHED_DEFAULTS or value not in (None, UNKNOWN_VALUES[name]))
     }
     return EpisodeContent(
         row["episode_uuid"],
