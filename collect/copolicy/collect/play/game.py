@@ -120,8 +120,8 @@ class Game:
             pair_id=self.settings.pair,
             player_0_id=robot.player_id,
             player_1_id=human.player_id,
-            controller_0=robot.controller.name,
-            controller_1=human.controller.name,
+            controller_0=robot.agent.name,
+            controller_1=human.agent.name,
             map_id=map_id,
             map_set=map_set,
             seed=int(np.random.SeedSequence(entropy).generate_state(1)[0]),
@@ -130,9 +130,9 @@ class Game:
             license=self.settings.license,
             software_version=version("lerobot_policy_copolicy"),
         )
-        controllers = (robot.controller, human.controller)
+        agents = (robot.agent, human.agent)
         return Trial(
-            self.folder.next_path(), config, seating, controllers, meta, self.anchor, self.settings.physics, practice,
+            self.folder.next_path(), config, seating, agents, meta, self.anchor, self.settings.physics, practice,
             self.clock,
         )  # fmt: skip
 

@@ -12,8 +12,10 @@ from copolicy.dataset.task import PairTask, TaskSpec, Vector
 from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
 from .maps import MAP_SETS, identify
 from .physics import Physics
+from .seats import TableSeats
 
 if TYPE_CHECKING:
+    from .agents.players import TablePlayers
     from .world import TableWorld
 
 _WIDTH, _HEIGHT = (float(side) for side in WINDOW)
@@ -53,6 +55,14 @@ class TableTask(PairTask):
     )
     scenario_type = MapConfig
     settings_type = Physics
+    exchange = TableSeats()
+
+    @property
+    def agents(self) -> "TablePlayers":
+        """Simulated pairs, partners and robots."""
+        from .agents.players import TablePlayers
+
+        return TablePlayers()
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:
