@@ -232,7 +232,7 @@ def test_a_checkpoint_with_nan_is_no_start(random_table, tmp_path, capsys):
     save_file(state, path)
     assert main([f"--config_path={output}", "--resume=true", "--steps=2"]) == 2
     assert "expected finite weights to start from, found nan in denoiser.head.weight" in capsys.readouterr().err
-    from copolicy.collect.agents.checkpoint import Checkpoint
+    from copolicy.train.checkpoint import Checkpoint
 
     with pytest.raises(
         FileFormatError, match=r"expected finite weights, found nan or infinity in denoiser.head.weight"

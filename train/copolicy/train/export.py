@@ -13,7 +13,6 @@ import torch
 from lerobot.policies.factory import make_pre_post_processors
 from torch import Tensor
 
-from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
@@ -22,6 +21,7 @@ from copolicy.dataset.files.staging import new_folder, replace_json
 from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.maps import MAP_SETS
 
+from .checkpoint import Checkpoint
 from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe
 
 _AVERAGED = "ema.model."

@@ -225,8 +225,8 @@ class CopolicyPolicy(PreTrainedPolicy):
         condition = self.features(observation)
         shape = (len(condition), self.config.horizon, _ACTION_SIZE)
         if noise is None:
-            source = condition.device if generator is None else generator.device
-            noise = torch.randn(shape, generator=generator, device=source)
+            # On the CPU, so that a seed means the same on every device.
+            noise = torch.randn(shape, generator=generator, device="cpu" if generator is None else generator.device)
         elif noise.shape != shape:
             raise ShapeError("noise", shape, tuple(noise.shape))
         noise, tokens = noise.to(condition.device), self._tokens(actions)
