@@ -37,11 +37,7 @@ _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
 
 
 def merge_datasets(
-    roots: Sequence[Path],
-    root: Path,
-    repo_id: str,
-    prefixes: Sequence[str] | None = None,
-    same_people: bool = False,
+    roots: Sequence[Path], root: Path, repo_id: str, prefixes: Sequence[str] | None = None, same_people: bool = False
 ) -> dict[str, Any]:
     """Writes the episodes of several data sets, one after the other, as one at `root`.
 
