@@ -196,3 +196,15 @@ def visit(browser):
 
     with visiting(browser) as visit:
         yield visit
+
+
+@pytest.fixture
+def peg(monkeypatch):
+    """A task of another package, installed as far as Python can tell, here and in the commands that a test starts."""
+    from copolicy.dataset.task import get_task
+
+    folder = str(Path(__file__).parent / "peg_task")
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH")))))
+    yield get_task("peg")
+    get_task.cache_clear()

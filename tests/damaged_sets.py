@@ -209,8 +209,8 @@ def look_before_training(root: Path) -> None:
     """
     from copolicy.dataset.lerobot_folder.info import read_info
     from copolicy.dataset.lerobot_folder.loading import read_statistics
+    from copolicy.train.episode_choice import check_local_dataset
     from copolicy.train.finite_data import mended_statistics, require_finite_frames
-    from copolicy.train.local_dataset import check_local_dataset
 
     check_local_dataset(root)
     info = read_info(root)

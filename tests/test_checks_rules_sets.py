@@ -169,3 +169,35 @@ def test_leakage_between_splits(sound):
     ]
     found = find(replace(table, info={"splits": {"train": "0:5", "test": "4:9"}}), "leakage")
     assert [finding.rule for finding in found[:2]] == ["splits", "splits"]
+
+
+def test_two_files_of_maps_with_one_name(sound):
+    """The same name and other content is one warning; a map of a file is not held against the sets of the package."""
+    count = len(sound.labels)
+    of_file = sound
+    for column, values in (
+        ("map_set", np.full(count, "lab")), ("map_set_version", np.full(count, "1")),
+        ("map_set_digest", np.full(count, "a" * 16)),
+        ("map_id", np.array([f"lab-{name}" for name in sound.columns["map_id"].tolist()])),
+    ):  # fmt: skip
+        of_file = with_column(of_file, column, values)
+    for rule in ("map_files", "map_names", "map_rows", "obstacle_sizes"):
+        assert find(of_file, rule) == []
+    digests = np.array(["a" * 16, *["b" * 16] * (count - 1)])
+    found = find(with_column(of_file, "map_set_digest", digests), "map_files")
+    assert [f.message for f in found] == [
+        f"episodes of several files of maps that are all named lab: {count - 1} of version 1, digest {'b' * 16}; 1 of "
+        f"version 1, digest {'a' * 16}"
+    ]
+    elsewhere = with_entry(of_file, "map_id", 0, "other-01")
+    assert [f.message for f in find(elsewhere, "map_names")] == ["map_set is not the file of map_id"]
+
+
+def test_maps_of_a_file_are_as_frequent_as_their_weights(sound):
+    count = 60
+    table = replace(sound, labels=tuple(map(str, range(count))), columns={
+        "map_set": np.full(count, "lab"), "map_id": np.array(["lab-a"] * 45 + ["lab-b"] * 15),
+        "map_weight": np.array([3] * 45 + [1] * 15),
+    })  # fmt: skip
+    assert find(table, "balance") == []
+    assert of(find(with_column(table, "map_weight", np.ones(count, int)), "balance")) == [("", "warning")]

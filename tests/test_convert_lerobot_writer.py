@@ -15,6 +15,7 @@ from copolicy.convert.lerobot.writer import write_dataset
 from copolicy.dataset.episode import EPISODE_COLUMNS, Episode, EpisodeMeta
 from copolicy.dataset.exceptions import OutputExistsError, RunError
 from copolicy.dataset.lerobot_folder.info import robot_type
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
@@ -128,6 +129,7 @@ def test_it_loads_with_time_offsets_and_our_columns(written):
 def test_the_record_of_the_conversion(written):
     record = json.loads((written[0] / "meta/copolicy.json").read_text(encoding="utf-8"))
     notes = {f"uuid-{index}": [f"note {index}"] for index in range(5)}
+    assert record.pop("task") == json.loads(json.dumps(get_task("table").spec.to_dict()))
     assert record == {"converter": "test", "fps": 10, "hold": "mean", "notes": notes}
 
 

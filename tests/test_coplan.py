@@ -13,13 +13,13 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan.rollouts import coplan
-from copolicy.evaluate.planner import Planner
 from copolicy.evaluate.summary import success_rate
 from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
+from copolicy.train.checkpoint import Checkpoint
 
 
 def _demonstration(config, seed):
@@ -36,20 +36,20 @@ def _demonstration(config, seed):
             return clock.frame_actions(np.array(actions), 10), np.array(path)
 
 
-class ReplayPlanner:
-    """Plans what was demonstrated on each map, and remembers what it was shown."""
+class ReplayPolicy:
+    """Predicts what was demonstrated on each map, and remembers what it was shown."""
 
-    def __init__(self, demonstrations, maps, actions_per_plan):
-        self.frames = 3
+    name, n_obs_steps, n_action_steps, fps, keeps_history = "replay", 3, 8, 10, False
+
+    def __init__(self, demonstrations, maps):
         self.demonstrations = {tuple(environment_state(m)): d for m, d in zip(maps, demonstrations, strict=True)}
-        self.actions_per_plan = actions_per_plan
         self.calls = []
 
-    def seed(self, seed):
+    def reset(self, seed):
         """A replay has no noise."""
 
-    def plan(self, history):
-        first = len(self.calls) * self.actions_per_plan
+    def predict_action_chunk(self, history):
+        first = len(self.calls) * self.n_action_steps
         self.calls.append(history)
         plans = []
         for vector in history[ENVIRONMENT_STATE][:, -1]:
@@ -61,8 +61,8 @@ class ReplayPlanner:
 def test_a_replayed_demonstration_reaches_its_goal_on_its_path():
     maps = MAP_SETS["training"][:7:3]
     recorded = [_demonstration(config, seed) for seed, config in enumerate(maps)]
-    planner = ReplayPlanner([actions for actions, _ in recorded], maps, 8)
-    outcomes = coplan(planner, maps, Physics())  # pyright: ignore[reportArgumentType]
+    policy = ReplayPolicy([actions for actions, _ in recorded], maps)
+    outcomes = coplan(policy, maps, Physics())
     for outcome, (actions, path) in zip(outcomes, recorded, strict=True):
         assert outcome.success
         assert outcome.reason == "goal"
@@ -76,9 +76,9 @@ def test_a_replayed_demonstration_reaches_its_goal_on_its_path():
 def test_the_history_is_on_the_grid_of_frames_and_never_stale():
     (config,) = maps = MAP_SETS["training"][:1]
     actions, _ = _demonstration(config, 0)
-    planner = ReplayPlanner([actions], maps, 8)
-    coplan(planner, maps, Physics())  # pyright: ignore[reportArgumentType]
-    first, second = planner.calls[:2]
+    policy = ReplayPolicy([actions], maps)
+    coplan(policy, maps, Physics())
+    first, second = policy.calls[:2]
     # At the start the first observation is repeated and nothing was done before.
     assert (first[STATE] == first[STATE][:, :1]).all()
     assert not first[HUMAN_ACTION].any()
@@ -124,14 +124,14 @@ def test_the_command_writes_a_result_and_a_picture(checkpoint, tmp_path, capsys)
 
 
 def test_the_same_seed_gives_the_same_plans(checkpoint):
-    planner = Planner(checkpoint)
+    policy = Checkpoint(checkpoint)
     # The untrained head is zero and would plan rest from any noise.
     torch.manual_seed(0)
-    for parameter in planner.checkpoint.policy.parameters():
+    for parameter in policy.policy.parameters():
         torch.nn.init.normal_(parameter, std=0.1)
     paths = []
     for seed in (0, 0, 1):
-        outcomes = coplan(planner, MAP_SETS["unseen"][:2], Physics(step_limit=90), seed=seed)
+        outcomes = coplan(policy, MAP_SETS["unseen"][:2], Physics(step_limit=90), seed=seed)
         paths.append(np.array([outcome.path for outcome in outcomes]))
     np.testing.assert_array_equal(paths[0], paths[1])
     assert np.abs(paths[0] - paths[2]).max() > 0.1
@@ -166,7 +166,7 @@ def test_more_actions_than_a_plan_holds_are_refused(checkpoint, tmp_path, capsys
 
 def test_a_setting_that_the_policy_lacks_is_refused(checkpoint):
     with pytest.raises(FileFormatError, match="expected a policy with the setting 'temperature'"):
-        Planner(checkpoint, temperature=2.0)
+        Checkpoint(checkpoint, settings={"temperature": 2.0})
 
 
 def test_success_rate_states_its_uncertainty():

@@ -13,10 +13,10 @@ from mcap.writer import Writer
 
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
-from copolicy.dataset.edit.subset import replace_folder
-from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.withdrawal.withdraw import withdraw
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.files import replace_folder
+from copolicy.dataset.files.replace_folder import finish_interrupted
 from copolicy.dataset.publication.minimal_card import is_minimal_card
 from copolicy.dataset.recording.log import read_metadata
 from copolicy.dataset.versions.content import read_content

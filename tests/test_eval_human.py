@@ -18,11 +18,10 @@ from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.recording.log import read_episode
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.human_study.latin_square import williams_square
-from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan
+from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
 from copolicy.evaluate.human_study.questionnaire import read_ratings
 from copolicy.evaluate.human_study.repeated_measures import anova, rank_test, tukey
-from copolicy.evaluate.human_study.schedule import BlindPlanner
+from copolicy.evaluate.human_study.schedule import BlindPolicy
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
 from copolicy.evaluate.partner_study.configurations import study_configurations
@@ -198,24 +197,24 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
 
 def test_only_the_chosen_robot_plans():
     class One:
-        name, actions_per_plan, fps = "one", 8, 10
+        name, n_action_steps, fps, keeps_history = "one", 8, 10, False
 
         def __init__(self, value, frames):
-            self.value, self.frames = value, frames
+            self.value, self.n_obs_steps = value, frames
 
-        def seed(self, seed):
+        def reset(self, seed):
             self.value += seed
 
-        def plan(self, history):
-            return np.full((10, 4), self.value)
+        def predict_action_chunk(self, observations):
+            return np.full((1, 10, 4), self.value)
 
     one, other = One(1.0, 2), One(2.0, 3)
-    blind = BlindPlanner({"one": one, "other": other}, 1)
-    assert (blind.name, blind.actions_per_plan, blind.frames) == ("study", 1, 2)
+    blind = BlindPolicy({"one": one, "other": other}, 1)
+    assert (blind.name, blind.n_action_steps, blind.n_obs_steps) == ("study", 1, 2)
     blind.choose("other")
-    blind.seed(5)
-    assert blind.frames == 3
-    assert blind.plan({})[0, 0] == 7.0
+    blind.reset(5)
+    assert blind.n_obs_steps == 3
+    assert blind.predict_action_chunk({})[0, 0, 0] == 7.0
     assert one.value == 1.0
 
 

@@ -13,20 +13,23 @@ from untrained_policy import save_untrained_policy
 from copolicy.cards.cli import main as cards
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.partner_study.configurations import study_configurations
 from copolicy.evaluate.partner_study.outcome import PartnerOutcome
-from copolicy.evaluate.partner_study.robots import PolicyRobot, never_yields, passive
+from copolicy.evaluate.partner_study.robots import policy_robot, scripted_robots
 from copolicy.evaluate.partner_study.study import carry_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
-from copolicy.tasks.table.agents import Habits, ScriptedPilot
-from copolicy.tasks.table.agents.partners import PARTNERS, simulated_partner
+from copolicy.tasks.table.agents import PARTNERS, Habits, ScriptedPilot, simulated_partner
+from copolicy.tasks.table.agents.players import simulated_partner
+from copolicy.tasks.table.agents.profiles import PARTNERS
 from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
 
 MAPS = MAP_SETS["training"][6:84:14]
+ROBOTS = scripted_robots(get_task())
 
 
 @pytest.fixture(scope="module")
@@ -83,20 +86,22 @@ def test_sixty_configurations_are_spread_over_a_set():
     assert str(error.value) == "--configurations: expected a multiple of 4 from 4 to 336, found 58"
 
 
-class CountingPlanner:
-    """Plans forces that tell the plan's number, and remembers what it was shown."""
+class CountingPolicy:
+    """Predicts forces that tell the chunk's number, and remembers what it was shown."""
 
-    frames = 3
-    planning_seconds = (0.01,)
-    batch_sizes = (1,)
+    name, n_obs_steps, fps, keeps_history = "counter", 3, 10, False
 
-    def __init__(self):
+    def __init__(self, n_action_steps=1):
+        self.n_action_steps = n_action_steps
         self.calls: list[dict[str, np.ndarray]] = []
 
-    def seed(self, seed):
+    def describe(self):
+        return {}
+
+    def reset(self, seed):
         """Nothing here is random."""
 
-    def plan(self, history):
+    def predict_action_chunk(self, history):
         self.calls.append(history)
         plans = np.zeros((len(history[STATE]), 10, 4))
         plans[:, :, 0] = 0.01 * len(self.calls)
@@ -106,8 +111,8 @@ class CountingPlanner:
 
 
 def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
-    planner = CountingPlanner()
-    robot = PolicyRobot("counter", planner)  # pyright: ignore[reportArgumentType]
+    planner = CountingPolicy()
+    robot = policy_robot("counter", planner)  # pyright: ignore[reportArgumentType]
     (outcome,) = carry_with_partners(robot, MAPS[:1], ["stubborn"], Physics(step_limit=31))
     assert outcome.steps == 31
     assert outcome.plans == len(planner.calls) == 11
@@ -128,8 +133,8 @@ def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
 
 
 def test_more_actions_a_plan_are_executed_in_turn():
-    planner = CountingPlanner()
-    robot = PolicyRobot("counter", planner, actions_per_plan=2)  # pyright: ignore[reportArgumentType]
+    planner = CountingPolicy(2)
+    robot = policy_robot("counter", planner)  # pyright: ignore[reportArgumentType]
     (outcome,) = carry_with_partners(robot, MAPS[:1], ["slow"], Physics(step_limit=12))
     np.testing.assert_allclose(outcome.actions[::3, :2], [[0.01, 0], [0.01, 0.001], [0.02, 0], [0.02, 0.001]])
     assert len(planner.calls) == 2
@@ -138,8 +143,8 @@ def test_more_actions_a_plan_are_executed_in_turn():
 def test_every_robot_meets_the_same_partner():
     physics = Physics(step_limit=40)
     kinds = ["stubborn", "erratic"]
-    one = carry_with_partners(passive(), MAPS[:2], kinds, physics, repeats=2)
-    other = carry_with_partners(never_yields(), MAPS[:2], kinds, physics, repeats=2, seed=9)
+    one = carry_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
+    other = carry_with_partners(ROBOTS["never-yields"], MAPS[:2], kinds, physics, repeats=2, seed=9)
     assert [(o.map_index, o.partner, o.repeat) for o in one] == [
         (m, k, r) for m in (0, 1) for k in kinds for r in (0, 1)
     ]
@@ -147,9 +152,9 @@ def test_every_robot_meets_the_same_partner():
     np.testing.assert_array_equal([o.actions[0, 2:] for o in one], [o.actions[0, 2:] for o in other])
     assert len({tuple(o.actions[0, 2:]) for o in one}) == 8
     assert not np.concatenate([o.actions for o in one])[:, :2].any()
-    again = carry_with_partners(passive(), MAPS[:2], kinds, physics, repeats=2)
+    again = carry_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
     np.testing.assert_array_equal([o.path for o in one], [o.path for o in again])
-    changed = carry_with_partners(passive(), MAPS[:1], ["erratic"], physics, partner_seed=1)
+    changed = carry_with_partners(ROBOTS["passive"], MAPS[:1], ["erratic"], physics, partner_seed=1)
     assert (changed[0].actions[0] != one[2].actions[0]).any()
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +14,9 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.features import STATE
+from copolicy.dataset.features import HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.coplan.rollouts import PlannedTable
-from copolicy.evaluate.planner import Planner
+from copolicy.evaluate.coplan.rollouts import coplan
 from copolicy.evaluate.plans.figure import save_plans
 from copolicy.evaluate.plans.sampling import sample_plans
 from copolicy.tasks.table.agents import simulated_pair
@@ -24,6 +24,7 @@ from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.routes import route_class
 from copolicy.tasks.table.world import TableWorld
+from copolicy.train.checkpoint import Checkpoint
 
 MAP = MapConfig((240.0, 300.0, 3.14), (960.0, 300.0), ((600.0, 300.0),))
 BLUE, VERMILION = "#0072B2", "#D55E00"
@@ -56,21 +57,22 @@ def right() -> tuple[np.ndarray, np.ndarray]:
 class Replayed:
     """Plans what was demonstrated: asked for whole plans, each demonstration in turn; else the one that is near."""
 
+    name, n_obs_steps, n_action_steps, fps, keeps_history = "replay", 3, 8, 10, False
+
     def __init__(self, *demonstrations: tuple[np.ndarray, np.ndarray]):
-        self.frames = 3
-        self.actions: int | None = 8
+        self.wanted: int | None = 8
         self.demonstrations = demonstrations
         self.frame = 0
         self.lengths = []
 
-    def seed(self, seed: int) -> None:
+    def reset(self, seed: int) -> None:
         """A replay has no noise."""
 
-    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        length = 10 if self.actions is None else self.actions
+    def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        length = 10 if self.wanted is None else self.wanted
         self.lengths.append(length)
         places = history[STATE][:, -1, :2]
-        plans = [self._rest(k if self.actions is None else self._near(place), length) for k, place in enumerate(places)]
+        plans = [self._rest(k if self.wanted is None else self._near(place), length) for k, place in enumerate(places)]
         self.frame += 8
         return np.array(plans)
 
@@ -84,8 +86,8 @@ class Replayed:
         return np.vstack((actions[self.frame :], np.tile(actions[-1], (length, 1))))[:length]
 
 
-def decide(planner: Replayed, **settings):
-    return sample_plans(planner, MAP, Physics(), **{"samples": 4, **settings})  # pyright: ignore[reportArgumentType]
+def decide(policy: Any, physics: Physics | None = None, **settings):
+    return sample_plans(policy, MAP, physics or Physics(), **{"samples": 4, **settings})
 
 
 def test_each_plan_goes_its_way(left, right):
@@ -136,26 +138,27 @@ def test_the_route_of_an_unfinished_path_is_not_decided():
     assert {sample.route for sample in decision.samples} == {None}
 
 
+class Swaying:
+    """Forces that follow from the whole history, for as many tables as there are."""
+
+    name, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "swaying", 3, 8, 10, False, 8
+
+    def reset(self, seed: int) -> None:
+        """Nothing here is random."""
+
+    def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
+        seen = np.concatenate([history[STATE], history[HUMAN_ACTION]], axis=-1).sum(axis=(1, 2))
+        phase = seen[:, None, None] + np.arange(10)[:, None] + np.arange(4)
+        return np.sin(phase)[:, : self.wanted or 10]
+
+
 def test_a_branch_goes_on_as_the_table_itself():
-    table = PlannedTable(0, MAP, 0, Physics(step_limit=40), 3)
-    rng = np.random.default_rng(0)
-    for action in rng.uniform(-1, 1, (5, 4)):
-        table.execute(action, 3)
-    branch = table.branch(7)
-    rest = rng.uniform(-1, 1, (9, 4))
-    for number, action in enumerate(rest):
-        branch.execute(action, 3)
-        assert len(table.path) == 16 + 3 * number  # the one leaves the other alone
-        table.execute(action, 3)
-        if branch.outcome is not None:
-            break
-    one, other = table.result(), branch.result()
-    assert (one.reason, one.steps, other.repeat) == (other.reason, other.steps, 7)
-    assert one.reason == "timeout"
-    np.testing.assert_array_equal(one.path, other.path)
-    np.testing.assert_array_equal(one.interaction, other.interaction)
-    np.testing.assert_array_equal(table.states, branch.states)
-    np.testing.assert_array_equal(table.human, branch.human)
+    physics = Physics(step_limit=200)
+    (whole,) = coplan(Swaying(), [MAP], physics)
+    for sample in decide(Swaying(), samples=2, seconds=2.4, physics=physics).samples:
+        assert (sample.outcome.reason, sample.outcome.plans) == (whole.reason, whole.plans)
+        np.testing.assert_array_equal(sample.outcome.path, whole.path)
+        np.testing.assert_array_equal(sample.outcome.interaction, whole.interaction)
 
 
 def drawn(path: Path, colour: str) -> int:
@@ -179,16 +182,16 @@ def checkpoint(tmp_path_factory) -> Path:
 
 
 def test_the_same_seed_gives_the_same_plans_and_no_two_are_alike(checkpoint):
-    planner = Planner(checkpoint)
+    policy = Checkpoint(checkpoint)
     # The untrained head is zero and would plan rest from any noise.
     torch.manual_seed(0)
-    for parameter in planner.checkpoint.policy.parameters():
+    for parameter in policy.policy.parameters():
         torch.nn.init.normal_(parameter, std=0.1)
     first, second, other = (
-        np.array([s.plan for s in sample_plans(planner, MAP, Physics(step_limit=30), samples=3, seed=seed).samples])
+        np.array([s.plan for s in sample_plans(policy, MAP, Physics(step_limit=30), samples=3, seed=seed).samples])
         for seed in (4, 4, 5)
     )
-    assert first.shape == (3, planner.checkpoint.planned_frames, 4)
+    assert first.shape == (3, policy.chunk_size, 4)
     np.testing.assert_array_equal(first, second)
     assert np.abs(first - other).max() > 1e-4
     assert np.abs(first[0] - first[1]).max() > 1e-4

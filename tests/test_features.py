@@ -3,8 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.dataset import features
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import ENVIRONMENT_STATE
+from copolicy.tasks.table import features
 from copolicy.tasks.table.maps import MAP_SETS
 
 
@@ -18,7 +19,7 @@ def test_every_column_has_names_and_bounds_of_its_size():
 
 @pytest.mark.parametrize("name", MAP_SETS)
 def test_maps_lie_inside_the_bounds_and_come_back_from_their_vector(name):
-    low, high = features.BOUNDS[features.ENVIRONMENT_STATE]
+    low, high = features.BOUNDS[ENVIRONMENT_STATE]
     for config in MAP_SETS[name]:
         vector = features.environment_state(config)
         assert ((low <= vector) & (vector <= high)).all()

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.records import Channel, Message, Metadata, Schema
+from scripted_agents import scripted_agents
 
-from copolicy.collect.agents.replay import ReplayController
+from copolicy.collect.agents import ReplayAgent
 from copolicy.collect.cli import main as collect
 from copolicy.collect.recording.recover import recover, recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
@@ -29,7 +30,6 @@ from copolicy.dataset.recording.log import read_episode, read_metadata, read_rec
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, chunk_records
 from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.evaluate.human_study.recordings import study_rows
-from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.maps import MAP_SETS
 
 LAYOUTS = {**{name: (variant, ()) for name, variant in variants.VERIFIED.items()}, **variants.UNVERIFIED}
@@ -41,7 +41,7 @@ def source(tmp_path_factory):
     path = tmp_path_factory.mktemp("source") / "episode_000.mcap"
     config = MAP_SETS["training"][6]
     meta = EpisodeMeta("layouts", "s-1", "S01", "S01-a", "S01-b", map_id="training-06", map_set="training", seed=37)
-    record_episode(path, config, simulated_pair(config, "S01", 3), meta, WallClockAnchor.simulated(10**18))
+    record_episode(path, config, scripted_agents(3), meta, WallClockAnchor.simulated(10**18))
     return path, read_recording(path)
 
 
@@ -80,7 +80,7 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
 
     assert {key: value for key, value in read_metadata(file).items() if key != "calibration"} == read_metadata(path)
     assert [(one.map_id, one.counts) for one in recordings(folder)] == [("training-06", True)]
-    assert np.array_equal(ReplayController(file)._actions, truth.episode.actions)
+    assert np.array_equal(ReplayAgent(file)._actions[0], truth.episode.actions)
     assert read_track(file).moments == read_track(path).moments
 
     status, summary, lines = run(collect, "replay", file, "--verify", "--png", tmp_path / "sheet.png")

@@ -8,9 +8,8 @@ import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.agents import Habits
+from copolicy.tasks.table.agents import NEVER_YIELDS, Habits
 from copolicy.tasks.table.agents.hand import UnsteadyHand
-from copolicy.tasks.table.agents.partners import NEVER_YIELDS
 
 MINUTE = 60 * RECORD_HZ
 

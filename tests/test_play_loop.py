@@ -7,9 +7,9 @@ import pytest
 from mcap.reader import make_reader
 from play_session import SimulatedClock, on_short_map, settings
 
-from copolicy.collect.agents import Reading
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.rollout import Agent
 from copolicy.collect.ticker import DT_NS
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
@@ -17,38 +17,32 @@ from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopT
 SCRIPTED = (PilotSpec("scripted", "S01"), PilotSpec("scripted", "S01"))
 
 
-class Puller:
+class Puller(Agent):
     """Pulls towards the goal; takes its time in some steps."""
 
     name = "puller"
-    is_person = False
 
     def __init__(self, slow_steps=(), seconds=0.0, sleep=time.sleep):
         self.step = 0
         self._slow, self._seconds, self._sleep = slow_steps, seconds, sleep
 
-    def begin(self, seat, map_config, seed):
+    def begin(self, seat, starts):
         self.step = 0
 
-    def read(self, state):
+    def act(self, states, worlds):
         if self.step in self._slow:
             self._sleep(self._seconds)
         self.step += 1
-        return Reading((1.0, 0.0), PlayerInput(axes=(float(self.step),)))
-
-    def executed(self, action):
-        pass
-
-    def close(self):
-        pass
+        self.input = PlayerInput(axes=(float(self.step),))
+        return np.array([[1.0, 0.0]])
 
 
 def _play(tmp_path, first, second, clock=None, **changes):
     """One headless episode on the short map; returns its recording and its messages by topic."""
     with prepared(settings(tmp_path, pilots=SCRIPTED, episodes=1, **changes), clock=clock) as application:
         on_short_map(application)
-        for player, controller in zip(application.game.players, (first, second), strict=True):
-            player.controller = controller
+        for player, agent in zip(application.game.players, (first, second), strict=True):
+            player.agent = agent
         application.run()
         pictures = application.pictures
     (path,) = tmp_path.rglob("*.mcap")
@@ -92,10 +86,10 @@ def test_a_loop_that_falls_behind_skips_ticks_and_says_so(tmp_path):
 
 def test_an_error_in_a_player_leaves_a_marked_recording(tmp_path):
     class Broken(Puller):
-        def read(self, state):
+        def act(self, states, worlds):
             if self.step == 30:
                 raise ZeroDivisionError("in the middle")
-            return super().read(state)
+            return super().act(states, worlds)
 
     with pytest.raises(ZeroDivisionError, match="in the middle"):
         _play(tmp_path, Broken(), Puller(), SimulatedClock(), headless=True)

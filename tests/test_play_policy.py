@@ -6,30 +6,35 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from mcap.reader import make_reader
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.agents.checkpoint import Checkpoint
-from copolicy.collect.agents.policy import PolicyController
+from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.cli import main
+from copolicy.collect.rollout import Start
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.task import TableTask
 from copolicy.tasks.table.world import TableWorld
 
 MAP = MAP_SETS["training"][0]
+ONE = np.array([0])
 
 
 class Counter:
-    """A planner whose every action tells which plan it is from and which of its actions it is."""
+    """A policy whose every action tells which chunk it is from and which of its actions it is."""
 
     name = "policy:counter"
-    frames = 2
+    n_obs_steps = 2
     fps = 10
-    actions_per_plan = 3
+    n_action_steps = 3
+    keeps_history = False
 
     def __init__(self):
         self.histories: list[dict[str, np.ndarray]] = []
@@ -37,17 +42,21 @@ class Counter:
         self.gate = threading.Event()
         self.gate.set()
 
-    def seed(self, seed: int) -> None:
+    def reset(self, seed: int) -> None:
         self.seeds.append(seed)
 
-    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
+    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         self.gate.wait(10)
-        self.histories.append(history)
+        self.histories.append({key: column[0] for key, column in observations.items()})
         plan = np.zeros((6, 4))
         plan[:, 0] = 0.1 * len(self.histories)
         plan[:, 1] = 0.1 * np.arange(6)
         plan[:, 2:] = -plan[:, :2]
-        return plan
+        return plan[None]
+
+
+def begin(agent, config=MAP, seat=0, seed=0):
+    agent.begin(seat, [Start(config, seed, TableWorld(config).observation)])
 
 
 @pytest.fixture
@@ -56,31 +65,31 @@ def counter():
 
 
 @pytest.fixture
-def controller(counter):
-    one = PolicyController(counter)
-    one.begin(0, MAP, 5)
+def agent(counter):
+    one = PolicyAgent(counter, real_time=True)
+    begin(one, seed=5)
     yield one
     counter.gate.set()
     one.close()
 
 
-def _run(controller, world, steps, human=(0.0, 0.0), wait=True):
+def _run(agent, world, steps, human=(0.0, 0.0), wait=True):
     """The forces of some steps; the human's force grows by 0.01 a step."""
     forces = []
     for _ in range(steps):
         if wait:
-            controller.wait(10)
-        reading = controller.read(world.observation)
+            agent.wait(10)
+        (force,) = agent.act(world.observation[None], ONE)
         shift = 0.01 * world.step_count
-        action = np.array([*reading.force, human[0] + shift, human[1]])
+        action = np.array([*force, human[0] + shift, human[1]])
         world.step(action)
-        controller.executed(action)
-        forces.append(reading.force)
+        agent.acted(action[None], ONE)
+        forces.append(force)
     return np.array(forces)
 
 
-def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(controller, counter):
-    forces = _run(controller, TableWorld(MAP), 24)
+def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(agent, counter):
+    forces = _run(agent, TableWorld(MAP), 24)
     # Plan 1 from frame 0; the next is asked for at frame 2, and taken up at frame 3, at its second action.
     first = [[0.1, 0.0], [0.1, 0.1], [0.1, 0.2]]
     second, third = [[0.2, 0.1], [0.2, 0.2]], [[0.3, 0.1], [0.3, 0.2]]
@@ -89,21 +98,41 @@ def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(control
     assert counter.seeds == [5]
 
 
-def test_the_other_seat_gets_the_other_half(counter):
-    controller = PolicyController(counter)
-    controller.begin(1, MAP, 0)
-    forces = _run(controller, TableWorld(MAP), 3)
-    controller.close()
-    np.testing.assert_allclose(forces, [[-0.1, 0.0]] * 3)
+def test_at_the_humans_seat_a_policy_sees_the_seats_exchanged(counter):
+    agent, world = PolicyAgent(counter), TableWorld(MAP)
+    begin(agent, seat=1)
+    for step in range(6):
+        (force,) = agent.act(world.observation[None], ONE)
+        assert force.tolist() == pytest.approx([0.1, 0.1 * (step // 3)])  # its robot's half
+        action = np.array([0.01 * step, 0.5, *force])
+        world.step(action)
+        agent.acted(action[None], ONE)
+        if step == 2:
+            seen = world.observation
+    counter.n_action_steps = 2
+    agent.act(world.observation[None], ONE)
+    first, second = counter.histories
+    turned = get_task().exchange.states
+    np.testing.assert_array_equal(first[STATE][0], turned(TableWorld(MAP).observation))
+    np.testing.assert_array_equal(second[STATE], turned(np.array([seen, world.observation])))
+    np.testing.assert_allclose(second[HUMAN_ACTION], [[0.01, 0.5], [0.04, 0.5]])  # what the robot really did
+    assert first[ENVIRONMENT_STATE][0, 2] == pytest.approx((MAP.start[2] + np.pi) % (2 * np.pi))
 
 
-def test_the_history_is_on_the_grid_of_the_data_set(controller, counter):
+def test_without_an_exchange_the_other_seat_gets_the_other_half(counter, monkeypatch):
+    monkeypatch.setattr(TableTask, "exchange", None)
+    agent = PolicyAgent(counter)
+    begin(agent, seat=1)
+    assert agent.act(TableWorld(MAP).observation[None], ONE).tolist() == [[-0.1, 0.0]]
+
+
+def test_the_history_is_on_the_grid_of_the_data_set(agent, counter):
     world = TableWorld(MAP)
     rest = world.observation
-    _run(controller, world, 6)
+    _run(agent, world, 6)
     seen = world.observation
-    _run(controller, world, 3)
-    controller.wait(10)
+    _run(agent, world, 3)
+    agent.wait(10)
     before, at_frame_two = counter.histories[:2]
     np.testing.assert_array_equal(before[STATE], [rest, rest])
     np.testing.assert_array_equal(before[HUMAN_ACTION], np.zeros((2, 2)))
@@ -112,27 +141,28 @@ def test_the_history_is_on_the_grid_of_the_data_set(controller, counter):
     np.testing.assert_allclose(at_frame_two[HUMAN_ACTION][:, 0], [0.01, 0.04])
 
 
-def test_a_slow_plan_lets_go_and_is_taken_up_where_it_is_due(controller, counter):
+def test_a_slow_plan_lets_go_and_is_taken_up_where_it_is_due(agent, counter):
     world = TableWorld(MAP)
-    _run(controller, world, 6)
+    _run(agent, world, 6)
     counter.gate.clear()
     started = time.monotonic()
-    forces = _run(controller, world, 18, wait=False)  # frames 2 to 7 while the plan for frame 2 is being made
+    forces = _run(agent, world, 18, wait=False)  # frames 2 to 7 while the plan for frame 2 is being made
     assert time.monotonic() - started < 0.5, "the loop waited for a plan"
     np.testing.assert_allclose(forces[::3], [[0.1, 0.2], [0.1, 0.3], [0.1, 0.4], [0.1, 0.5], [0, 0], [0, 0]])
     counter.gate.set()
-    controller.wait(10)
+    agent.wait(10)
     # Frame 8 is the seventh action of the plan for frame 2, which has six: it lets go, and asks again.
-    assert _run(controller, world, 1).tolist() == [[0.0, 0.0]]
-    assert len(controller.latencies) == 2
-    assert controller.latencies[1] > 0
+    assert _run(agent, world, 1).tolist() == [[0.0, 0.0]]
+    assert len(agent.latencies) == 2
+    assert agent.latencies[1] > 0
 
 
-def test_the_age_of_a_plan_is_recorded(controller):
+def test_the_age_of_a_plan_is_recorded(agent):
     world = TableWorld(MAP)
-    controller.wait(10)
+    agent.wait(10)
     time.sleep(0.05)
-    message = controller.read(world.observation).message
+    agent.act(world.observation[None], ONE)
+    message = agent.input
     assert message.age_ns > 50e6
     assert list(message.axes) == pytest.approx([0.1, 0.0])
 
@@ -143,25 +173,29 @@ def checkpoint(tmp_path_factory) -> Path:
     return save_untrained_policy(tmp_path_factory.mktemp("checkpoint"))
 
 
-def test_one_table_is_planned_for_as_a_batch_of_one(checkpoint):
+def test_the_same_seed_gives_the_same_chunk_whatever_else_draws(checkpoint):
     history = {
-        STATE: np.tile(TableWorld(MAP).observation, (3, 1)),
-        ENVIRONMENT_STATE: np.random.default_rng(0).random((3, 11)),
-        HUMAN_ACTION: np.zeros((3, 2)),
+        STATE: np.tile(TableWorld(MAP).observation, (2, 3, 1)),
+        ENVIRONMENT_STATE: np.random.default_rng(0).random((2, 3, 11)),
+        HUMAN_ACTION: np.zeros((2, 3, 2)),
     }
-    policy = Checkpoint(checkpoint)
-    policy.seed(3)
-    expected = policy.plan_batch({key: value[None] for key, value in history.items()})
-    policy.seed(3)
-    np.testing.assert_array_equal(policy.plan(history), expected[0])
-    assert expected.shape == (1, policy.planned_frames, 4)
-    assert (policy.frames, policy.planned_frames, policy.actions_per_plan) == (3, 10, 8)
+    policy = load_policy(checkpoint)
+    chunks = []
+    for _ in range(2):
+        policy.reset(3)
+        torch.rand(5)
+        before = torch.get_rng_state()
+        chunks.append(policy.predict_action_chunk(history))
+        assert torch.equal(torch.get_rng_state(), before)  # nor does it change what others draw
+    np.testing.assert_array_equal(*chunks)
+    assert chunks[0].shape == (2, 10, 4)
+    assert (policy.n_obs_steps, policy.n_action_steps, policy.keeps_history) == (3, 8, False)
     assert policy.name.startswith("policy:copolicy-")
 
 
 def test_a_folder_without_a_checkpoint_is_named(tmp_path):
     with pytest.raises(FileFormatError) as error:
-        Checkpoint(tmp_path)
+        load_policy(tmp_path)
     assert str(error.value) == (
         f"{tmp_path}: expected a checkpoint folder with config.json and model.safetensors, found an empty folder"
     )

@@ -13,8 +13,8 @@ import torch
 from lerobot.configs import PreTrainedConfig
 from small_policies import MLP, TRANSFORMER, columns, lively_policy
 
-from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.train.checkpoint import Checkpoint
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser

@@ -12,8 +12,7 @@ from PIL import Image, ImageSequence
 from play_session import SHORT_MAP, settings
 from safetensors import safe_open
 
-from copolicy.collect.agents.checkpoint import Checkpoint
-from copolicy.collect.agents.checkpoint_folder import checkpoint_folder, pretrained_folder
+from copolicy.collect.agents.checkpoint_folder import checkpoint_folder, load_policy, pretrained_folder
 from copolicy.collect.cli import main as collect
 from copolicy.collect.demonstration.episode import demonstrate
 from copolicy.collect.play.session_run import prepared
@@ -25,6 +24,7 @@ from copolicy.dataset.recording.log import read_episode
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.cli import main as train
 
 ROOT = Path(__file__).parent.parent
@@ -104,7 +104,7 @@ except FileFormatError as error:
 def test_without_the_extra_it_is_one_clear_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(MissingExtraError):
-        Checkpoint("pretrained")
+        load_policy("pretrained")
     flags = ["--out", str(tmp_path), "--headless", "--pilots", "scripted", "policy:pretrained"]
     assert collect(["play", *flags]) == 2
     assert capsys.readouterr().err == (
@@ -115,14 +115,14 @@ def test_without_the_extra_it_is_one_clear_line(tmp_path, monkeypatch, capsys):
 
 def test_it_plans_for_both_players(shipped):
     config = MAP_SETS["unseen"][0]
-    frames = shipped.frames
+    frames = shipped.n_obs_steps
     history = {
-        STATE: np.tile(state_vector(config.start, (0.0, 0.0, 0.0)), (frames, 1)),
-        ENVIRONMENT_STATE: np.tile(environment_state(config), (frames, 1)),
-        HUMAN_ACTION: np.zeros((frames, 2)),
+        STATE: np.tile(state_vector(config.start, (0.0, 0.0, 0.0)), (1, frames, 1)),
+        ENVIRONMENT_STATE: np.tile(environment_state(config), (1, frames, 1)),
+        HUMAN_ACTION: np.zeros((1, frames, 2)),
     }
-    plan = shipped.plan(history)
-    assert plan.shape == (shipped.planned_frames, 4)
+    plan = shipped.predict_action_chunk(history)
+    assert plan.shape == (1, shipped.chunk_size, 4)
     assert np.abs(plan).max() <= 1
     assert np.abs(plan).mean() > 0.01, "a policy that plans rest was not trained"
 

@@ -15,6 +15,7 @@ import pytest
 
 from copolicy.collect.cli import main
 from copolicy.collect.recording.wall_clock import WallClockAnchor
+from copolicy.collect.rollout import Agent
 from copolicy.collect.simulate.command import simulate
 from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.collect.simulate.recipes import RECIPES, Recipe
@@ -34,21 +35,21 @@ STARTED_NS = 1_700_000_000_000_000_000
 SHORT = Physics(step_limit=60)
 
 
-class StraightLine:
+class StraightLine(Agent):
     """Pushes towards a goal, harder than allowed, so that the recorded force is the clipped one."""
 
     def __init__(self, goal):
         self.goal = np.array(goal)
 
-    def act(self, state):
-        way = self.goal - state[:2]
+    def act(self, states, worlds):
+        way = self.goal - states[:, :2]
         return 3.0 * way / np.linalg.norm(way)
 
 
 def run(path, config, physics=None):
-    pilots = (StraightLine(config.goal), StraightLine(config.goal))
+    agents = (StraightLine(config.goal), StraightLine(config.goal))
     return record_episode(
-        path, config, pilots, EpisodeMeta("u"), WallClockAnchor.simulated(STARTED_NS), physics or Physics()
+        path, config, agents, EpisodeMeta("u"), WallClockAnchor.simulated(STARTED_NS), physics or Physics()
     )
 
 

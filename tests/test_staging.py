@@ -1,10 +1,11 @@
 import errno
+import json
 
 import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.files.staging import about, new_file, new_folder, replacement, require_new
+from copolicy.dataset.files.staging import about, new_file, new_folder, replace_json, replacement, require_new
 
 
 def names(folder):
@@ -124,3 +125,12 @@ def test_an_error_of_a_network_library_keeps_its_words(tmp_path):
     with pytest.raises(RemoteError) as caught, about(tmp_path / "run"):
         raise RemoteError("404 Client Error")
     assert (caught.value.errno, caught.value.filename) == (None, None)
+
+
+def test_a_document_that_cannot_be_written_leaves_the_old_file(tmp_path):
+    path = tmp_path / "statistics.json"
+    replace_json(path, {"a": 1}, allow_nan=False)
+    with pytest.raises(ValueError, match="nan"):
+        replace_json(path, {"a": float("nan")}, allow_nan=False)
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": 1}
+    assert list(tmp_path.iterdir()) == [path]

@@ -12,7 +12,6 @@ from copolicy.dataset.cli import main
 from copolicy.dataset.command_line.commands import _lines
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
-from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.statistics.command import summary
 from copolicy.dataset.statistics.reading import read_trajectories
 from copolicy.tasks.table.routes import route_class
@@ -89,15 +88,6 @@ def test_another_seed_moves_the_draws_and_not_the_values(folder, described, tmp_
 def test_a_target_that_is_a_folder_is_refused_before_the_work(folder, tmp_path, capsys):
     assert main(["stats", str(folder), "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err == f"copolicy-dataset: {tmp_path}: expected a file to write, found a folder\n"
-
-
-def test_a_document_that_cannot_be_written_leaves_the_old_file(tmp_path):
-    path = tmp_path / "statistics.json"
-    replace_json(path, {"a": 1}, allow_nan=False)
-    with pytest.raises(ValueError, match="nan"):
-        replace_json(path, {"a": float("nan")}, allow_nan=False)
-    assert json.loads(path.read_text(encoding="utf-8")) == {"a": 1}
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_discarded_episodes_and_other_sources_do_not_count(constructed, tmp_path):

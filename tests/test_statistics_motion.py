@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from constructed_pairs import ONE, carried, row, still, trajectories
 
-from copolicy.dataset.statistics.activity import activity_statistics, longest_runs
-from copolicy.dataset.statistics.forces import force_statistics
+from copolicy.dataset.statistics.forces import activity_statistics, force_statistics, longest_runs
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.smoothness import f95, log_dimensionless_jerk, smoothness_statistics, sparc

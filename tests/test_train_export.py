@@ -12,8 +12,8 @@ from safetensors.torch import load_file, save_file
 from training_table import LENGTHS, write_table
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.cli import main
 
 DIGEST = "0123456789ab" * 5

@@ -14,11 +14,11 @@ from lerobot.datasets import LeRobotDatasetMetadata
 from training_table import LENGTHS, flags, lerobot_train, mark_discarded, weights, write_table
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.train.checked_stream import CheckedStream
 from copolicy.train.cli import main
 from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError, require_finite_frames, unusable_rows
 from copolicy.train.finite_training import guarded, link_last_checkpoint
 from copolicy.train.finite_weights import non_finite_weight
+from copolicy.train.memory_training import CheckedStream
 
 EPISODE, FRAME = 2, 7
 ROW = LENGTHS[0] + LENGTHS[1] + FRAME
@@ -232,7 +232,7 @@ def test_a_checkpoint_with_nan_is_no_start(random_table, tmp_path, capsys):
     save_file(state, path)
     assert main([f"--config_path={output}", "--resume=true", "--steps=2"]) == 2
     assert "expected finite weights to start from, found nan in denoiser.head.weight" in capsys.readouterr().err
-    from copolicy.collect.agents.checkpoint import Checkpoint
+    from copolicy.train.checkpoint import Checkpoint
 
     with pytest.raises(
         FileFormatError, match=r"expected finite weights, found nan or infinity in denoiser.head.weight"

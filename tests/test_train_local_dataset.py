@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
-from copolicy.train.local_dataset import check_local_dataset, training_episodes
+from copolicy.train.episode_choice import check_local_dataset, training_episodes
 
 
 @pytest.mark.parametrize(

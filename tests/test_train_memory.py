@@ -16,9 +16,8 @@ from training_table import LENGTHS, assert_same_batch, windows
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import STATE
 from copolicy.tasks.table.features import TASK
-from copolicy.train.epoch_order import WholeEpochSampler
 from copolicy.train.memory_dataset import DeferredBatch, MemoryDataset
-from copolicy.train.memory_training import _make_datasets
+from copolicy.train.memory_training import WholeEpochSampler, _make_datasets
 
 
 @pytest.mark.parametrize("episodes", [None, [4, 1, 2]])

@@ -15,10 +15,11 @@ from lerobot.datasets import LeRobotDatasetMetadata
 from training_table import flags, write_table
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.agents import PolicyController
+from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.collect.play.command import _angular_limit
 from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.rollout import Start
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.evaluate.human_study.plan import StudyPlan
@@ -194,27 +195,27 @@ def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
 
 
 class _Fast:
-    name, frames, fps, actions_per_plan = "policy:fast", 2, 30, 3
+    name, n_obs_steps, fps, n_action_steps, keeps_history = "policy:fast", 2, 30, 3, False
 
-    def seed(self, seed):
+    def reset(self, seed):
         """No noise."""
 
-    def plan(self, history):
-        return np.array([[0.1 * k, 0.0, 0.0, 0.0] for k in range(6)])
+    def predict_action_chunk(self, observations):
+        return np.array([[[0.1 * k, 0.0, 0.0, 0.0] for k in range(6)]])
 
 
 def test_a_policy_of_30_hz_at_a_seat_acts_anew_at_every_step():
-    controller = PolicyController(_Fast())
+    agent, worlds = PolicyAgent(_Fast(), real_time=True), np.array([0])
     world = TableWorld(MAP_SETS["training"][0])
-    controller.begin(0, world.map_config, 0)
+    agent.begin(0, [Start(world.map_config, 0, world.observation)])
     forces = []
     for _ in range(3):
-        controller.wait(10)
-        forces.append(controller.read(world.observation).force[0])
+        agent.wait(10)
+        forces.append(agent.act(world.observation[None], worlds)[0, 0])
         action = np.array([forces[-1], 0.0, 0.0, 0.0])
         world.step(action)
-        controller.executed(action)
-    controller.close()
+        agent.acted(action[None], worlds)
+    agent.close()
     assert forces == pytest.approx([0.0, 0.1, 0.2])
 
 

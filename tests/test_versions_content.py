@@ -21,9 +21,8 @@ from versioned_data_set import (
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.exclusions import exclude
-from copolicy.dataset.versions.canonical import digest, encode
 from copolicy.dataset.versions.content import read_content
-from copolicy.dataset.versions.digests import Content, EpisodeContent
+from copolicy.dataset.versions.digests import Content, EpisodeContent, digest, encode
 
 
 @pytest.fixture(scope="module")

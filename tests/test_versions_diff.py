@@ -15,7 +15,7 @@ from versioned_data_set import (
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.versions.release import release
-from copolicy.dataset.versions.statistics import compare_statistics
+from copolicy.dataset.versions.sources import compare_statistics
 
 
 @pytest.fixture(scope="module")

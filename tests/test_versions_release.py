@@ -20,11 +20,10 @@ from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidV
 from copolicy.dataset.files.meta_files import MANIFEST_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.publication.data_version import DataVersion, newest
-from copolicy.dataset.versions.changelog import with_release
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.difference import Change
 from copolicy.dataset.versions.manifest import Manifest
-from copolicy.dataset.versions.release import release
+from copolicy.dataset.versions.release import release, with_release
 from copolicy.dataset.versions.release_record import ReleaseRecord, read_release
 
 DAY = datetime.date(2026, 3, 1)

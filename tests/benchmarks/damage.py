@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scripted_agents import scripted_agents
 
 from copolicy.collect.recording.recover import recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
@@ -21,7 +22,6 @@ from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.recording.log import read_episode
-from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.maps import MAP_SETS
 
 RESULT_COLUMNS = (
@@ -112,7 +112,7 @@ def originals(folder: Path) -> list[Original]:
     config = MAP_SETS["training"][6]
     path = folder / "truth.mcap"
     record_episode(
-        path, config, simulated_pair(config, "S01", 3), EpisodeMeta("truth", pair_id="S01", seed=37),
+        path, config, scripted_agents(3), EpisodeMeta("truth", pair_id="S01", seed=37),
         WallClockAnchor.simulated(10**18),
     )  # fmt: skip
     content, truth = path.read_bytes(), read_episode(path)

@@ -31,10 +31,10 @@ import numpy as np
 
 from copolicy.dataset.command_line.commands import progress_bar
 from copolicy.evaluate.coplan.rollouts import Outcome, coplan
-from copolicy.evaluate.planner import Planner
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.routes import route_class
+from copolicy.train.checkpoint import Checkpoint
 
 REFERENCE = ("ddpm", 100)
 SAMPLERS = [(name, steps) for name in ("ddim", "dpmsolver++") for steps in (10, 8, 5)]
@@ -136,23 +136,22 @@ def main() -> None:
     results, reference, described = {}, [], {}
     print(f"{len(maps)} maps, {arguments.repeats} repeats; differences to DDPM-100 within maps, ± standard error")
     for sampler, steps in (REFERENCE, *SAMPLERS):
-        planner = Planner(
-            arguments.checkpoint, sampler=sampler, num_inference_steps=steps, backend=arguments.backend, **settings
-        )
-        planner.actions = 8  # as many as the study executes
+        sampling = {"sampler": sampler, "num_inference_steps": steps, "backend": arguments.backend, **settings}
+        policy = Checkpoint(arguments.checkpoint, settings=sampling)
+        policy.n_action_steps = policy.wanted = 8  # as many as the study executes
         begin = time.perf_counter()
         with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
             outcomes = coplan(
-                planner,
+                policy,
                 maps,
                 Physics(step_limit=arguments.step_limit),
                 repeats=arguments.repeats,
                 seed=arguments.seed,
-                on_plan=lambda finished, bar=bar: bar.update(finished - bar.n),
+                on_step=lambda finished, bar=bar: bar.update(finished - bar.n),
             )
         seconds = time.perf_counter() - begin
         reference = reference or outcomes
-        described = described or planner.describe()
+        described = described or policy.describe()
         label = f"{sampler} {steps}"
         results[label] = {**compare(outcomes, reference), "seconds": seconds}
         print(line(label, results[label], seconds), flush=True)

@@ -20,12 +20,12 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from damaged_files import damage_one, sound
 from foreign_files import FOREIGN
 from reading_commands import COMMANDS, call
+from scripted_agents import scripted_agents
 
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.maps import MAP_SETS
 
 SOUND = {("collect recover", kind) for kind in ("empty folder", "recordings of another project")}
@@ -54,7 +54,7 @@ def mutated(folder: Path, copies: int, seed: int) -> Iterator[tuple[str, str, st
     recording = folder / "recording.mcap"
     config = MAP_SETS["training"][6]
     record_episode(
-        recording, config, simulated_pair(config, "S01", 3), EpisodeMeta("truth", "s-1", "S01", "S01-a", "S01-b"),
+        recording, config, scripted_agents(3), EpisodeMeta("truth", "s-1", "S01", "S01-a", "S01-b"),
         WallClockAnchor.simulated(10**18),
     )  # fmt: skip
     for kind, (commands, build) in sound(recording).items():

@@ -20,8 +20,8 @@ from lerobot.datasets import EpisodeAwareSampler, LeRobotDataset
 from torch.utils.data import DataLoader
 
 from copolicy.tasks.table.features import FEATURES, TASK
-from copolicy.train.epoch_order import WholeEpochSampler
 from copolicy.train.memory_dataset import MemoryDataset
+from copolicy.train.memory_training import WholeEpochSampler
 
 _FPS = 10
 _WINDOWS = {

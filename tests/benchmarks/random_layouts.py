@@ -10,11 +10,11 @@ import argparse
 import numpy as np
 
 from copolicy.evaluate.coplan.rollouts import coplan
-from copolicy.evaluate.planner import Planner
 from copolicy.evaluate.summary import success_rate
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
+from copolicy.train.checkpoint import Checkpoint
 
 _APART = 50.0  # px, so that obstacles do not overlap
 
@@ -45,7 +45,7 @@ def main() -> None:
     arguments = parser.parse_args()
     maps = layouts(arguments.layouts, arguments.seed)
     for policy in arguments.policies:
-        outcomes = coplan(Planner(policy), maps, Physics(step_limit=2000))
+        outcomes = coplan(Checkpoint(policy), maps, Physics(step_limit=2000))
         rates = {"all": success_rate([outcome.success for outcome in outcomes])}
         for size in (1, 2, 3):
             chosen = [o.success for o in outcomes if len(o.map_config.obstacles) == size]

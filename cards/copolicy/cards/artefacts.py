@@ -5,19 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.checks.stored_check import Validity, content_hash, validity
-from copolicy.dataset.files import json_file
+from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import CHECK_FILE, RELEASE_FILE, STATISTICS_FILE
 from copolicy.dataset.lerobot_folder.documents import CheckDocument, ReleaseDocument, StatisticsDocument
-
-__all__ = [
-    "KeptFindings",
-    "estimates",
-    "kept_findings",
-    "newest_release",
-    "read_json",
-    "statistics_doubt",
-    "stored_statistics",
-]
 
 
 @dataclass(frozen=True)
@@ -34,24 +24,12 @@ def kept_findings(root: Path, path: Path | None = None) -> KeptFindings | None:
     Raises:
         FileFormatError: there is a file, and it holds no JSON object.
     """
-    document = read_json(path or root / CHECK_FILE, CheckDocument, "findings of copolicy-dataset check")
+    document = read_optional_json(path or root / CHECK_FILE, CheckDocument, "findings of copolicy-dataset check")
     if document is None:
         return None
     # Reading the whole content is worth the time only where there is something to compare it with.
     content = content_hash(root) if document.get("content_hash") else None
     return KeptFindings(document, validity(document, content))
-
-
-def read_json(path: Path, kind: type = dict, what: str = "a JSON object") -> dict[str, Any] | None:
-    """The object in a JSON file, or None where there is no such file.
-
-    Args:
-        kind: the type that it must have (`copolicy.dataset.lerobot_folder.documents`).
-
-    Raises:
-        FileFormatError: there is a file, and it holds something else.
-    """
-    return json_file.read_json(path, kind, what) if path.exists() else None
 
 
 def stored_statistics(root: Path) -> dict[str, Any] | None:
@@ -60,7 +38,7 @@ def stored_statistics(root: Path) -> dict[str, Any] | None:
     Raises:
         FileFormatError: there is a file, and it holds something else.
     """
-    return read_json(root / STATISTICS_FILE, StatisticsDocument, "statistics of copolicy-dataset stats")
+    return read_optional_json(root / STATISTICS_FILE, StatisticsDocument, "statistics of copolicy-dataset stats")
 
 
 def newest_release(root: Path) -> dict[str, Any] | None:
@@ -69,7 +47,7 @@ def newest_release(root: Path) -> dict[str, Any] | None:
     Raises:
         FileFormatError: there is a file, and it holds something else.
     """
-    return read_json(root / RELEASE_FILE, ReleaseDocument, "the record of a release")
+    return read_optional_json(root / RELEASE_FILE, ReleaseDocument, "the record of a release")
 
 
 def statistics_doubt(stored: dict[str, Any], episodes: int) -> str:

@@ -1,13 +1,14 @@
 """What a checkpoint and its evaluations say of themselves: everything a model card may state."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.json_file import require_type
+from copolicy.dataset.files.json_file import read_optional_json, require_type
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.policies.documents import (
     EvaluationDocument,
@@ -17,15 +18,87 @@ from copolicy.dataset.policies.documents import (
     TrainingDocument,
 )
 from copolicy.dataset.policies.training_run import find_policy_folder
+from copolicy.dataset.scenarios import set_label
 
-from .artefacts import read_json
 from .facts import DatasetFacts
-from .training_data import TrainingData
 
 WEIGHTS = "model.safetensors"
 RECIPE = "recipe.json"
 EVALUATIONS = "eval.json"
 _RESULT = "a result of copolicy-eval"
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """The data behind a policy; None or empty where it is not stated.
+
+    Attributes:
+        used: episodes that it was trained on.
+        episodes: of the data set.
+        sources: episodes by source (`human`, `simulated`, `upstream`); so for map sets, licences and pairs.
+    """
+
+    repo_id: str
+    revision: str | None
+    used: int | None
+    episodes: int | None = None
+    frames: int | None = None
+    fps: float | None = None
+    version: str | None = None
+    content_hash: str | None = None
+    sources: dict[str, int] = field(default_factory=dict)
+    map_sets: dict[str, int] = field(default_factory=dict)
+    licences: dict[str, int] = field(default_factory=dict)
+    pairs: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def at_hand(self) -> bool:
+        """More than its name is known."""
+        return bool(self.sources)
+
+    @classmethod
+    def from_data_set(cls, facts: DatasetFacts, settings: dict[str, Any]) -> "TrainingData":
+        """From the data set's folder, and what the training says about it."""
+        chosen = settings.get("episodes")
+        sets = Counter(set_label(episode) for episode in facts.episodes)
+        return cls(
+            repo_id=str(settings.get("repo_id") or ""),
+            revision=settings.get("revision"),
+            used=len(facts.episodes) if chosen is None else len(chosen),
+            episodes=len(facts.episodes),
+            frames=facts.info["total_frames"],
+            fps=facts.info["fps"],
+            sources=facts.counts("source"),
+            map_sets=dict(sorted(sets.items(), key=lambda item: (-item[1], item[0]))),
+            licences=facts.counts("license"),
+            pairs=facts.counts("pair_id"),
+        )
+
+    @classmethod
+    def from_settings(cls, settings: dict[str, Any]) -> "TrainingData":
+        """From what the training says alone; its data set is not at hand."""
+        chosen = settings.get("episodes")
+        return cls(
+            str(settings.get("repo_id") or ""), settings.get("revision"), None if chosen is None else len(chosen)
+        )
+
+    @classmethod
+    def from_recipe(cls, recipe: dict[str, Any]) -> "TrainingData":
+        """From the `dataset` of `recipe.json`."""
+        return cls(
+            repo_id=str(recipe.get("repo_id") or ""),
+            revision=recipe.get("revision"),
+            used=recipe.get("episodes_used"),
+            episodes=recipe.get("episodes"),
+            frames=recipe.get("frames"),
+            fps=recipe.get("fps"),
+            version=recipe.get("version"),
+            content_hash=recipe.get("content_hash"),
+            sources=recipe.get("source") or {},
+            map_sets=recipe.get("map_set") or {},
+            licences=recipe.get("license") or {},
+            pairs=recipe.get("pair_id") or {},
+        )
 
 
 @dataclass(frozen=True)
@@ -59,12 +132,12 @@ class Checkpoint:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
         """
         folder = _folder(path)
-        config = read_json(folder / "config.json", dict, "a policy's configuration") or {}
+        config = read_optional_json(folder / "config.json", dict, "a policy's configuration") or {}
         if "type" not in config:
             raise FileFormatError(folder / "config.json", "a policy's configuration with its type", "none")
         require_type(config, PolicyConfigDocument, "a policy's configuration", folder / "config.json")
-        training = read_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
-        recipe = read_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
+        training = read_optional_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
+        recipe = read_optional_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
         root = dataset_root or _training_root(settings)
         if root is not None:
@@ -94,7 +167,7 @@ class Checkpoint:
         """
         if not paths:
             kept = self.folder / EVALUATIONS
-            stored = read_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
+            stored = read_optional_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
             results = stored.get("evaluations") or []
             return [self._checked(kept, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
@@ -102,7 +175,7 @@ class Checkpoint:
         return [self._evaluation(path) for path in paths]
 
     def _evaluation(self, path: Path) -> dict[str, Any]:
-        result = read_json(path, dict, _RESULT)
+        result = read_optional_json(path, dict, _RESULT)
         if result is None:
             raise FileFormatError(path, _RESULT, "no such file")
         return self._checked(path, result)

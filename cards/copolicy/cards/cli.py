@@ -1,10 +1,17 @@
 """`copolicy-cards`: what a data set or a model tells its readers."""
 
+import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
-from copolicy.dataset.command_line.commands import command_parser, run
+from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.extras import FIGURES, HUB, TABLES
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.staging import replace_text, require_new
+from copolicy.dataset.publication.licences import checked_licence
+from copolicy.dataset.publication.minimal_card import is_minimal_card
+from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
-from .commands import add_dataset_command, add_model_command
 from .report import add_report_command
 
 
@@ -15,3 +22,94 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_model_command(commands)
     add_report_command(commands)
     return run(parser, argv)
+
+
+def add_dataset_command(commands: argparse._SubParsersAction) -> None:
+    """Adds the command `dataset`."""
+    dataset = add_command(
+        commands,
+        "dataset",
+        _dataset,
+        "write README.md with Hub metadata, a datasheet and figures into a data set folder",
+        "copolicy-cards dataset outputs/dataset --repo-id my-lab/table",
+        lambda arguments: (*TABLES, *HUB, *(() if arguments.no_figures else FIGURES)),
+    )
+    dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
+    dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
+    dataset.add_argument("--pretty-name", help="title of the card (default: the data set's name)")
+    dataset.add_argument("--no-figures", action="store_true", help="draw no pictures")
+    dataset.add_argument(
+        "--croissant",
+        action="store_true",
+        help="also write meta/croissant.json, Croissant 1.0 metadata as JSON-LD (needs --repo-id)",
+    )
+    dataset.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
+
+
+def add_model_command(commands: argparse._SubParsersAction) -> None:
+    """Adds the command `model`."""
+    model = add_command(
+        commands,
+        "model",
+        _model,
+        "write README.md with Hub metadata and results into a checkpoint folder",
+        "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
+        (*TABLES, *HUB, *FIGURES),
+    )
+    model.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run (its last checkpoint)")
+    model.add_argument(
+        "--eval",
+        action="append",
+        type=Path,
+        default=[],
+        metavar="FILE",
+        help="result of copolicy-eval (default: those that an exported policy keeps)",
+    )
+    model.add_argument("--dataset", type=Path, help="folder of its training data (default: where training found it)")
+    model.add_argument("--repo-id", default="local/copolicy", help="user/name on the Hub (default: local/copolicy)")
+    model.add_argument("--license", help="Hub identifier of the licence of the weights (default: none is stated)")
+    model.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
+
+
+def _dataset(arguments: argparse.Namespace) -> dict:
+    if arguments.repo_id is not None:
+        checked_repo_id(arguments.repo_id)
+    from copolicy.dataset.files.meta_files import CROISSANT_FILE
+
+    from .croissant import croissant_text
+    from .dataset_card import render
+    from .facts import DatasetFacts
+
+    facts = DatasetFacts.read(arguments.root)
+    path = arguments.root / "README.md"
+    require_new(path, overwrite=arguments.overwrite or is_minimal_card(path))
+    if arguments.croissant and not arguments.repo_id:
+        raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
+    repo_id = arguments.repo_id or local_repo_id(arguments.root)
+    render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
+    figures = []
+    if not arguments.no_figures:
+        from .figures import save_figures
+
+        figures = save_figures(facts)
+    summary = {"card": str(path), "figures": [figure for figure, _ in figures]}
+    if arguments.croissant:
+        replace_text(arguments.root / CROISSANT_FILE, croissant_text(facts, repo_id, arguments.pretty_name))
+        summary["croissant"] = str(arguments.root / CROISSANT_FILE)
+    replace_text(path, render(facts, repo_id, arguments.pretty_name, figures))
+    return {**summary, "episodes": len(facts.episodes), "sources": facts.counts("source")}
+
+
+def _model(arguments: argparse.Namespace) -> dict:
+    checked_repo_id(arguments.repo_id)
+    checked_licence(arguments.license or "")
+    from .checkpoint import Checkpoint
+    from .model_card import render_model_card
+
+    checkpoint = Checkpoint.read(arguments.checkpoint, arguments.dataset)
+    path = checkpoint.folder / "README.md"
+    require_new(path, overwrite=arguments.overwrite)
+    evaluations = checkpoint.evaluations(arguments.eval)
+    replace_text(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
+    sources = checkpoint.data.sources or "not stated: the data set is not at hand"
+    return {"card": str(path), "evaluations": len(evaluations), "trained_on": sources}

@@ -160,7 +160,11 @@ def _frames(facts: DatasetFacts) -> dict[str, Any]:
 
 def _episodes(facts: DatasetFacts) -> dict[str, Any]:
     columns = {"episode_index": "int", "length": "int", **EPISODE_COLUMNS}
-    columns = {name: kind for name, kind in columns.items() if name in facts.stored or name not in LATER_COLUMNS}
+    columns = {
+        name: kind
+        for name, kind in columns.items()
+        if name in facts.folder.episodes.column_names or name not in LATER_COLUMNS
+    }
     return {
         "@type": "cr:RecordSet",
         "@id": "episodes",

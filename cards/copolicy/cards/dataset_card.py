@@ -2,24 +2,22 @@
 
 from collections.abc import Iterable
 
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError
+from huggingface_hub import DatasetCardData
+
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.lerobot_folder.exclusions import FLAG
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
 from copolicy.dataset.publication.repo_id import checked_repo_id
+from copolicy.dataset.scenarios import set_label
 
 from .artefacts import newest_release
 from .datasheet import datasheet
-from .excluded import excluded
 from .facts import DatasetFacts
 from .findings import findings
 from .markdown import share, table
 from .multimodality import multimodality
-
-try:
-    from huggingface_hub import DatasetCardData
-except ModuleNotFoundError:
-    raise MissingExtraError("huggingface_hub") from None
 
 SOURCES = {
     "human": "People played these episodes, two at a time, with one controller each.",
@@ -50,6 +48,9 @@ The task, its dynamics and its maps are those of the paper:
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
+_LISTED = 400  # episodes; a longer list is for a command to print
+
+
 def render(
     facts: DatasetFacts, repo_id: str, pretty_name: str | None = None, figures: Iterable[tuple[str, str]] = ()
 ) -> str:
@@ -69,7 +70,7 @@ def render(
         _overview(facts, title),
         *(f"![{caption}]({path})\n\n*{caption}*" for path, caption in figures),
         _loading(facts, repo_id),
-        *excluded(facts, repo_id),
+        *_excluded(facts, repo_id),
         _episodes(facts),
         multimodality(facts),
         findings(facts),
@@ -140,13 +141,9 @@ def _physics(facts: DatasetFacts) -> str:
 
 def _episodes(facts: DatasetFacts) -> str:
     total = len(facts.episodes)
-    sets: dict[str, list[dict]] = {name: [] for name in facts.values("map_set")}
+    sets: dict[str, list[dict]] = {}
     for episode in facts.episodes:
-        if episode["map_set_digest"]:
-            file = f"version {episode['map_set_version']}, {episode['map_set_digest']}"
-            sets.setdefault(f"{episode['map_set']} ({file})", []).append(episode)
-        elif episode["map_set"]:
-            sets[episode["map_set"]].append(episode)
+        sets.setdefault(set_label(episode), []).append(episode)
     maps = [
         (
             name,
@@ -155,7 +152,7 @@ def _episodes(facts: DatasetFacts) -> str:
             share(sum(e["success"] for e in members), len(members)),
         )
         for name, members in sorted(sets.items())
-        if members
+        if name
     ]
     reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
     routes = [(route or "none", count) for route, count in facts.counts("route_class").items()]
@@ -208,3 +205,44 @@ copolicy-train --policy.type=copolicy --dataset.repo_id={repo_id}
 def _names(feature: dict) -> Iterable[str]:
     names = feature.get("names")
     return map(str, names) if isinstance(names, list) else ()
+
+
+def _excluded(facts: DatasetFacts, repo_id: str) -> list[str]:
+    """The section on excluded episodes, where there are any; none otherwise.
+
+    Args:
+        repo_id: `user/name` of the data set, for the examples.
+    """
+    marked = [episode for episode in facts.episodes if episode.get("discarded")]
+    if not marked:
+        return []
+    included = [str(episode["episode_index"]) for episode in facts.episodes if not episode.get("discarded")]
+    named = f"'[{','.join(included)}]'" if len(included) <= _LISTED else "LIST"
+    rows = [(episode["episode_index"], _why(str(episode.get("quality_flags") or ""))) for episode in marked]
+    return [
+        f"""## Excluded episodes
+
+{len(marked)} of {len(facts.episodes)} episodes are kept and marked as not to be used (column `discarded` of
+`meta/episodes`):
+
+{table(("episode", "why"), rows)}
+
+`copolicy-train` leaves them out. LeRobot knows no such mark: its own trainer and loader take every episode unless they
+are told which ones (`copolicy-dataset exclude FOLDER --list` prints the list).
+
+```bash
+lerobot-train --dataset.repo_id={repo_id} --dataset.episodes={named} ...
+```
+
+```python
+from lerobot.datasets import LeRobotDataset, LeRobotDatasetMetadata
+
+marked = LeRobotDatasetMetadata("{repo_id}").episodes["discarded"]
+dataset = LeRobotDataset("{repo_id}", episodes=[k for k, mark in enumerate(marked) if not mark])
+```"""
+    ]
+
+
+def _why(flags: str) -> str:
+    reasons = [flag.removeprefix(FLAG) for flag in flags.split(",") if flag.startswith(FLAG)]
+    return reasons[0] if reasons else "discarded while recording"

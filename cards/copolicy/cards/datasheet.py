@@ -6,11 +6,12 @@ What the metadata does not say is called not stated, so that a reader knows what
 from collections.abc import Iterator
 
 from copolicy.dataset.features import ACTION
+from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import RECORD_FILE
 from copolicy.dataset.lerobot_folder.documents import ConversionRecord
 from copolicy.dataset.versions.withdrawals import read_withdrawals
 
-from .artefacts import newest_release, read_json
+from .artefacts import newest_release
 from .facts import DatasetFacts
 from .markdown import listing, share
 
@@ -91,7 +92,7 @@ def _preprocessing(facts: DatasetFacts) -> list[str]:
     ]
     if "hold" in action:
         lines.append(f"The action of a frame is the {action['hold']} of the recorded actions until the next frame")
-    record = read_json(facts.root / RECORD_FILE, ConversionRecord, "the record of a conversion")
+    record = read_optional_json(facts.root / RECORD_FILE, ConversionRecord, "the record of a conversion")
     if record is None:
         return [*lines, f"Conversion: not stated (no `{RECORD_FILE}`)"]
     lines.append(f"Converted by `{record.get('converter', 'not stated')}` {record.get('version', '')}".rstrip())

@@ -17,15 +17,11 @@ class DatasetFacts:
     """The metadata of a LeRobot v3 data set and its episodes.
 
     Attributes:
-        info: `meta/info.json`.
         episodes: one dict an episode with its episode columns and `length` (frames).
-        stored: the columns that meta/episodes has; a data set of an earlier version lacks some of `LATER_COLUMNS`.
     """
 
-    root: Path
-    info: dict[str, Any]
+    folder: LeRobotFolder
     episodes: tuple[dict[str, Any], ...]
-    stored: frozenset[str]
 
     @classmethod
     def read(cls, root: Path) -> "DatasetFacts":
@@ -41,7 +37,17 @@ class DatasetFacts:
         if len(episodes) != count or sum(folder.lengths) != frames:
             found = f"{len(episodes)} episodes with {sum(folder.lengths)} frames"
             raise FileFormatError(root / INFO_FILE, f"{count} episodes with {frames} frames in meta/episodes", found)
-        return cls(root, folder.info, episodes, frozenset(folder.episodes.column_names))
+        return cls(folder, episodes)
+
+    @property
+    def root(self) -> Path:
+        """The folder of the data set."""
+        return self.folder.root
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """`meta/info.json`."""
+        return self.folder.info
 
     def counts(self, column: str) -> dict[str, int]:
         """How many episodes have each value of a column, most frequent first."""

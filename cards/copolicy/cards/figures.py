@@ -5,7 +5,11 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from copolicy.dataset.exceptions import MissingExtraError
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
 from copolicy.dataset.files.staging import replacement
 from copolicy.tasks.table.map_config import WINDOW
 from copolicy.tasks.table.physics import GOAL_SIZE
@@ -13,14 +17,6 @@ from copolicy.tasks.table.physics import GOAL_SIZE
 from .facts import DatasetFacts
 from .frames import EpisodeFrames, read_frames
 from .human_figure import human_figure
-
-try:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Rectangle
-except ModuleNotFoundError:
-    raise MissingExtraError("matplotlib") from None
 
 FOLDER = Path("figures")
 

@@ -2,20 +2,15 @@
 
 from collections.abc import Sequence
 
-from copolicy.dataset.exceptions import MissingExtraError
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from .artefacts import stored_statistics
 from .facts import DatasetFacts
 from .routes import HumanDistance, RouteStatistics, route_statistics
-
-try:
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-except ModuleNotFoundError:
-    raise MissingExtraError("matplotlib") from None
 
 _OURS, _PEOPLE, _CHANCE = "#0072B2", "#E69F00", "#BBBBBB"
 _HEIGHT = 0.38  # of a bar; two of them to a route

@@ -3,18 +3,13 @@
 from collections.abc import Sequence
 from typing import Any
 
-from copolicy.dataset.exceptions import MissingExtraError
+from huggingface_hub import ModelCardData
 
 from .checkpoint import Checkpoint
 from .dataset_card import CITATION, SOURCES
 from .markdown import listing, share, table
 from .model_index import eval_results
 from .model_results import results
-
-try:
-    from huggingface_hub import ModelCardData
-except ModuleNotFoundError:
-    raise MissingExtraError("huggingface_hub") from None
 
 # What tells one policy from another, in the order of a reader's questions; a policy has only some of them.
 _SETTINGS = (

@@ -9,12 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from copolicy.dataset.exceptions import MissingExtraError
-
-try:
-    from huggingface_hub import EvalResult
-except ModuleNotFoundError:
-    raise MissingExtraError("huggingface_hub") from None
+from huggingface_hub import EvalResult
 
 _SETTINGS = (
     "map_count", "configurations", "orientations", "repeats", "actions_per_plan", "fps", "step_limit",
@@ -50,7 +45,7 @@ def _result(evaluation: Mapping[str, Any]) -> EvalResult:
     return EvalResult(
         task_type="robotics",
         task_name=f"table carrying, {evaluation['study']} (simulation)",
-        dataset_type=f"copolicy-maps-{settings['maps']}",
+        dataset_type=f"copolicy-maps-{settings['maps'].replace('#', '-')}",
         dataset_name=f"{settings['maps']} maps{'' if whole else ', a part of them'}",
         dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
         dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else 'maps'}",

@@ -1,19 +1,19 @@
 """Converts folders of recordings, one MCAP file an episode, to a LeRobot v3 data set."""
 
+import contextlib
 import functools
 import logging
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.commands import progress
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import broken_links, distinct, distinct_files
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.log import read_episode, recorded_task
 from copolicy.dataset.worker_pool import WorkerPool
 
 from .lerobot.prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
@@ -44,11 +44,12 @@ def convert_recordings(
         DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is left behind.
         MissingExtraError: lerobot is not installed.
     """
-    stride(conversion.fps)
     require_new(root)
     if workers < 1:
         raise InvalidValueError("workers", "at least 1", workers)
     files, unfinished = find_recordings(folders)
+    with contextlib.suppress(ForeignRecordingError):  # said with the other files that cannot be read
+        stride(conversion.fps, recorded_task(files[0]).spec.record_hz)
     left_out = LeftOut()
     notes: list[str] = []
     with _prepared(files, conversion, min(workers, len(files))) as results:
@@ -111,7 +112,7 @@ def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     return files, unfinished
 
 
-@contextmanager
+@contextlib.contextmanager
 def _prepared(
     files: list[Path], conversion: Conversion, workers: int
 ) -> Iterator[Iterator[PreparedEpisode | NotPrepared]]:

@@ -81,14 +81,11 @@ UNHASHED_DEFAULTS: tuple[str, ...] = ("obstacle_sizes", *SET_COLUMNS)
 LATER_COLUMNS: tuple[str, ...] = ("physics", "obstacle_size", *UNHASHED_DEFAULTS)
 """Episode columns that data sets of earlier versions lack; readers take the default of `EpisodeMeta` for them."""
 
-LATER_DEFAULTS: dict[str, Any] = {
-    column.name: column.default for column in fields(EpisodeMeta) if column.name in LATER_COLUMNS
-}
-"""Value of each of them in an episode of such a data set, or where a merge with one left nothing."""
-
 UNKNOWN_VALUES: dict[str, Any] = {
-    name: LATER_DEFAULTS.get(name, {"str": "", "int": -1, "float": float("nan"), "bool": False}[kind])
-    for name, kind in EPISODE_COLUMNS.items()
+    column.name: column.default
+    if column.name in LATER_COLUMNS
+    else {"str": "", "int": -1, "float": float("nan"), "bool": False}[_type_name(column)]
+    for column in fields(EpisodeMeta)
 }
 """What stands for an empty entry of each episode column."""
 

@@ -15,6 +15,9 @@ STATE = "observation.state"
 ENVIRONMENT_STATE = "observation.environment_state"
 HUMAN_ACTION = "observation.human_action"
 ACTION = "action"
+VECTORS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)
+"""The columns of vectors: `(N, n)` in memory even where n is 1, a column that LeRobot stores as plain numbers."""
+
 SCENE_IMAGE = "observation.images.scene"
 """The optional image of the scene, without the actions."""
 

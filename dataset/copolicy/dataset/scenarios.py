@@ -153,7 +153,19 @@ class ScenarioFiles(ABC):
         """
 
 
+def set_label(row: Mapping[str, Any]) -> str:
+    """The map set in an episode's columns, with version and digest where it is of a file."""
+    file = f" (version {row['map_set_version']}, {row['map_set_digest']})" if row["map_set_digest"] else ""
+    return f"{row['map_set']}{file}"
+
+
+def file_and_split(text: str) -> tuple[str, str]:
+    """The two parts of `FILE#split`; the split is empty where there is none (a path may hold `#`)."""
+    path, mark, split = text.rpartition("#")
+    return (path, split) if mark and not Path(text).is_file() else (text, "")
+
+
 def is_file_name(text: str) -> bool:
     """Whether `--maps` names a file, not a set that comes with the task."""
-    path = text.partition("#")[0]
+    path, _ = file_and_split(text)
     return path.lower().endswith(SUFFIXES) or "/" in path or "\\" in path or Path(path).is_file()

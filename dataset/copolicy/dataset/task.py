@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
-from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, is_file_name
+from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -139,6 +139,68 @@ class World(Protocol):
         ...
 
 
+class Player(Protocol):
+    """A simulated player of one episode."""
+
+    @property
+    def changes(self) -> int:
+        """How often it has changed its mind, as the task defines it."""
+        ...
+
+    def act(self, state: np.ndarray) -> np.ndarray:
+        """Its action `(m,)` in a state `(n,)`; called once a step."""
+        ...
+
+
+class SimulatedPlayers(Protocol):
+    """The part `agents` of a task: players that need neither a person nor a policy.
+
+    Attributes:
+        pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
+        partners: profiles of kinds of partner for the human seat, which robots are judged with.
+        robots: profile and description of scripted robots, which policies are compared with.
+    """
+
+    @property
+    def pairs(self) -> Mapping[str, tuple[Any, Any]]: ...
+    @property
+    def partners(self) -> Mapping[str, Any]: ...
+    @property
+    def robots(self) -> Mapping[str, tuple[Any, str]]: ...
+
+    def make_pair(self, scenario: Any, name: str, seed: int, /, *options: Any) -> tuple[Player, Player]:
+        """The players of a pair for one episode; `options` are the task's own."""
+        ...
+
+    def make_partner(self, scenario: Any, kind: str, seed: int, /) -> Player:
+        """A partner for one episode; equal seeds make equal ones, whoever the robot is."""
+        ...
+
+    def make_robot(self, scenario: Any, name: str, seed: int, /) -> Player:
+        """A scripted robot for one episode."""
+        ...
+
+
+class SeatExchange(Protocol):
+    """The part `exchange` of a task: the same episode with the robot's and the human's place exchanged.
+
+    Each method is its own inverse. A world in an exchanged state moves under an exchanged action as the first one
+    does, so that a policy that has learned the robot's seat can act at the human's.
+    """
+
+    def scenario(self, scenario: Any) -> Any:
+        """A scenario with the seats exchanged."""
+        ...
+
+    def states(self, states: np.ndarray) -> np.ndarray:
+        """States `(..., n)` with the seats exchanged."""
+        ...
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Joint actions `(..., 2 m)` with the seats exchanged."""
+        ...
+
+
 @dataclass(frozen=True)
 class TaskSpec:
     """What a task is, in plain data; recordings, data sets and checkpoints carry it.
@@ -151,6 +213,7 @@ class TaskSpec:
         scenario: the vector of a scenario in a data set.
         action: one player's action.
         reasons: how a world can end an episode.
+        successes: which of them mean success.
         record_hz: steps a second.
         players: names of the seats.
         title: what it is called in messages; its name where none is given.
@@ -166,9 +229,12 @@ class TaskSpec:
     record_hz: int = RECORD_HZ
     players: tuple[str, str] = PLAYERS
     title: str = ""
+    successes: tuple[str, ...] = ("goal",)
 
     def __post_init__(self):
         object.__setattr__(self, "title", self.title or self.name)
+        if not set(self.successes) <= set(self.reasons):
+            raise InvalidValueError(f"TaskSpec.successes of {self.name!r}", f"some of {self.reasons}", self.successes)
 
     def to_dict(self) -> dict[str, Any]:
         """The spec as data sets and recordings carry it, JSON-able."""
@@ -210,6 +276,16 @@ class PairTask(ABC):
     spec: ClassVar[TaskSpec]
     scenario_type: ClassVar[type]
     settings_type: ClassVar[type]
+
+    @property
+    def agents(self) -> SimulatedPlayers | None:
+        """Simulated players."""
+        return None
+
+    @property
+    def exchange(self) -> SeatExchange | None:
+        """How an episode looks from the other seat."""
+        return None
 
     @property
     @abstractmethod
@@ -360,10 +436,10 @@ class PairTask(ABC):
             scenarios = tuple(self.scenario_sets[text])
             return ScenarioSet(self.spec.name, text, "1", scenarios, (1,) * len(scenarios))
         if not is_file_name(text):
-            raise UnknownNameError("map set", text, [*self.scenario_sets, "FILE.yaml"])
+            raise UnknownNameError("map set", text, self.scenario_sets)
         if self.scenario_files is None:
             raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
-        path, _, split = text.partition("#")
+        path, split = file_and_split(text)
         chosen = self.scenario_files.read(Path(path))
         return chosen.part(split) if split else chosen
 

@@ -15,7 +15,7 @@ from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
 from .result_file import write_json
-from .study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
+from .study_flags import add_study_flags, policy_of, protocol_of, study_needs, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,24 +59,23 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     from .coplan.rollouts import coplan
     from .summary import summarise
 
-    planner = planner_of(arguments.policy, arguments)
-    protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
+    policy = policy_of(arguments.policy, arguments)
+    protocol = protocol_of(arguments, [(str(arguments.policy), policy.conditions)])
     with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
         outcomes = coplan(
-            planner,
+            policy,
             maps,
             protocol.physics,
             repeats=arguments.repeats,
-            actions_per_plan=arguments.actions_per_plan,
             fps=protocol.fps,
             seed=arguments.seed,
-            on_plan=lambda finished: bar.update(finished - bar.n),
+            on_step=lambda finished: bar.update(finished - bar.n),
         )
-    summary = summarise(outcomes, planner)
+    summary = summarise(outcomes, policy)
     result = {
         "study": "coplan",
         "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
-        "policy": planner.describe(),
+        "policy": policy.describe(),
         "settings": {
             "maps": chosen.label,
             "map_set": chosen.describe(),

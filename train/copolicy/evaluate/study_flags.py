@@ -16,7 +16,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.tasks.table.physics import Physics
 
 if TYPE_CHECKING:
-    from .planner import Planner
+    from copolicy.train.checkpoint import Checkpoint
 
 ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
@@ -160,18 +160,19 @@ def study_settings(arguments: argparse.Namespace, protocol: Protocol) -> dict[st
     }
 
 
-def planner_of(path: Path | str, arguments: argparse.Namespace) -> "Planner":
-    """The checkpoint at `path` as the flags want it to plan.
+def policy_of(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint":
+    """The checkpoint at `path` as the flags want it to act.
 
     Raises:
         FileFormatError: no such checkpoint, or one without a setting that the flags change.
-        InvalidValueError: it plans fewer actions than are to be executed.
+        InvalidValueError: its chunks hold fewer actions than are to be executed.
     """
-    from .planner import Planner  # torch
+    from copolicy.train.checkpoint import Checkpoint  # torch
 
-    planner = Planner(path, arguments.device, **policy_settings(arguments))
-    available = planner.checkpoint.planned_frames
-    if arguments.actions_per_plan > available:
-        raise InvalidValueError("--actions-per-plan", f"at most the plan's {available}", arguments.actions_per_plan)
-    planner.actions = arguments.actions_per_plan
-    return planner
+    policy = Checkpoint(path, arguments.device, policy_settings(arguments))
+    if arguments.actions_per_plan > policy.chunk_size:
+        raise InvalidValueError(
+            "--actions-per-plan", f"at most the plan's {policy.chunk_size}", arguments.actions_per_plan
+        )
+    policy.n_action_steps = policy.wanted = arguments.actions_per_plan
+    return policy

@@ -3,36 +3,37 @@
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.stats import binomtest
 
-from .coplan.rollouts import Outcome
-from .planner import Planner
+if TYPE_CHECKING:
+    from copolicy.train.checkpoint import Checkpoint
+
+    from .coplan.rollouts import Outcome
 
 
 def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
     """Share of successes with its binomial standard error and Wilson's 95 % interval."""
     n = len(successes)
     p = sum(successes) / n
-    z = 1.959963984540054
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    interval = binomtest(sum(successes), n).proportion_ci(method="wilson")
     return {
         "mean": p,
         "standard_error": math.sqrt(p * (1 - p) / n),
-        "wilson_95": [max(0.0, centre - half), min(1.0, centre + half)],
+        "wilson_95": [float(interval.low), float(interval.high)],
         "episodes": n,
     }
 
 
-def summarise(outcomes: Sequence[Outcome], planner: Planner | None) -> dict[str, Any]:
+def summarise(outcomes: Sequence["Outcome"], policy: "Checkpoint | None") -> dict[str, Any]:
     """The summary of `eval.json`. Times to completion count successes only, as the paper's do.
 
     Args:
-        planner: whose planning time is told; None where nothing planned.
+        policy: whose planning time is told; None where nothing planned.
     """
-    planning_seconds, tables = (planner.planning_seconds, sum(planner.batch_sizes)) if planner else ([], 0)
+    planning_seconds, tables = (policy.planning_seconds, sum(policy.batch_sizes)) if policy else ([], 0)
     rows = [outcome.to_json() for outcome in outcomes]
     reasons: dict[str, int] = defaultdict(int)
     by_map: dict[str, list[bool]] = defaultdict(list)

@@ -136,7 +136,7 @@ def _train(arguments: argparse.Namespace) -> dict:
         _check_repo_id(name, _value(name, flags))
     # LeRobot and its libraries print here and there; stdout is for the summary.
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
-        from .local_dataset import check_local_dataset
+        from .episode_choice import check_local_dataset
         from .memory_training import train_from_memory
 
         config = _parse()

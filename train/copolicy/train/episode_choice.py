@@ -1,22 +1,67 @@
-"""Which episodes a policy is trained on: those asked for, less those that the data set marks as excluded."""
+"""A local data set before training: whether its files are complete, and which episodes a policy is trained on.
+
+The episodes are those asked for, less those that the data set marks as excluded.
+"""
 
 import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.lerobot_folder.info import is_ours
+from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.policies.documents import TrainingDocument
-
-from .local_dataset import training_episodes
 
 _MARK = "discarded"
 _LOST = (
     "its episode columns were lost, as by LeRobot's delete_episodes; copolicy-dataset restores them from the "
     "recordings or an earlier version (copolicy-dataset amend --help)"
 )
+
+
+def check_local_dataset(root: Path | str) -> None:
+    """Checks that the files of a LeRobot v3 data set are there and complete, whatever its task.
+
+    Raises:
+        FileFormatError: no such folder, no `meta/info.json` of version 3, a Parquet file that is missing or broken,
+            another number of rows or episodes than `meta/info.json` says, or an episode whose file is not named.
+    """
+    root = Path(root)
+    if not root.is_dir():
+        raise FileFormatError(root, "the folder of a LeRobot v3 data set", "no such folder")
+    # Training mends statistics that an excluded episode spoiled, and refuses others.
+    require_loadable(root, finite_statistics=False)
+
+
+def training_episodes(episodes: list[int] | None, total: int, discarded: list[bool]) -> list[int] | None:
+    """The episodes to train on: those asked for, without the discarded ones.
+
+    Args:
+        episodes: asked for; None for all.
+        total: episodes of the data set.
+        discarded: their column `discarded`; empty if the data set has none.
+
+    Returns:
+        None where that is simply all of them.
+
+    Raises:
+        InvalidValueError: an episode that is not there.
+        RunError: none is left.
+    """
+    asked = list(range(total)) if episodes is None else episodes
+    missing = [episode for episode in asked if not 0 <= episode < total]
+    if missing:
+        raise InvalidValueError("dataset.episodes", f"0 to {total - 1}", missing[0])
+    kept = [episode for episode in asked if not (discarded and discarded[episode])]
+    if not kept:
+        raise RunError(f"dataset.episodes: all of the {len(asked)} episodes to train on are marked as discarded")
+    if len(kept) == len(asked):
+        return episodes
+    left_out = sorted(set(asked) - set(kept))
+    logging.info("Leaving out %d discarded of %d episodes: %s", len(left_out), len(asked), left_out)
+    return kept
 
 
 def excluded_episodes(meta: Any) -> frozenset[int]:

@@ -4,9 +4,6 @@ A training's checkpoint holds the weights twice, raw and averaged, and the state
 the averaged ones: the exported policy has them as its only weights, in float32, and is checked to make the same plans.
 """
 
-import json
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,13 +14,14 @@ import torch
 from lerobot.policies.factory import make_pre_post_processors
 from torch import Tensor
 
-from copolicy.collect.agents.checkpoint import Checkpoint
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.files.staging import about, sync_folder, sync_tree
+from copolicy.dataset.files.replace_folder import replaced_folder
+from copolicy.dataset.files.staging import new_folder, replace_json
 from copolicy.dataset.task import get_task
 
+from .checkpoint import Checkpoint
 from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe
 
 _AVERAGED = "ema.model."
@@ -66,15 +64,13 @@ def export_checkpoint(
     recipe = training_recipe(source, original.weights_sha256, averaged=policy.ema is not None, commands=commands)
     with _staged(out, overwrite) as folder:
         _save(policy, source, folder)
-        (folder / RECIPE_FILE).write_text(json.dumps(recipe, indent=1) + "\n", encoding="utf-8")
+        replace_json(folder / RECIPE_FILE, recipe, indent=1)
         (folder / "model.safetensors").chmod(0o644)  # safetensors writes for its owner alone
         exported = Checkpoint(folder)
         digests = {original.weights_sha256, recipe["weights"]["exported_from"], exported.weights_sha256}
         results = [kept_evaluation(file, digests) for file in evaluations]
         if results:
-            (folder / EVALUATION_FILE).write_text(
-                json.dumps({"evaluations": results}, indent=1) + "\n", encoding="utf-8"
-            )
+            replace_json(folder / EVALUATION_FILE, {"evaluations": results}, indent=1)
         difference = _difference(policy, exported.policy)
         if difference > _LARGEST_DIFFERENCE:
             raise RunError(f"{out}: expected the plans of {source}, found one that differs by {difference:.2g}")
@@ -115,7 +111,7 @@ def _averaged(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 @torch.inference_mode()
 def _difference(one: Any, other: Any) -> float:
-    """Largest difference between the plans of two policies from the same noise, at the starts of the task's first set."""
+    """Largest difference between the plans of two policies from the same noise, at the starts of a task's first set."""
     task, frames = get_task(one.config.task), one.config.n_obs_steps
     scenarios = next(iter(task.scenario_sets.values()))
     starts = task.states_of(np.array([task.start_of(scenario) for scenario in scenarios]))
@@ -142,15 +138,7 @@ def _check_output(out: Path, overwrite: bool) -> None:
 @contextmanager
 def _staged(out: Path, overwrite: bool) -> Iterator[Path]:
     """A folder to write to, which takes the place of `out` when all is written."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".export-", dir=out.parent) as place:
-        folder = Path(place) / out.name
-        with about(out, folder):
-            folder.mkdir()
-            yield folder
-            sync_tree(folder)
-            _check_output(out, overwrite)
-            if out.exists():
-                shutil.move(out, Path(place) / f"{out.name}.before")
-            folder.rename(out)
-            sync_folder(out.parent)
+    with (replaced_folder if out.exists() else new_folder)(out) as folder:
+        folder.mkdir()
+        yield folder
+        _check_output(out, overwrite)

@@ -14,8 +14,8 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.files.listing import visible_files
-from copolicy.dataset.files.meta_files import EPISODES_FOLDER
+from copolicy.dataset.lerobot_folder.folder import data_files
+from copolicy.dataset.lerobot_folder.info import episode_files
 from copolicy.dataset.lerobot_folder.tables import DAMAGED, damaged, read_parquet
 
 _EPISODE, _FRAME = "episode_index", "frame_index"
@@ -129,7 +129,7 @@ def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str,
         FileFormatError: a file cannot be read.
     """
     statistics = []
-    for path in visible_files(root / EPISODES_FOLDER, "*.parquet"):
+    for path in episode_files(root):
         for row in read_parquet(path).to_pylist():
             if row[_EPISODE] in episodes:
                 entry: dict[str, dict[str, np.ndarray]] = {}
@@ -166,7 +166,7 @@ def _fixed(kind: pa.DataType) -> bool:
 
 
 def _row_groups(root: Path, columns: list[str]) -> Iterator[pa.Table]:
-    for path in visible_files(root / "data", "*.parquet"):
+    for path in data_files(root):
         try:
             with pq.ParquetFile(path) as file:
                 there = set(file.schema_arrow.names)

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.json_file import read_json
+from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
+from copolicy.dataset.scenarios import set_label
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -38,15 +39,16 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     for command in commands:
         if str(Path.home()) in command or str(Path.cwd()) in command:
             raise InvalidValueError("--commands", "paths that another machine has too", command)
-    earlier = _json(folder / RECIPE_FILE, "the recipe of an exported policy")
+    earlier = read_optional_json(folder / RECIPE_FILE, dict[str, Any], "the recipe of an exported policy")
     if earlier:
         return {**earlier, **({"commands": list(commands)} if commands else {})}
     recipe: dict[str, Any] = {
         "weights": {"exported_from": weights_sha256, "averaged": averaged, "dtype": "float32"},
     }
-    training = _json(folder / "train_config.json", "the settings of a training", TrainingDocument)
+    training = read_optional_json(folder / "train_config.json", TrainingDocument, "the settings of a training")
     if training:
-        reached = _json(folder.parent / "training_state" / "training_step.json", "a training's step", ReachedStep) or {}
+        step_file = folder.parent / "training_state" / "training_step.json"
+        reached = read_optional_json(step_file, ReachedStep, "a training's step") or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},
@@ -67,7 +69,7 @@ def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
     Raises:
         FileFormatError: no result, or one of other weights.
     """
-    result = _json(path, "a result of copolicy-eval")
+    result = read_optional_json(path, dict[str, Any], "a result of copolicy-eval")
     try:
         if result is None:
             raise FileFormatError(path, "a result of copolicy-eval", "no such file")
@@ -105,7 +107,7 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
     folder = LeRobotFolder.open(root)
     info = folder.info
     used = range(info["total_episodes"]) if chosen is None else chosen
-    release = _json(root / RELEASE_FILE, "the record of a release") or {}
+    release = read_optional_json(root / RELEASE_FILE, dict[str, Any], "the record of a release") or {}
     return {
         **facts,
         "episodes": info["total_episodes"],
@@ -126,11 +128,9 @@ def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[s
     """How many of the used episodes have each value of an episode column."""
     if column not in folder.episodes.column_names:
         return {}
-    values = folder.episodes.column(column).to_pylist()
+    if column == "map_set":
+        values = [set_label(row) for row in folder.rows((column, "map_set_version", "map_set_digest"))]
+    else:
+        values = folder.episodes.column(column).to_pylist()
     counts = Counter(str(value) for episode, value in enumerate(values) if episode in used)
     return dict(counts.most_common())
-
-
-def _json(path: Path, what: str, kind: Any = dict[str, Any]) -> dict[str, Any] | None:
-    """The object in a JSON file, None where there is no such file."""
-    return read_json(path, kind, what) if path.is_file() else None

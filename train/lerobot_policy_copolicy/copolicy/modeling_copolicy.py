@@ -151,8 +151,8 @@ class CopolicyPolicy(PreTrainedPolicy):
         """The training loss: mean squared error of the prediction over all tokens and both players.
 
         Args:
-            batch: observation columns `(B, To, n)`, action `(B, T, m)` of both players, and its padding mask `(B, T)` where
-                `do_mask_loss_for_padding` is set.
+            batch: observation columns `(B, To, n)`, action `(B, T, m)` of both players, and its padding mask
+                `(B, T)` where `do_mask_loss_for_padding` is set.
             reduction: "mean", or "none" for one loss a sample (LeRobot's sample weighting).
 
         Returns:
@@ -234,8 +234,8 @@ class CopolicyPolicy(PreTrainedPolicy):
         condition = self.features(self._observation(batch))
         shape = (len(condition), self.config.horizon, self._sizes[ACTION])
         if noise is None:
-            source = condition.device if generator is None else generator.device
-            noise = torch.randn(shape, generator=generator, device=source)
+            # On the CPU, so that a seed means the same on every device.
+            noise = torch.randn(shape, generator=generator, device="cpu" if generator is None else generator.device)
         elif noise.shape != shape:
             raise ShapeError("noise", shape, tuple(noise.shape))
         noise, tokens = noise.to(condition.device), self._tokens(actions)

@@ -14,9 +14,9 @@ from typing import Any
 from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
-from copolicy.train.checked_stream import CheckedStream
 from copolicy.train.episode_choice import excluded_episodes, require_episode_columns
 from copolicy.train.finite_data import mended_statistics, require_finite_frames
+from copolicy.train.memory_training import CheckedStream
 
 from ..env.configuration_table_carrying import TableCarryingEnvConfig
 from .callers import data_sets_of_callers, environment_of_callers

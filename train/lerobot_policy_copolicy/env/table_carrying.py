@@ -8,15 +8,17 @@ import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from copolicy.collect.agents import HeldAgent, ScriptedAgent
+from copolicy.collect.agents.scripted import simulated_players
+from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE
-from copolicy.dataset.task import RUNNING, get_task
+from copolicy.dataset.features import BOUNDS, OBSERVATION_KEYS, SCENE_SIZE
+from copolicy.dataset.task import get_task
 from copolicy.tasks.table.features import BOUNDS, environment_state, theta_of
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import WINDOW, MapConfig
 from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.world import TableWorld
 
 from .configuration_table_carrying import require_image_size
 
@@ -133,11 +135,13 @@ class TableCarryingEnv(gymnasium.Env):
             raise InvalidValueError("map_index", f"0 to {len(self.maps) - 1}", index)
         self._next_map = (index + 1) % len(self.maps)
         self.map_index, map_config = int(index), self.maps[index]
-        self.world = TableWorld(map_config, self.physics)
         self._environment = environment_state(map_config).astype(np.float32)
-        self._human = None
+        self._given = HeldAgent(np.zeros(2)), HeldAgent(np.zeros(2))
+        agents, seed = self._given, 0
         if self.partner:
-            self._human = _simulated_human(map_config, self.partner, int(self.np_random.integers(2**31)))
+            agents, seed = (self._given[0], ScriptedAgent.of_pair(self.partner)), int(self.np_random.integers(2**31))
+        self._rollout = Rollout(get_task(), [map_config], agents, seeds=[seed], settings=self.physics, beyond_end=True)
+        self.world: Any = self._rollout.worlds[0]
         self._action = np.zeros(4)
         self._image = _scene_image(map_config, self._image_size) if self._image_size else None
         return self._observation(), self._info("", False, 0.0)
@@ -152,19 +156,18 @@ class TableCarryingEnv(gymnasium.Env):
         if given.shape != self._action_shape:
             raise ShapeError("action", self._action_shape, given.shape)
         given = np.clip(given, -1.0, 1.0)
-        executed, forces = [], []
-        outcome = RUNNING
+        for agent, half in zip(self._given, (given[:2], given[2:]), strict=True):
+            agent.action = half
+        trace = Trace([self.world])
+        self._rollout.observers = [trace]
         for _ in range(self._stride):
-            held = given
-            if self._human is not None:
-                held = np.concatenate((given, np.clip(self._human.act(self.world.observation), -1.0, 1.0)))
-            outcome = self.world.step(held)
-            executed.append(held)
-            forces.append(interaction_force(self.world.pose[2], held))
+            self._rollout.step()
+            (outcome,) = self._rollout.outcomes
             if outcome.done:
                 break
         # The past human action is that of the frame: of several held steps their mean, as in a data set.
-        self._action = np.mean(executed, axis=0)
+        self._action = np.mean(trace.actions(0), axis=0)
+        forces = interaction_force(trace.states(0)[1:, 2], trace.actions(0))
         truncated = outcome.reason == "timeout"
         info = self._info(outcome.reason, outcome.success, float(np.abs(forces).mean()))
         return self._observation(), self.world.reward(), outcome.done and not truncated, truncated, info
@@ -200,20 +203,10 @@ class TableCarryingEnv(gymnasium.Env):
         }
 
 
-# Imported where they are used: only a simulated partner needs the planner behind it, only images need pygame.
-
-
 def _check_pair(pair_id: str) -> None:
-    from copolicy.tasks.table.agents import PAIRS
-
-    if pair_id not in PAIRS:
-        raise UnknownNameError("simulated pair", pair_id, PAIRS)
-
-
-def _simulated_human(map_config: MapConfig, pair_id: str, seed: int):
-    from copolicy.tasks.table.agents import simulated_pair
-
-    return simulated_pair(map_config, pair_id, seed)[1]
+    pairs = simulated_players(get_task()).pairs
+    if pair_id not in pairs:
+        raise UnknownNameError("simulated pair", pair_id, pairs)
 
 
 def _scene_image(map_config: MapConfig, size: tuple[int, int]):

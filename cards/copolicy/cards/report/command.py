@@ -1,7 +1,13 @@
-"""`copolicy-cards report`."""
+"""`copolicy-cards report`: template, style, script and data put together into one page that loads nothing."""
 
 import argparse
+import json
+import math
+import re
+from html import escape
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import TABLES
@@ -12,6 +18,27 @@ from copolicy.dataset.files.staging import replace_text
 from ..artefacts import KeptFindings, kept_findings, stored_statistics
 
 REPORT_NAME = "report.html"
+
+
+SCRIPTS = (
+    "elements.js",
+    "palette.js",
+    "data.js",
+    "scene.js",
+    "filters.js",
+    "overview.js",
+    "route_statistics.js",
+    "trajectories.js",
+    "heatmaps.js",
+    "pairs.js",
+    "timing.js",
+    "findings.js",
+    "statistics.js",
+    "episodes.js",
+    "player.js",
+    "main.js",
+)
+"""In the order in which they run; they share one scope."""
 
 
 def add_report_command(commands: argparse._SubParsersAction) -> None:
@@ -39,7 +66,6 @@ def _report(arguments: argparse.Namespace) -> dict:
     from copolicy.dataset.files.staging import require_new
 
     from ..facts import DatasetFacts
-    from .page import render_page
     from .payload import build_payload
 
     path = arguments.out or arguments.root / REPORT_NAME
@@ -68,3 +94,31 @@ def _shown(findings: KeptFindings | None) -> str:
     if findings.validity.state == "current":
         return "shown"
     return f"shown as {findings.validity.state}: {findings.validity.reason}"
+
+
+def render_page(payload: dict[str, Any]) -> str:
+    """The text of the page."""
+    folder = files(__package__)
+    script = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    # Inside a script element only "</" and "<!--" could end the data; JSON may spell "<" as an escape.
+    data = json.dumps(_plain(payload), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {
+        "{{title}}": escape(payload["title"]),
+        "{{style}}": folder.joinpath("report.css").read_text(encoding="utf-8"),
+        "{{script}}": f'(() => {{\n"use strict";\n{script}\n}})();',
+        "{{data}}": data,
+    }
+    template = folder.joinpath("template.html").read_text(encoding="utf-8")
+    # One pass: what is put in is not searched again.
+    return re.sub(r"\{\{\w+\}\}", lambda match: parts[match[0]], template)
+
+
+def _plain(value: Any) -> Any:
+    """The value without numbers that JSON has no word for, which JSON written by Python may contain."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

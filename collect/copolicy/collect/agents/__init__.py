@@ -1,4 +1,4 @@
-"""Who can hold an end of the table: a person, a simulated player, an earlier recording, a policy.
+"""Who can act at a seat: a person, a simulated player, an earlier recording, a policy.
 
 Names are loaded when they are asked for: flags need none of them.
 """
@@ -7,21 +7,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .controller import Controller, Reading
-    from .people import PersonController
-    from .policy import PolicyController
-    from .replay import ReplayController
-    from .scripted import ScriptedController
+    from .checkpoint_folder import load_policy
+    from .people import PersonAgent
+    from .policy import Policy, PolicyAgent
+    from .replay import HeldAgent, RecordedAgent, ReplayAgent
+    from .scripted import ScriptedAgent
 
-__all__ = ["Controller", "PersonController", "PolicyController", "Reading", "ReplayController", "ScriptedController"]
+__all__ = [
+    "HeldAgent",
+    "PersonAgent",
+    "Policy",
+    "PolicyAgent",
+    "RecordedAgent",
+    "ReplayAgent",
+    "ScriptedAgent",
+    "load_policy",
+]
 
 _MODULES = {
-    "Controller": "controller",
-    "PersonController": "people",
-    "PolicyController": "policy",
-    "Reading": "controller",
-    "ReplayController": "replay",
-    "ScriptedController": "scripted",
+    **dict.fromkeys(("HeldAgent", "RecordedAgent", "ReplayAgent"), "replay"),
+    **dict.fromkeys(("Policy", "PolicyAgent"), "policy"),
+    "PersonAgent": "people",
+    "ScriptedAgent": "scripted",
+    "load_policy": "checkpoint_folder",
 }
 
 

@@ -1,16 +1,45 @@
 """Where a policy lies on the disk: in a checkpoint, in a training run, or beside LeRobot's plugin of this package."""
 
+from collections.abc import Mapping
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from copolicy.dataset.command_line.extras import POLICIES, require_packages
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.listing import is_hidden
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
+
+if TYPE_CHECKING:
+    from .policy import LearnedPolicy
 
 PRETRAINED = "pretrained"
 """In the place of a path: the model that comes with the package."""
 
 _PLUGIN = "lerobot_policy_copolicy"
+_ENTRY_POINTS = "copolicy.policies"
+
+
+def load_policy(path: Path | str, device: str = "cpu", settings: Mapping[str, Any] | None = None) -> "LearnedPolicy":
+    """A policy as it can act at a seat.
+
+    Collecting needs no torch: what loads a checkpoint is found by its name, `lerobot`, in the entry point group
+    `copolicy.policies`.
+
+    Args:
+        path: see `checkpoint_folder`.
+        device: where it predicts.
+        settings: fields of the policy's configuration to change, such as `num_inference_steps`.
+
+    Raises:
+        FileFormatError: no such policy, or one that cannot act in this task or lacks such a setting.
+        MissingExtraError: torch or LeRobot is not installed.
+    """
+    folder = checkpoint_folder(path)
+    require_packages(*POLICIES)
+    (loader,) = entry_points(group=_ENTRY_POINTS, name="lerobot")
+    return loader.load()(folder, device, settings)
 
 
 def checkpoint_folder(path: Path | str) -> Path:

@@ -7,18 +7,17 @@ import numpy as np
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
-from copolicy.tasks.table.map_config import MapConfig
 
 from ..inputs import InputSample, KeyboardHalf, Pad, RestWatch, StickCalibration, keyboard_force
-from .controller import Reading
+from ..rollout import Agent
 
 Force = tuple[float, float]
 
 
-class PersonController:
+class PersonAgent(Agent):
     """A person with a device in hand; which one can change whenever it is unplugged.
 
-    The device is read in `read` itself, so a reading serves one step and no other.
+    The device is read in `act` itself, so a reading serves one step and no other.
 
     Attributes:
         name: of the kind of device.
@@ -77,25 +76,17 @@ class PersonController:
         device = self.device
         return device.force(sample, self.calibration) if isinstance(device, Pad) else keyboard_force(sample)
 
-    def begin(self, seat: int, map_config: MapConfig, seed: int) -> None:
-        """Nothing to prepare."""
-
-    def read(self, state: np.ndarray) -> Reading:
-        """Reads the device."""
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Reads the device, right after the event queue was pumped."""
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
             self._rest.add(force, RestWatch.CARRYING)
         age = self._clock() - sample.time_ns
-        return Reading(force, PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age))
+        self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
+        return np.array([force])
 
     @property
     def _has_stick(self) -> bool:
         device = self.device
         return isinstance(device, Pad) and not device.steering(self.calibration).digital
-
-    def executed(self, action: np.ndarray) -> None:
-        """A person sees for themselves."""
-
-    def close(self) -> None:
-        """The device stays as it is."""

@@ -1,8 +1,8 @@
-"""A policy at the stick: plans on a thread beside the loop, executed on the policy's own grid of frames."""
+"""A policy at a seat: history on the data set's grid of frames, action chunks, zero-order hold, replanning."""
 
+import copy
 import time
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple, Protocol
 
@@ -11,140 +11,252 @@ import numpy as np
 from copolicy.dataset.clock import frame_actions, stride
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
-from copolicy.tasks.table.features import environment_state, state_vector
-from copolicy.tasks.table.map_config import MapConfig
+from copolicy.dataset.task import PairTask, get_task
 
-from .controller import ZERO, Reading
+from ..rollout import Agent, Start
+from .training_conditions import TrainingConditions
 
 
-class JointPlanner(Protocol):
-    """What `Checkpoint` offers."""
+class Policy(Protocol):
+    """A policy for both players: what `load_policy` gives.
+
+    Attributes:
+        name: in recordings.
+        n_obs_steps: frames of history that it wants.
+        n_action_steps: actions of a chunk that are executed before the next chunk.
+        keeps_history: it remembers frames itself: it must see each one, always of all worlds, and gives one action.
+    """
 
     name: str
-    frames: int
-    actions_per_plan: int
+    n_obs_steps: int
+    n_action_steps: int
+    keeps_history: bool
 
     @property
     def fps(self) -> int:
-        """Frames a second that plans are for."""
+        """Frames a second of the data that it learned from."""
         ...
 
-    def seed(self, seed: int) -> None:
-        """Sets the source of noise."""
+    def reset(self, seed: int) -> None:
+        """Episodes begin: forgets, and sets the source of what it draws at random."""
         ...
 
-    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        """`(frames, 4)` joint actions from the newest frame on."""
+    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+        """Joint actions `(B, actions, 2 m)` from the newest frame on, from observations `(B, n_obs_steps, n)`."""
         ...
 
 
-class _Plan(NamedTuple):
+class LearnedPolicy(Policy, Protocol):
+    """A policy from a checkpoint.
+
+    Attributes:
+        conditions: rate and physics that it learned at.
+    """
+
+    conditions: TrainingConditions
+
+
+class _Chunk(NamedTuple):
     frame: int  # that its first action is for
-    actions: np.ndarray
+    worlds: np.ndarray  # that it was predicted for
+    actions: np.ndarray  # (worlds, actions, 2 m)
     observed_ns: int
     seconds: float
 
 
-class PolicyController:
-    """Executes its seat's half of a policy's joint plans (receding horizon).
+class PolicyAgent(Agent):
+    """Executes its seat's half of a policy's action chunks (receding horizon).
 
         frame     0     1     2     3     4        of a policy of 10 Hz: three steps each
-        observe   o0    o1    o2    o3    o4       state, and the human action of the frame before
-        plan A    a0    a1    a2    ..             asked for before the start, when the table rests
-        plan B               (o2)  b1    b2        asked for at frame 2; its b0 was due while it was being made
+        observe   o0    o1    o2    o3    o4       state, and the partner's action of the frame before
+        chunk A   a0    a1    a2    ..
+        chunk B                     b0    b1       the world waits: predicted where A's n_action_steps are executed
+        chunk B               (o2)  b1    b2       in real time: asked for one frame before; b0 is due meanwhile
 
-    A frame's action is held for 30 / fps steps, at the rate of the data that the policy learned from. The next plan is
-    asked for one frame before `actions_per_plan` frames of this one are executed, and taken up at the first frame after
-    it is ready, at the action that this frame is due, never from its beginning. A slow plan so never holds the loop;
-    where a plan runs out, its player lets go.
+    A frame's action is held for 30 / fps steps, at the rate of the data that the policy learned from. All worlds get
+    their chunks from one call of the policy.
+
+    In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
+    is asked for at the start, while the world rests. A chunk is taken up at the first frame after it is ready, at the
+    action that this frame is due, never from its beginning; where a chunk runs out, its player lets go.
+
+    A policy acts as the robot. At the human's seat it sees the task's exchange of seats (`PairTask.exchange`); where a
+    task has none, the human's half of its joint actions is executed.
 
     Attributes:
-        latencies: seconds that each plan took.
+        latencies: seconds that each chunk took.
+        chunks: `(worlds,)` how many each world got.
     """
 
-    is_person = False
-
-    def __init__(self, planner: JointPlanner, clock: Callable[[], int] = time.monotonic_ns):
-        self.name = planner.name
+    def __init__(
+        self,
+        policy: Policy,
+        task: PairTask | None = None,
+        *,
+        fps: int | None = None,
+        seed: int | None = None,
+        real_time: bool = False,
+        clock: Callable[[], int] = time.monotonic_ns,
+    ):
+        """
+        Args:
+            task: the table if None.
+            fps: frames a second that an action is held at; the policy's own if None.
+            seed: of what the policy draws at random; that of the first world if None.
+            real_time: inference runs beside the loop.
+        """
+        self.name = policy.name
         self.latencies: list[float] = []
-        self._planner = planner
-        self._clock = clock
-        self._hold = stride(planner.fps)
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy")
-        self._pending: Future[_Plan] | None = None
-        self._forget()
+        self._policy = policy
+        self._task = task or get_task()
+        self._fps, self._seed, self._clock = fps, seed, clock
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy") if real_time else None
+        self._pending: Future[_Chunk] | None = None
+        self._chunk: _Chunk | None = None
 
-    def _forget(self) -> None:
-        self._plan: _Plan | None = None
-        self._force = ZERO
-        self._age_from = 0
-        self._step = 0
-        self._held: list[np.ndarray] = []
-
-    def begin(self, seat: int, map_config: MapConfig, seed: int) -> None:
-        """Forgets, and asks for the first plan: the table rests at the start until the count-down is over."""
+    def begin(self, seat: int, starts: Sequence[Start]) -> None:
+        """Forgets; in real time, asks for the first chunk."""
         if self._pending is not None:
             self._pending.cancel()
-        self._forget()
-        self._hold = stride(self._planner.fps)  # another policy may plan now
-        self._worker.submit(self._planner.seed, seed)  # after a plan that still runs
-        self._seat = seat
-        self._map = environment_state(map_config)
-        rest = state_vector(map_config.start, (0.0, 0.0, 0.0))
+        self._pending, self._chunk = None, None
+        # Another policy may be behind the same name now.
+        self._rate = self._fps or self._policy.fps
+        self._hold = stride(self._rate)
+        self._seat, spec = seat, self._task.spec
+        self._exchange = self._task.exchange if seat == 1 else None
+        count, frames, size = len(starts), self._policy.n_obs_steps, len(spec.action)
+        self._size = size
+        scenarios, states = [start.scenario for start in starts], np.array([start.state for start in starts])
+        if self._exchange is not None:
+            scenarios, states = [self._exchange.scenario(one) for one in scenarios], self._exchange.states(states)
+        self._scenarios = np.array([self._task.scenario_vector(one) for one in scenarios])
         # Before the start there is nothing: the first observation is repeated, as it is padded in training.
-        self._states: deque[np.ndarray] = deque([rest] * self._planner.frames, maxlen=self._planner.frames)
-        self._human: deque[np.ndarray] = deque([np.zeros(2)] * self._planner.frames, maxlen=self._planner.frames)
-        self._ask(0)
+        self._states = np.repeat(states[:, None], frames, axis=1)  # (worlds, n_obs_steps, n)
+        self._partner = np.zeros((count, frames, size))
+        self._held: list[np.ndarray] = []  # joint actions (worlds, 2 m) of the steps of this frame
+        self._bounds = spec.joint_action.bounds
+        self._joint = np.zeros((count, 2 * size))  # of the present frame
+        self._age_from = 0
+        self.chunks = np.zeros(count, int)
+        self._step = 0
+        seed = starts[0].seed if self._seed is None else self._seed
+        if self._worker is None:
+            self._policy.reset(seed)
+        else:
+            self._worker.submit(self._policy.reset, seed)  # after a chunk that is still being made
+            self._ask(0, np.arange(count))
 
-    def read(self, state: np.ndarray) -> Reading:
-        """The force of the present frame."""
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Its half of the joint actions of the present frame."""
         frame, within = divmod(self._step, self._hold)
         if within == 0:
             if frame > 0:
-                self._states.append(np.array(state))
-                self._human.append(frame_actions(np.array(self._held), self._planner.fps)[0, 2:].copy())
-                self._held = []
-            self._take(frame)
-        age = self._clock() - self._age_from if self._age_from else 0
-        return Reading(self._force, PlayerInput(axes=self._force, age_ns=age))
+                self._observe(states, worlds)
+            self._next_action(frame, worlds)
+        own = self.half(self._seat, worlds)
+        if self._worker is not None:
+            age = self._clock() - self._age_from if self._age_from else 0
+            self.input = PlayerInput(axes=own[0].tolist(), age_ns=age)
+        return own
 
-    def executed(self, action: np.ndarray) -> None:
-        """Keeps the action for the history."""
-        self._held.append(np.array(action))
+    def half(self, seat: int, worlds: np.ndarray) -> np.ndarray:
+        """The half `(B, m)` of a seat of the joint actions of the present frame."""
+        return self._joint[worlds, seat * self._size : (seat + 1) * self._size]
+
+    def acted(self, actions: np.ndarray, worlds: np.ndarray) -> None:
+        """Keeps the actions for the history."""
+        joint = np.zeros_like(self._joint)
+        joint[worlds] = actions
+        self._held.append(joint)
         self._step += 1
 
+    def other_half(self) -> Agent:
+        """An agent for the human's seat that executes the human's half of the same chunks, as in co-planning."""
+        return _OtherHalf(self)
+
+    def branch(self, count: int) -> "PolicyAgent":
+        """An agent for `count` worlds in the state of this one's only world, which predicts anew there."""
+        other = copy.copy(self)
+        for name in ("_scenarios", "_states", "_partner", "_joint", "chunks"):
+            setattr(other, name, np.repeat(getattr(self, name), count, axis=0))
+        other._held = [np.repeat(actions, count, axis=0) for actions in self._held]
+        other._chunk = None
+        return other
+
+    @property
+    def predicted(self) -> np.ndarray:
+        """`(worlds, actions, 2 m)` the present chunks."""
+        assert self._chunk is not None, "a chunk before the first step"
+        return self._chunk.actions
+
     def wait(self, timeout_s: float | None = None) -> None:
-        """Waits for the plan that is being made, if there is one; a check of a checkpoint before a session."""
+        """Waits for the chunk that is being made, if there is one."""
         if self._pending is not None:
             self._pending.result(timeout_s)
 
     def close(self) -> None:
-        """Ends the thread after the plan that it is making."""
-        self._worker.shutdown(cancel_futures=True)
+        """Ends the thread after the chunk that it is making."""
+        if self._worker is not None:
+            self._worker.shutdown(cancel_futures=True)
 
-    def _take(self, frame: int) -> None:
+    def _observe(self, states: np.ndarray, worlds: np.ndarray) -> None:
+        held = np.array(self._held)  # (hold, worlds, 2 m)
+        mean = frame_actions(held.reshape(len(held), -1), self._rate)[0].reshape(held.shape[1:])[worlds]
+        self._held = []
+        if self._exchange is not None:
+            states, mean = self._exchange.states(states), self._exchange.actions(mean)
+        for history, newest in ((self._states, states), (self._partner, mean[:, self._size :])):
+            history[worlds] = np.concatenate((history[worlds, 1:], newest[:, None]), axis=1)
+
+    def _next_action(self, frame: int, worlds: np.ndarray) -> None:
         if self._pending is not None and self._pending.done():
-            self._plan, self._pending = self._pending.result(), None
-            self.latencies.append(self._plan.seconds)
-        plan = self._plan
-        used = frame - plan.frame if plan is not None else 0
-        if self._pending is None and (plan is None or used + 1 >= self._planner.actions_per_plan):
-            self._ask(frame)
-        if plan is None or used >= len(plan.actions):
-            self._force, self._age_from = ZERO, 0
+            self._take(self._pending.result())
+        ahead = int(self._worker is not None)
+        if self._pending is None:
+            chunk = self._chunk
+            if chunk is None or frame - chunk.frame + ahead >= min(self._policy.n_action_steps, chunk.actions.shape[1]):
+                # A single action that is made meanwhile acts a frame later.
+                self._ask(frame + ahead * self._policy.keeps_history, worlds)
+        chunk = self._chunk
+        if chunk is None or frame - chunk.frame >= chunk.actions.shape[1]:
+            self._joint, self._age_from = np.zeros_like(self._joint), 0
             return
-        x, y = np.clip(plan.actions[used, 2 * self._seat : 2 * self._seat + 2], -1.0, 1.0).tolist()
-        self._force, self._age_from = (x, y), plan.observed_ns
+        joint = np.clip(chunk.actions[:, frame - chunk.frame], *self._bounds)
+        self._joint = joint if self._exchange is None else self._exchange.actions(joint)
+        self._age_from = chunk.observed_ns
 
-    def _ask(self, frame: int) -> None:
-        history = {
-            STATE: np.array(self._states),
-            ENVIRONMENT_STATE: np.repeat(self._map[None], self._planner.frames, axis=0),
-            HUMAN_ACTION: np.array(self._human),
+    def _ask(self, frame: int, worlds: np.ndarray) -> None:
+        if self._policy.keeps_history:
+            worlds = np.arange(len(self._states))
+        observations = {
+            STATE: self._states[worlds],
+            ENVIRONMENT_STATE: np.repeat(self._scenarios[worlds, None], self._states.shape[1], axis=1),
+            HUMAN_ACTION: self._partner[worlds],
         }
-        self._pending = self._worker.submit(self._make, frame, history, self._clock())
+        request = (frame, worlds, observations, self._clock())
+        if self._worker is None:
+            self._take(self._predict(*request))
+        else:
+            self._pending = self._worker.submit(self._predict, *request)
 
-    def _make(self, frame: int, history: dict[str, np.ndarray], observed_ns: int) -> _Plan:
+    def _predict(self, frame: int, worlds: np.ndarray, observations: dict[str, np.ndarray], observed_ns: int) -> _Chunk:
         started = time.perf_counter()
-        actions = self._planner.plan(history)
-        return _Plan(frame, actions, observed_ns, time.perf_counter() - started)
+        predicted = self._policy.predict_action_chunk(observations)
+        seconds = time.perf_counter() - started
+        actions = np.zeros((len(self._states), *predicted.shape[1:]))
+        actions[worlds] = predicted
+        return _Chunk(frame, worlds, actions, observed_ns, seconds)
+
+    def _take(self, chunk: _Chunk) -> None:
+        self._chunk, self._pending = chunk, None
+        self.chunks[chunk.worlds] += 1
+        self.latencies.append(chunk.seconds)
+
+
+class _OtherHalf(Agent):
+    def __init__(self, agent: PolicyAgent):
+        self.name = agent.name
+        self._agent = agent
+
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        return self._agent.half(1, worlds)

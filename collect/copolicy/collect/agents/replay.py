@@ -1,24 +1,46 @@
-"""One player of an earlier recording, force by force."""
+"""Actions that are known before: of an earlier recording, or set from outside."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from copolicy.dataset.recording.log import read_episode
-from copolicy.tasks.table.map_config import MapConfig
 
-from .controller import ZERO, Reading
+from ..rollout import Agent, Start
 
 
-class ReplayController:
-    """Repeats the forces of the seat it is put on, whatever the table does; none after their end.
+class RecordedAgent(Agent):
+    """Repeats its seat's half of joint actions, whatever the world does; zero after their end."""
+
+    def __init__(self, actions: Sequence[np.ndarray], name: str = "recorded"):
+        """
+        Args:
+            actions: `(T, 2 m)` of each world.
+        """
+        self.name = name
+        self._actions = actions
+
+    def begin(self, seat: int, starts: Sequence[Start]) -> None:
+        """Starts over."""
+        self._step = 0
+        size = self._actions[0].shape[1] // 2
+        self._own = [actions[:, seat * size : (seat + 1) * size] for actions in self._actions]
+        self._rest = np.zeros(size)
+
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """The actions of this step."""
+        step, self._step = self._step, self._step + 1
+        return np.array([own[step] if step < len(own := self._own[index]) else self._rest for index in worlds])
+
+
+class ReplayAgent(RecordedAgent):
+    """One player of an earlier recording.
 
     Attributes:
-        map_config: the recording's map, on which alone this makes sense.
+        map_config: the recording's scenario, in which alone this makes sense.
         physics: what led from state to state in the recording.
     """
-
-    is_person = False
 
     def __init__(self, path: Path):
         """
@@ -26,27 +48,22 @@ class ReplayController:
             FileFormatError: the file is no recording of this task.
         """
         episode = read_episode(path)
-        self.name = f"replay:{path.stem}"
+        super().__init__((episode.actions,), f"replay:{path.stem}")
         self.map_config = episode.map_config
         self.physics = episode.physics
-        self._actions = episode.actions
-        self._seat = 0
-        self._step = 0
 
-    def begin(self, seat: int, map_config: MapConfig, seed: int) -> None:
-        """Starts over."""
-        self._seat, self._step = seat, 0
 
-    def read(self, state: np.ndarray) -> Reading:
-        """The recorded force of this step."""
-        if self._step >= len(self._actions):
-            return Reading(ZERO, None)
-        x, y = self._actions[self._step, 2 * self._seat : 2 * self._seat + 2].tolist()
-        return Reading((x, y), None)
+class HeldAgent(Agent):
+    """Holds an action in every world until another one is set.
 
-    def executed(self, action: np.ndarray) -> None:
-        """One step further."""
-        self._step += 1
+    Attributes:
+        action: `(m,)`.
+    """
 
-    def close(self) -> None:
-        """Nothing is open."""
+    def __init__(self, action: np.ndarray, name: str = "held"):
+        self.name = name
+        self.action = action
+
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """The action."""
+        return np.tile(self.action, (len(worlds), 1))

@@ -1,36 +1,64 @@
-"""A simulated player at the table, in real time."""
+"""Simulated players at a seat, one for each world."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
-from copolicy.tasks.table.agents import ScriptedPilot, simulated_pair
-from copolicy.tasks.table.map_config import MapConfig
+from copolicy.dataset.exceptions import CopolicyError
+from copolicy.dataset.task import PairTask, Player, SimulatedPlayers, get_task
 
-from .controller import ZERO, Reading
+from ..rollout import Agent, Start
 
 
-class ScriptedController:
-    """A `ScriptedPilot` with the habits of one of the simulated pairs."""
+def simulated_players(task: PairTask) -> SimulatedPlayers:
+    """The task's part `agents`.
 
-    is_person = False
+    Raises:
+        CopolicyError: it has none.
+    """
+    if task.agents is None:
+        raise CopolicyError(task.missing("agents"))
+    return task.agents
 
-    def __init__(self, pair: str):
-        self.name = f"scripted:{pair}"
-        self._pair = pair
-        self._pilot: ScriptedPilot | None = None
 
-    def begin(self, seat: int, map_config: MapConfig, seed: int) -> None:
-        """Makes a fresh mind for the seat and the map."""
-        self._pilot = simulated_pair(map_config, self._pair, seed)[seat]
+class ScriptedAgent(Agent):
+    """A player of the task's own (`PairTask.agents`) in each world.
 
-    def read(self, state: np.ndarray) -> Reading:
-        """Asks the pilot."""
-        if self._pilot is None:
-            return Reading(ZERO, None)
-        x, y = self._pilot.act(state).tolist()
-        return Reading((x, y), None)
+    Attributes:
+        players: one a world, since the episodes began.
+    """
 
-    def executed(self, action: np.ndarray) -> None:
-        """The pilot knows only how the table moves."""
+    def __init__(self, name: str, make: Callable[[int, int, Start], Player]):
+        """
+        Args:
+            make: the player of a seat, for the world of an index and its start.
+        """
+        self.name = name
+        self.players: list[Player] = []
+        self._make = make
 
-    def close(self) -> None:
-        """Nothing is open."""
+    @classmethod
+    def of_pair(cls, pair: str, task: PairTask | None = None, *options: Any) -> "ScriptedAgent":
+        """A player with the profile that a simulated pair has at the seat.
+
+        Args:
+            options: the task's own, see `SimulatedPlayers.make_pair`.
+
+        Raises:
+            CopolicyError: the task has no simulated players.
+        """
+        agents = simulated_players(task or get_task())
+
+        def make(seat: int, index: int, start: Start) -> Player:
+            return agents.make_pair(start.scenario, pair, start.seed, *options)[seat]
+
+        return cls(f"scripted:{pair}", make)
+
+    def begin(self, seat: int, starts: Sequence[Start]) -> None:
+        """Makes fresh players."""
+        self.players = [self._make(seat, index, start) for index, start in enumerate(starts)]
+
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Asks each player."""
+        return np.array([self.players[index].act(state) for index, state in zip(worlds, states, strict=True)])

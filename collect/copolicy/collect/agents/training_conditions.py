@@ -8,7 +8,8 @@ from typing import Any, TypedDict
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.lerobot_folder.info import INFO_FILE
+from copolicy.dataset.task import get_task
 
 ASSUMED_FPS = 10
 """Frames a second of a policy whose files do not say: our data sets have this rate unless asked for another."""
@@ -46,7 +47,7 @@ class TrainingConditions:
     """
 
     fps: int
-    physics: Physics
+    physics: Any
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -91,12 +92,13 @@ def training_conditions(folder: Path) -> TrainingConditions:
     return TrainingConditions(rate, _physics(folder, physics or {}), tuple(notes))  # pyright: ignore[reportArgumentType]
 
 
-def _physics(folder: Path, settings: dict[str, Any]) -> Physics:
-    path, known = folder / "config.json", {field.name for field in fields(Physics)} - {_FREE}
+def _physics(folder: Path, settings: dict[str, Any]) -> Any:
+    settings_type = get_task().settings_type
+    path, known = folder / "config.json", {field.name for field in fields(settings_type)} - {_FREE}
     if not settings.keys() <= known:
         raise FileFormatError(path, f"physics of {', '.join(sorted(known))}", str(settings))
     try:
-        return Physics(**{name: float(value) for name, value in settings.items()})  # pyright: ignore[reportArgumentType]
+        return settings_type(**{name: float(value) for name, value in settings.items()})
     except (TypeError, ValueError, InvalidValueError) as error:
         raise FileFormatError(path, "physics that can be", str(error)) from None
 

@@ -64,14 +64,14 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     if path.exists() and not arguments.overwrite:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.
-    from ..agents.checkpoint import Checkpoint
+    from ..agents import load_policy
     from ..replay.film import save_gif
     from .episode import demonstrate
     from .pictures import SIZE, picture_count, pictures
 
-    planner = Checkpoint(arguments.policy)
-    physics = planner.conditions.physics
-    tracks = [demonstrate(planner, maps[place], arguments.partner, arguments.seed, physics) for place in arguments.map]
+    policy = load_policy(arguments.policy)
+    physics = policy.conditions.physics
+    tracks = [demonstrate(policy, maps[place], arguments.partner, arguments.seed, physics) for place in arguments.map]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)
     frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
@@ -83,8 +83,8 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         "out": str(path),
         "bytes": path.stat().st_size,
         "pictures": count,
-        "policy": planner.name,
-        "learned": planner.conditions.to_json(),
+        "policy": policy.name,
+        "learned": policy.conditions.to_json(),
         "partner": f"simulated, human of {arguments.partner}",
         "episodes": [
             f"{chosen.label} {place}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"

@@ -1,55 +1,42 @@
 """An episode of a policy with a simulated partner, played without a clock: the same every time."""
 
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.task import RUNNING, get_task
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.world import TableWorld
+from copolicy.dataset.task import get_task
 
-from ..agents import PolicyController, ScriptedController
-from ..agents.policy import JointPlanner
+from ..agents import Policy, PolicyAgent, ScriptedAgent
 from ..replay.track import Track, track_of
+from ..rollout import Rollout, Trace
 
 
-def demonstrate(
-    planner: JointPlanner, map_config: MapConfig, partner: str = "S01", seed: int = 0, physics: Physics | None = None
-) -> Track:
+def demonstrate(policy: Policy, scenario: Any, partner: str = "S01", seed: int = 0, settings: Any = None) -> Track:
     """Lets a policy on the robot's seat and a simulated partner carry the table to the end of the episode.
 
-    The world waits for each plan, so that the speed of the machine changes nothing.
+    Chunks come as in real time, but the world waits for each, so that the speed of the machine changes nothing.
 
     Args:
-        planner: the policy.
-        map_config: the map.
+        policy: at the robot's seat.
+        scenario: the map.
         partner: name of a simulated pair, whose human is the partner.
-        seed: of the plans' noise and of the partner.
-        physics: of the world; the usual one if None.
+        seed: of the policy's noise and of the partner.
+        settings: of the world; the usual ones if None.
     """
-    robot, human = PolicyController(planner), ScriptedController(partner)
-    physics = physics or Physics()
-    world = TableWorld(map_config, physics)
-    states, actions = [], []
+    task = get_task()
+    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
+    settings = settings or task.settings_type()
+    world = task.make_world(scenario, settings)
+    trace = Trace([world])
     try:
-        for seat, controller in enumerate((robot, human)):
-            controller.begin(seat, map_config, seed)
-        outcome = RUNNING
-        while not outcome.done:
+        rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], worlds=[world], observers=[trace])
+        while len(rollout.running):
             robot.wait()
-            state = world.observation
-            forces = [controller.read(state).force for controller in (robot, human)]
-            action = np.clip(np.concatenate(forces), -1.0, 1.0)
-            states.append(state)
-            actions.append(action)
-            outcome = world.step(action)
-            for controller in (robot, human):
-                controller.executed(action)
+            rollout.step()
     finally:
         robot.close()
-    name = get_task().name_of(map_config)
+    name = task.name_of(scenario)
+    (outcome,) = rollout.outcomes
     meta = EpisodeMeta(
         "",
         controller_0=robot.name,
@@ -60,5 +47,6 @@ def demonstrate(
         success=outcome.success,
         termination_reason=outcome.reason,
     )
-    episode = Episode(np.array(states), np.array(actions), world.observation, meta, map_config, settings=physics)
+    states = task.states_of(trace.states(0))
+    episode = Episode(states[:-1], trace.actions(0), states[-1], meta, scenario, settings=settings, task=task.spec.name)
     return track_of(Path(name.scenario), episode)

@@ -1,7 +1,6 @@
 """What the players hold in their hands: gamepads and the keyboard, their calibration, and what a press means."""
 
-from .calibration import StickCalibration
-from .calibration_run import CalibrationRun
+from .calibration import CalibrationRun, StickCalibration
 from .calibration_store import CalibrationStore, user_config_folder
 from .commands import Command, CommandReader, Press
 from .gamepads import GamepadMapping, MappingRun, MappingStore

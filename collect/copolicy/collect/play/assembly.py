@@ -49,7 +49,7 @@ def assemble(
     what = f"the policy {policies[0]}, with torch and LeRobot" if policies else "the players"
     players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents, clock))
     for player in players:
-        stack.callback(player.controller.close)
+        stack.callback(player.agent.close)
     say_other_physics(players, settings.physics)
     folder = loading.run("what was played before", lambda: _folder(settings))
     sounds = Sounds(settings.mute or settings.headless)

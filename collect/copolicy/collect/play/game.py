@@ -116,8 +116,8 @@ class Game:
             pair_id=self.settings.pair,
             player_0_id=robot.player_id,
             player_1_id=human.player_id,
-            controller_0=robot.controller.name,
-            controller_1=human.controller.name,
+            controller_0=robot.agent.name,
+            controller_1=human.agent.name,
             **get_task().name_of(config).columns,
             seed=int(np.random.SeedSequence(entropy).generate_state(1)[0]),
             source="human" if robot.person or human.person else "simulated",
@@ -125,9 +125,9 @@ class Game:
             license=self.settings.license,
             software_version=version("lerobot_policy_copolicy"),
         )
-        controllers = (robot.controller, human.controller)
+        agents = (robot.agent, human.agent)
         return Trial(
-            self.folder.next_path(), config, seating, controllers, meta, self.anchor, self.settings.physics, practice,
+            self.folder.next_path(), config, seating, agents, meta, self.anchor, self.settings.physics, practice,
             self.clock,
         )  # fmt: skip
 

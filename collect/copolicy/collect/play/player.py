@@ -5,15 +5,14 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.physics_text import physics_summary
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
 
-from ..agents import Controller, PersonController, PolicyController, ReplayController, ScriptedController
-from ..agents.checkpoint import Checkpoint
+from ..agents import PersonAgent, PolicyAgent, ReplayAgent, ScriptedAgent, load_policy
 from ..inputs import HALVES, KeyboardHalf, Pad
+from ..rollout import Agent
 from .settings import PilotSpec
 
 
@@ -31,14 +30,14 @@ class Player:
     index: int
     player_id: str
     spec: PilotSpec
-    controller: Controller
+    agent: Agent
     consent: str
     ready: bool
 
     @property
-    def person(self) -> PersonController | None:
-        """The controller of a person; None for anything else."""
-        return self.controller if isinstance(self.controller, PersonController) else None
+    def person(self) -> PersonAgent | None:
+        """A person; None for anything else."""
+        return self.agent if isinstance(self.agent, PersonAgent) else None
 
     @property
     def device(self) -> Pad | KeyboardHalf | None:
@@ -64,7 +63,7 @@ class Player:
             return self.device.name
         if self.device is not None:
             return f"keys {self.device.hint.split(',')[0]}"
-        return "joins with any button" if self.person else self.controller.name
+        return "joins with any button" if self.person else self.agent.name
 
     def wants(self, device: Pad | KeyboardHalf) -> bool:
         """This player could join with a device."""
@@ -72,7 +71,7 @@ class Player:
 
     def describe(self) -> dict[str, str]:
         """For the recording: what was held and how it was set; nothing that identifies a person or a machine."""
-        about = {"player": self.player_id, "controller": self.controller.name}
+        about = {"player": self.player_id, "controller": self.agent.name}
         if isinstance(self.device, Pad) and self.person:
             pad, settings = self.device, self.person.calibration
             about |= {"device": pad.name, "guid": pad.guid, "instance_id": str(pad.instance_id)}
@@ -106,32 +105,32 @@ def make_players(
     """
     players = []
     for index, spec in enumerate(specs):
-        controller = _controller(spec, clock)
+        agent = _agent(spec, clock)
         consent = consents[index] if spec.is_person else ""
         player_id = f"{pair}-{'ab'[index]}"
-        players.append(Player(index, player_id, spec, controller, consent, ready=not spec.is_person))
+        players.append(Player(index, player_id, spec, agent, consent, ready=not spec.is_person))
     return players[0], players[1]
 
 
-def replayed_map(players: Iterable[Player]) -> MapConfig | None:
+def replayed_map(players: Iterable[Player]) -> Any | None:
     """The map on which a replayed recording was made, None where nothing is replayed.
 
     Raises:
         InvalidValueError: two recordings of different maps.
     """
-    maps = {one.controller.map_config for one in players if isinstance(one.controller, ReplayController)}
+    maps = {one.agent.map_config for one in players if isinstance(one.agent, ReplayAgent)}
     if len(maps) > 1:
         raise InvalidValueError("pilots", "replays of one map", sorted(config.digest for config in maps))
     return maps.pop() if maps else None
 
 
-def say_other_physics(players: Iterable[Player], physics: Physics) -> None:
+def say_other_physics(players: Iterable[Player], physics: Any) -> None:
     """Forces of an earlier recording move the table otherwise under another physics."""
     for player in players:
-        if isinstance(player.controller, ReplayController):
-            recorded = replace(player.controller.physics, step_limit=physics.step_limit)
+        if isinstance(player.agent, ReplayAgent):
+            recorded = replace(player.agent.physics, step_limit=physics.step_limit)
             if recorded != physics:
-                words = (player.controller.name, physics_summary(recorded), physics_summary(physics))
+                words = (player.agent.name, physics_summary(recorded), physics_summary(physics))
                 logging.warning("warning: %s was recorded with %s, this session has %s", *words)
 
 
@@ -140,13 +139,13 @@ def keyboard_half(name: int | str) -> KeyboardHalf | None:
     return HALVES.get(name) if isinstance(name, str) else None
 
 
-def _controller(spec: PilotSpec, clock: Callable[[], int]) -> Controller:
+def _agent(spec: PilotSpec, clock: Callable[[], int]) -> Agent:
     match spec.kind:
         case "scripted":
-            return ScriptedController(spec.detail)
+            return ScriptedAgent.of_pair(spec.detail)
         case "replay":
-            return ReplayController(Path(spec.detail))
+            return ReplayAgent(Path(spec.detail))
         case "policy":
-            return PolicyController(Checkpoint(spec.detail), clock)
+            return PolicyAgent(load_policy(spec.detail), real_time=True, clock=clock)
         case kind:
-            return PersonController(kind, clock)
+            return PersonAgent(kind, clock)

@@ -1,24 +1,23 @@
-"""One episode while it runs: the world, both controllers, the recorder, and how well the loop keeps its time."""
+"""One episode while it runs: the rollout, the recorder, and how well the loop keeps its time."""
 
 import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
-from copolicy.dataset.task import PLAYERS, RECORD_HZ, RUNNING, Outcome
+from copolicy.dataset.task import PLAYERS, RECORD_HZ, RUNNING, Outcome, get_task
 from copolicy.tasks.table.interaction import interaction_force
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.world import TableWorld
 
-from ..agents import Controller, PersonController, PolicyController
+from ..agents import PersonAgent, PolicyAgent
 from ..recording.recorder import EpisodeRecorder
 from ..recording.wall_clock import WallClockAnchor
+from ..rollout import Agent, Rollout
 from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
 
@@ -32,7 +31,7 @@ class Trial:
     before is on the disk within a second, the end at once.
 
     Attributes:
-        controllers: robot seat, human seat.
+        agents: robot seat, human seat.
         outcome: how it stands.
         before: pose before the last step.
         forces: the last action, robot xy, human xy.
@@ -47,22 +46,23 @@ class Trial:
     def __init__(
         self,
         path: Path,
-        map_config: MapConfig,
+        map_config: Any,
         seating: int,
-        controllers: tuple[Controller, Controller],
+        agents: tuple[Agent, Agent],
         meta: EpisodeMeta,
         anchor: WallClockAnchor,
-        physics: Physics,
+        physics: Any,
         practice: bool,
         clock: Callable[[], int] = time.monotonic_ns,
     ):
         self.path = path
         self.map_config = map_config
         self.seating = seating
-        self.controllers = controllers
+        self.agents = agents
         self.meta = meta
         self.practice = practice
-        self.world = TableWorld(map_config, physics)
+        self._rollout = Rollout(get_task(), [map_config], agents, seeds=[meta.seed], settings=physics)
+        self.world: Any = self._rollout.worlds[0]
         self.step_limit = physics.step_limit
         self.outcome: Outcome = RUNNING
         self.before: Pose = self.world.pose
@@ -79,8 +79,6 @@ class Trial:
         self._clock = clock
         self._stack = ExitStack()
         self._recorder: EpisodeRecorder | None = None
-        for seat, controller in enumerate(controllers):
-            controller.begin(seat, map_config, meta.seed)
 
     @property
     def began(self) -> bool:
@@ -123,14 +121,10 @@ class Trial:
             OSError: the recording cannot be written.
         """
         world = self.world
-        state = world.observation
-        readings = [controller.read(state) for controller in self.controllers]
-        self._watch_sticks()
-        action = np.clip(np.array([*readings[0].force, *readings[1].force]), -1.0, 1.0)
         self.before, self.step_ns = world.pose, tick.start_ns
-        self.outcome = world.step(action)
-        for controller in self.controllers:
-            controller.executed(action)
+        self._rollout.step()
+        self._watch_sticks()
+        (action,), (self.outcome,) = self._rollout.actions, self._rollout.outcomes
         reward = world.reward()
         self.loop.add(tick)
         timing = LoopTiming(
@@ -145,7 +139,7 @@ class Trial:
             world.recorded,
             reward,
             monotonic_ns=tick.start_ns,
-            inputs=(readings[0].message, readings[1].message),
+            inputs=(self.agents[0].input, self.agents[1].input),
             timing=timing,
         )
         self.forces = tuple(action.tolist())
@@ -157,10 +151,10 @@ class Trial:
             self.event("outcome", self.outcome.reason)
 
     def _watch_sticks(self) -> None:
-        for seat, controller in enumerate(self.controllers):
-            if isinstance(controller, PersonController) and controller.push_at_rest and seat not in self._off_centre:
+        for seat, agent in enumerate(self.agents):
+            if isinstance(agent, PersonAgent) and agent.push_at_rest and seat not in self._off_centre:
                 self._off_centre.add(seat)
-                self.event(OFF_CENTRE, f"{PLAYERS[seat]}: pushes with {controller.push_at_rest:.2f} at rest")
+                self.event(OFF_CENTRE, f"{PLAYERS[seat]}: pushes with {agent.push_at_rest:.2f} at rest")
 
     def event(self, kind: str, detail: str = "") -> None:
         """Records an event, if the recording has begun."""
@@ -218,7 +212,7 @@ class Trial:
             flags = (*flags, OFF_CENTRE)
         self.event("verdict", "discard" if discarded else "keep")
         self.event("loop", self.loop.summary())
-        plans = _latencies(self.controllers)
+        plans = _latencies(self.agents)
         if plans:
             self.event("plans", plans)
         notes = [f"discarded: {reason}"] if discarded and reason else []
@@ -239,11 +233,11 @@ class Trial:
         return self._recorder
 
 
-def _latencies(controllers: Sequence[Controller]) -> str:
+def _latencies(agents: Sequence[Agent]) -> str:
     """How long policies planned, where any did."""
     lines = []
-    for seat, controller in enumerate(controllers):
-        if isinstance(controller, PolicyController) and controller.latencies:
-            p50, most = np.percentile(controller.latencies, (50, 100)) * 1e3
-            lines.append(f"seat {seat}: {len(controller.latencies)} plans, p50 {p50:.0f} ms, max {most:.0f} ms")
+    for seat, agent in enumerate(agents):
+        if isinstance(agent, PolicyAgent) and agent.latencies:
+            p50, most = np.percentile(agent.latencies, (50, 100)) * 1e3
+            lines.append(f"seat {seat}: {len(agent.latencies)} plans, p50 {p50:.0f} ms, max {most:.0f} ms")
     return "; ".join(lines)

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import RUNNING, Outcome
+from copolicy.dataset.task import Outcome, get_task
 from copolicy.tasks.table.features import theta_of
-from copolicy.tasks.table.world import TableWorld
 
+from ..agents import RecordedAgent
+from ..rollout import Rollout, Trace
 from .track import Track
 
 LIMIT_PX = 0.01
@@ -86,16 +87,16 @@ def _simulate(track: Track, angular_limit: float) -> tuple[np.ndarray, np.ndarra
     episode = track.episode
     physics = replace(episode.physics, angular_acceleration_limit=angular_limit, step_limit=track.steps + 1)
     states = np.vstack((episode.states, episode.final_state))
-    world = TableWorld(episode.map_config, physics)
-    world.reset(track.poses[0], states[0, 4:].tolist())
-    poses = [world.pose]
-    ended, first = track.steps, RUNNING
-    for step, action in enumerate(episode.actions, start=1):
-        outcome = world.step(action)
-        if outcome.done and not first.done:
-            first, ended = outcome, step
-        poses.append(world.pose)
-    simulated = np.array(poses)
+    task = get_task()
+    world = task.make_world(episode.map_config, physics)
+    world.restore((*track.poses[0], *states[0, 4:].tolist()))
+    trace = Trace([world])
+    agents = (RecordedAgent([episode.actions]), RecordedAgent([episode.actions]))
+    # To the last recorded action, also where the world ends the episode before.
+    rollout = Rollout(task, [episode.map_config], agents, worlds=[world], observers=[trace], beyond_end=True)
+    rollout.run(track.steps)
+    simulated, (first,) = trace.states(0), rollout.outcomes
     px = np.linalg.norm(simulated[:, :2] - states[:, :2], axis=1)
     turn = simulated[:, 2] - theta_of(states)
+    ended = rollout.ends[0] if first.done else track.steps
     return px, np.abs((turn + math.pi) % (2 * math.pi) - math.pi), first, ended

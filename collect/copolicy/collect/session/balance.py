@@ -3,11 +3,11 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.task import get_task
-from copolicy.tasks.table.map_config import MapConfig
 
 Configuration = tuple[str, int]
 """Map id, and who sits where: 0 with player a on the robot's seat, 1 with player b there."""
@@ -39,7 +39,7 @@ class Balance:
     Seats change once, in the middle of a session, and the session begins with the seats that were kept less.
     """
 
-    def __init__(self, maps: Sequence[MapConfig], episodes: int, seed: int, pair: str, swap: bool, seating: int = 0):
+    def __init__(self, maps: Sequence[Any], episodes: int, seed: int, pair: str, swap: bool, seating: int = 0):
         """
         Args:
             maps: to choose from; repeated ones count once, one of a file as often as its weight says.
@@ -58,7 +58,7 @@ class Balance:
         self._swap = swap
         self._seating = seating
 
-    def next(self, counts: Counts) -> tuple[MapConfig, int]:
+    def next(self, counts: Counts) -> tuple[Any, int]:
         """Map and seats of the next episode."""
         seating = self.seating(counts)
         starts, goals = Counter(), Counter()
@@ -98,7 +98,7 @@ class Balance:
             first = int(np.random.default_rng(self._entropy).integers(2))
         return first if counts.kept_here.total() < -(-self._episodes // 2) else 1 - first
 
-    def practice(self, number: int) -> MapConfig:
+    def practice(self, number: int) -> Any:
         """The map of a practice episode, drawn apart from the schedule."""
         order = np.random.default_rng([*self._entropy, 1 << 20]).permutation(len(self._maps))
         return list(self._maps.values())[int(order[number % len(order)])]

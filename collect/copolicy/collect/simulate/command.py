@@ -91,7 +91,7 @@ def simulate(
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
     # Other maps, other episodes: a file may have the name of another one.
-    variant = f"{chosen.label}-{chosen.digest}" if chosen.from_file else map_set
+    variant = f"{chosen.label.replace('#', '.')}-{chosen.digest}" if chosen.from_file else map_set
     variant += f"{'-orientations' if orientations else ''}"
     variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
     variant += "" if clearance is None else f"-clearance_{clearance:g}"

@@ -2,27 +2,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import RUNNING
-from copolicy.tasks.table.agents import simulated_pair
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.world import TableWorld
+from copolicy.dataset.task import get_task
 
+from ..agents import ScriptedAgent
 from ..recording.recorder import EpisodeRecorder
 from ..recording.wall_clock import WallClockAnchor
-
-
-class Pilot(Protocol):
-    """Whoever moves one end of the table."""
-
-    def act(self, state: np.ndarray) -> np.ndarray:
-        """The force `(2,)` in a state `(7,)`."""
-        ...
+from ..rollout import Agent, Rollout
 
 
 @dataclass(frozen=True)
@@ -30,16 +20,17 @@ class EpisodeJob:
     """All that a worker needs for one episode."""
 
     path: Path
-    map_config: MapConfig
-    physics: Physics
+    map_config: Any
+    physics: Any
     meta: EpisodeMeta
     anchor: WallClockAnchor
     clearance: float | None = None
 
     def record(self) -> "EpisodeResult":
         """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, carry the table."""
-        pilots = simulated_pair(self.map_config, self.meta.pair_id, self.meta.seed, self.clearance)
-        return record_episode(self.path, self.map_config, pilots, self.meta, self.anchor, self.physics)
+        options = () if self.clearance is None else (self.clearance,)
+        agents = tuple(ScriptedAgent.of_pair(self.meta.pair_id, None, *options) for _ in range(2))
+        return record_episode(self.path, self.map_config, agents, self.meta, self.anchor, self.physics)
 
 
 @dataclass(frozen=True)
@@ -54,29 +45,35 @@ class EpisodeResult:
 
 def record_episode(
     path: Path,
-    map_config: MapConfig,
-    pilots: tuple[Pilot, Pilot],
+    scenario: Any,
+    agents: tuple[Agent, Agent],
     meta: EpisodeMeta,
     anchor: WallClockAnchor,
-    physics: Physics | None = None,
+    settings: Any = None,
 ) -> EpisodeResult:
-    """Lets two pilots carry the table until the episode ends, and records it.
+    """Lets two agents act until the episode ends, and records it.
 
     Args:
         path: of the finished file.
-        map_config: the map.
-        pilots: robot, human.
+        scenario: the map.
+        agents: robot, human; `meta.seed` is their seed.
         meta: what is known at the start.
         anchor: moment of the first step.
-        physics: settings of the dynamics.
+        settings: of the dynamics.
     """
-    world = TableWorld(map_config, physics)
-    with EpisodeRecorder(path, map_config, meta, anchor, settings=physics) as recorder:
-        outcome = RUNNING
-        while not outcome.done:
-            state = world.observation
-            action = np.clip(np.concatenate([pilot.act(state) for pilot in pilots]), -1.0, 1.0)
-            outcome = world.step(action)
-            recorder.step(action, world.recorded, world.reward())
+    rollout = Rollout(get_task(), [scenario], agents, seeds=[meta.seed], settings=settings)
+    with EpisodeRecorder(path, scenario, meta, anchor, settings=settings) as recorder:
+        rollout.observers.append(_Recording(recorder))
+        rollout.run()
+        (outcome,) = rollout.outcomes
         recorder.finish(outcome.success, outcome.reason)
     return EpisodeResult(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)
+
+
+@dataclass
+class _Recording:
+    recorder: EpisodeRecorder
+
+    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+        world = rollout.worlds[0]
+        self.recorder.step(actions[0], world.recorded, world.reward())

@@ -118,6 +118,11 @@ class MapFiles(ScenarioFiles):
 
         if not re.fullmatch(_SET_NAME, name) or name in (*MAP_SETS, "custom"):
             raise InvalidValueError("--name", "lower-case letters, digits, - or _, and no set of the package", name)
+        for key, least, most in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
+            low, high = bounds[key]
+            if not least <= math.ceil(low) <= math.floor(high) <= most:
+                expected = f"{key} with a whole number in it, from {least} to {most}"
+                raise InvalidValueError("--bounds", expected, f"{key}={low:g}:{high:g}")
         maps = [_plain(config) for config in random_maps(count, seed, bounds)]
         text = ", ".join(f"{key}={low:g}:{high:g}" for key, (low, high) in bounds.items())
         return {
@@ -181,6 +186,9 @@ def _configs(document: Document, place: str, entry: Map, number: str, problems: 
             message = f"expected rad as a number, or degrees such as 90deg, found {angle!r}"
             problems.append(document.problem(f"{place}.start", message))
         else:
+            if not isinstance(angle, str) and abs(angle or 0.0) > 2 * math.pi + 1e-6:
+                message = f"expected rad from -2 pi to 2 pi, found {angle:g}; degrees are written {angle:g}deg"
+                problems.append(document.problem(f"{place}.start", message))
             radians = math.radians(float(angle[:-3])) if isinstance(angle, str) else float(angle or 0.0)
             angles.append(radians % (2 * math.pi))
     whole = [round(math.degrees(angle)) % 360 for angle in angles]

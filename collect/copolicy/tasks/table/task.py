@@ -19,9 +19,11 @@ from .maps import MAP_SETS, identify, turned
 from .physics import Physics
 from .reward import reward
 from .routes import route_class
+from .seats import TableSeats
 from .spec import SPEC
 
 if TYPE_CHECKING:
+    from .agents.players import TablePlayers
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -35,6 +37,14 @@ class TableTask(PairTask):
     spec = SPEC
     scenario_type = MapConfig
     settings_type = Physics
+    exchange = TableSeats()
+
+    @property
+    def agents(self) -> "TablePlayers":
+        """Simulated pairs, partners and robots."""
+        from .agents.players import TablePlayers
+
+        return TablePlayers()
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:

@@ -10,12 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from copolicy.dataset.exceptions import MissingExtraError
-
-try:
-    import h5py
-except ModuleNotFoundError:
-    raise MissingExtraError("h5py") from None
+import h5py
 
 
 class NotedRefusals(io.RawIOBase):

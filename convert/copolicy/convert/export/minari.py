@@ -11,10 +11,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from copolicy.dataset.clock import frames
-from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_folder
 from copolicy.tasks.table.features import BOUNDS, TASK
@@ -22,11 +23,6 @@ from copolicy.tasks.table.physics import Physics
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
-
-try:
-    import h5py
-except ModuleNotFoundError:
-    raise MissingExtraError("h5py") from None
 
 _FORMAT_VERSION = "0.5.0"
 """Version of Minari whose layout this is; a later one reads it, an earlier one says that it cannot."""

@@ -14,21 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from copolicy.dataset.edit.groups import By, groups
 from copolicy.dataset.edit.parts import Part, deal
-from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_file
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
-
-try:
-    import h5py
-except ModuleNotFoundError:
-    raise MissingExtraError("h5py") from None
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _SPLITS = {"val": "valid", "validation": "valid"}

@@ -13,10 +13,8 @@ from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
-from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.lerobot_folder.tables import feature_values, read_parquet
 from copolicy.dataset.physics_text import physics_counts, physics_of
 from copolicy.dataset.task import PairTask
 
@@ -88,8 +86,7 @@ class ExportSource:
     splits: dict[str, range]
     rows: tuple[dict[str, Any], ...]
     left_out: int
-    task: PairTask
-    _lengths: dict[int, int] = field(repr=False)
+    _folder: LeRobotFolder = field(repr=False)
 
     @classmethod
     def open(cls, root: Path, keep_discarded: bool = False) -> "ExportSource":
@@ -110,7 +107,7 @@ class ExportSource:
         if fps != int(fps):
             raise FileFormatError(root / INFO_FILE, f"a rate that divides {record_hz}", str(fps))
         fps = int(fps)
-        splits = {name: _range(text, root) for name, text in (info.get("splits") or {}).items()}
+        splits = folder.splits
         stride(fps, record_hz)
         rows = folder.rows()
         for row in rows:
@@ -121,8 +118,7 @@ class ExportSource:
         kept = tuple(row for row in rows if keep_discarded or not row["discarded"])
         if not kept:
             raise RunError(f"{root}: expected an episode to export, found {len(rows)}, all discarded")
-        lengths = {row["episode_index"]: row["length"] for row in rows}
-        return cls(root, fps, hold, splits, kept, len(rows) - len(kept), task, lengths)
+        return cls(root, fps, hold, splits, kept, len(rows) - len(kept), folder)
 
     @property
     def frames(self) -> int:
@@ -165,30 +161,16 @@ class ExportSource:
             FileFormatError: the frames are not those that the metadata tells of.
         """
         wanted = {row["episode_index"]: row for row in self.rows}
-        expected = iter(sorted(self._lengths))
-        for path in visible_files(self.root / "data", "*.parquet"):
-            columns = _frames(path, self.task)
-            numbers = columns["episode_index"]
-            starts = np.flatnonzero(np.diff(numbers, prepend=-1))
-            for start, end in zip(starts, np.append(starts[1:], len(numbers)), strict=True):
-                index, due = int(numbers[start]), next(expected, None)
-                if index != due or end - start != self._lengths[index]:
-                    promised = (
-                        f"episode {due} with {self._lengths[due]} frames" if due is not None else "no more frames"
-                    )
-                    raise FileFormatError(path, f"{promised}, next", f"episode {index} with {end - start}")
-                if index in wanted:
-                    part = {name: values[start:end] for name, values in columns.items()}
-                    yield _episode(index, part, wanted[index], self.fps, self.task)
-        if (due := next(expected, None)) is not None:
-            raise FileFormatError(self.root / "data", f"the frames of episode {due}", "none")
+        names = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION, "next.reward")
+        features = features_of(self.task.spec)
+        for index, part in self._folder.frames({name: features[name]["shape"] for name in names}):
+            if index in wanted:
+                yield _episode(index, part, wanted[index], self.fps, self.task)
 
-
-def _range(text: str, root: Path) -> range:
-    first, colon, last = text.partition(":")
-    if not (colon and first.isdecimal() and last.isdecimal()):
-        raise FileFormatError(root / INFO_FILE, "splits as FIRST:END", repr(text))
-    return range(int(first), int(last))
+    @property
+    def task(self) -> PairTask:
+        """The task of the data set."""
+        return self._folder.task
 
 
 def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int, task: PairTask) -> ExportEpisode:
@@ -197,15 +179,3 @@ def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: 
         index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta,
         fps, physics_of(row["physics"], task) or task.settings_type(), task,
     )  # fmt: skip
-
-
-def _frames(path: Path, task: PairTask) -> dict[str, np.ndarray]:
-    names = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION, "next.reward")
-    table = read_parquet(path, (*names, "episode_index"))
-    columns = {"episode_index": feature_values(table, "episode_index", (1,), path)}
-    features = features_of(task.spec)
-    for name in names:
-        columns[name] = feature_values(table, name, features[name]["shape"], path)
-        if not np.isfinite(columns[name]).all():
-            raise FileFormatError(path, f"finite numbers of {name}", "nan or inf")
-    return columns

@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.clock import Hold
-from copolicy.dataset.edit.subset.numbered_files import Place, numbered_files
-from copolicy.dataset.edit.subset.replace_folder import finish_interrupted
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
-from copolicy.dataset.files.staging import about, sync_folder, sync_tree
+from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
+from copolicy.dataset.files.staging import about
 from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
+from copolicy.dataset.lerobot_folder.references import Place, numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, minimal_card
 from copolicy.dataset.recording.log import read_metadata
@@ -119,8 +119,7 @@ def append_recordings(
                 columns_added = add_later_columns(whole)
                 info = _join(whole, added)
                 mixtures = _mixtures(whole, rewards)
-                sync_tree(whole)
-                _take_place(whole, place)
+                shutil.rmtree(take_place(whole, place))
         except CopolicyError as error:
             # The folders in the making are gone when somebody reads this.
             error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
@@ -183,6 +182,7 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     info["total_episodes"], info["total_frames"] = total, info["total_frames"] + new["total_frames"]
     record, part = stored_record(whole), stored_record(added)
     notes = {**record.get("notes", {}), **part.pop("notes", {})}
+    part.pop("task", None)  # that of the whole
     part["version"] = version("lerobot_policy_copolicy")
     record = {**record, "notes": notes, "appended": [*record.get("appended", []), part]}
     _renew_minimal_card(whole)
@@ -218,17 +218,6 @@ def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, di
             target.parent.mkdir(parents=True, exist_ok=True)
             path.rename(target)
     return moved
-
-
-def _take_place(whole: Path, root: Path) -> None:
-    root.rename(_before(root))
-    whole.rename(root)
-    sync_folder(root.parent)
-    shutil.rmtree(_before(root))
-
-
-def _before(root: Path) -> Path:
-    return root.parent / f".{root.name}.before-append"
 
 
 def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:

@@ -58,7 +58,7 @@ class FrameFiles:
                 flat = pa.array(values.reshape(-1), field.type.value_type)
                 arrays.append(pa.FixedSizeListArray.from_arrays(flat, type=field.type))
             else:
-                arrays.append(pa.array(values, field.type))
+                arrays.append(pa.array(values.reshape(-1), field.type))
         return pa.Table.from_arrays(arrays, schema=self._schema)
 
     def _close(self) -> None:

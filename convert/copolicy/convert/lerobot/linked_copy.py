@@ -4,11 +4,11 @@ import os
 import shutil
 from pathlib import Path
 
-from copolicy.dataset.edit.subset.numbered_files import numbered_files
-from copolicy.dataset.episode import LATER_COLUMNS, LATER_DEFAULTS
+from copolicy.dataset.episode import LATER_COLUMNS, UNKNOWN_VALUES
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.listing import broken_links
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER
+from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 from .shifted_tables import write_like
@@ -52,7 +52,7 @@ def add_later_columns(whole: Path) -> list[str]:
         table = read_parquet(path)
         missing = [name for name in LATER_COLUMNS if name not in table.column_names]
         for name in missing:
-            table = table.append_column(name, pa.array([LATER_DEFAULTS[name]] * table.num_rows))
+            table = table.append_column(name, pa.array([UNKNOWN_VALUES[name]] * table.num_rows))
         if missing:
             path.unlink()  # a link: writing into it would change the data set in use
             write_like(table, table.schema, path)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.edit.subset.numbered_files import Place
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
+from copolicy.dataset.lerobot_folder.references import Place
 
 try:
     import pyarrow as pa

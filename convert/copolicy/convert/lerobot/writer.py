@@ -91,7 +91,7 @@ def write_dataset(
 
     Raises:
         OutputExistsError: there is something at `root`; nothing is touched.
-        RunError: no episodes, or two with the same episode_uuid; nothing is left behind.
+        RunError: no episodes, episodes of several tasks, or two with the same episode_uuid; nothing is left behind.
     """
     with new_folder(root) as partial:
         remaining = iter(episodes)
@@ -155,6 +155,9 @@ def _write_data(
         VideoFiles(meta.root, SCENE, meta.fps, meta.video_files_size_in_mb, meta.chunks_size) as videos,
     ):
         for index, episode in enumerate(episodes):
+            if episode.task != spec.name:
+                found = f"one of {episode.task!r}"
+                raise RunError(f"{episode.origin}: expected an episode of the task {spec.name!r}, found {found}")
             uuid = episode.meta.episode_uuid
             if uuid in origins:
                 raise RepeatedEpisodeError(uuid, origins[uuid], episode.origin or f"episode {index}")

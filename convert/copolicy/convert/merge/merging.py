@@ -11,13 +11,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.edit.subset.numbered_files import numbered_files
+import pyarrow as pa
+import pyarrow.parquet as pq
+from lerobot.datasets.feature_utils import get_hf_features_from_features
+
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
-from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_DEFAULTS
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, RunError
+from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
 from copolicy.dataset.versions.content import read_content
@@ -26,15 +30,7 @@ from copolicy.dataset.versions.digests import Content
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures, converter_versions
 from ..lerobot.stored_rewards import foreign_rewards
-from .people import LOCAL_NAMES, renamed, require_prefixes, require_strangers
-from .source import read_source, require_alike
-
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-    from lerobot.datasets.feature_utils import get_hf_features_from_features
-except ImportError as error:
-    raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
+from .source import LOCAL_NAMES, read_source, renamed, require_alike, require_prefixes, require_strangers
 
 _MOVED = ("data/", "videos/", "meta/episodes/", "stats/index/", "stats/episode_index/", "stats/task_index/")
 _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
@@ -100,7 +96,7 @@ def merge_datasets(
     }
 
 
-def _mixtures(episodes: "pa.Table", sources: Sequence[StoredSet]) -> Mixtures:
+def _mixtures(episodes: pa.Table, sources: Sequence[StoredSet]) -> Mixtures:
     named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
     try:
         mixtures = Mixtures.of(episodes.select(named).to_pylist())
@@ -111,7 +107,7 @@ def _mixtures(episodes: "pa.Table", sources: Sequence[StoredSet]) -> Mixtures:
     return replace(mixtures, mixed=[*mixtures.mixed, *versions, *foreign_rewards([source.root for source in sources])])
 
 
-def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.Table":
+def _joined(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Table:
     """All rows of meta/episodes as they were; where a data set lacks a column, null or what a later column is then."""
     types = {field.name: field.type for field in tables[0].schema}
     for source, table in zip(sources, tables, strict=True):
@@ -128,7 +124,7 @@ def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.T
                 {
                     name: _without_nan(name, table.column(name).cast(kind))
                     if name in table.column_names
-                    else pa.array([LATER_DEFAULTS.get(name)] * table.num_rows, kind)
+                    else pa.array([UNKNOWN_VALUES[name] if name in LATER_COLUMNS else None] * table.num_rows, kind)
                     for name, kind in types.items()
                 }
             )
@@ -137,14 +133,14 @@ def _joined(sources: Sequence[StoredSet], tables: Sequence["pa.Table"]) -> "pa.T
     )
 
 
-def _without_nan(name: str, column: "pa.ChunkedArray") -> "pa.ChunkedArray":
+def _without_nan(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
     """A number that is not known, as data sets of earlier versions have it, is null."""
     if EPISODE_COLUMNS.get(name) != "float":
         return column
     return pa.chunked_array([pa.array(column.to_pylist(), column.type, from_pandas=True)])
 
 
-def _restore_episodes(root: Path, expected: "pa.Table") -> None:
+def _restore_episodes(root: Path, expected: pa.Table) -> None:
     start = 0
     for path in numbered_files(root / EPISODES_FOLDER).values():
         merged = read_parquet(path)

@@ -4,24 +4,61 @@ import importlib.util
 import shutil
 import subprocess
 import sys
+from concurrent.futures import Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
+from datatrove.executor import LocalPipelineExecutor, RayPipelineExecutor, SlurmPipelineExecutor
+from datatrove.pipeline.base import PipelineStep
+from loguru import logger
+
+from copolicy.dataset.command_line.commands import progress
+from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
+from copolicy.dataset.files.staging import replace_json
+from copolicy.dataset.worker_pool import WorkerPool
 
 from ..lerobot.prepare import DamagedEpisodeError
-from .local import LocalExecutor, quiet
-from .pipeline import ConvertShard, MergeShards
 from .plan import ShardPlan
 
-try:
-    from datatrove.executor import RayPipelineExecutor, SlurmPipelineExecutor
-except ModuleNotFoundError as error:
-    raise MissingExtraError((error.name or "datatrove").split(".")[0], "scale") from None
+SUMMARY_FILE = "summary.json"
 
-ExecutorName = Literal["local", "slurm", "ray"]
+
+class _Step(PipelineStep):
+    """A step of datatrove's; its only output are files."""
+
+    type = "copolicy"
+
+    def __init__(self, plan: ShardPlan):
+        super().__init__()
+        self.plan = plan
+
+
+class ConvertShard(_Step):
+    """One shard a rank."""
+
+    name = "convert a shard"
+
+    def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Makes shard `rank` of the plan."""
+        from .shard import convert_shard
+
+        self.stat_update("episodes", value=convert_shard(self.plan, rank))
+
+
+class MergeShards(_Step):
+    """All shards to one data set, in a job of its own; the summary is kept beside the shards."""
+
+    name = "merge the shards"
+
+    def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Makes the data set of the plan."""
+        from .merge import merge_shards
+
+        summary = merge_shards(self.plan)
+        replace_json(self.plan.folder / SUMMARY_FILE, summary)
 
 
 @dataclass(frozen=True)
@@ -149,3 +186,50 @@ def _damage(plan: ShardPlan) -> RunError:
     others = f" (and {len(lines) - 1} more, in {lists[0].parent})" if len(lines) > 1 else ""
     advice = "mend or remove such files, or add --skip-damaged, and run again"
     return RunError(f"{lines[0]}{others}; {_finished(plan)}: {advice}")
+
+
+class LocalExecutor(LocalPipelineExecutor):
+    """Runs ranks in processes of this machine, like its parent, with another pool.
+
+    The parent's `multiprocess.Pool` waits for ever for the rank of a process that was killed, and terminates every
+    rank at the first that fails. Here a killed process ends the run, and a rank that fails ends alone.
+    """
+
+    def run(self) -> list[CopolicyError]:
+        """Runs the ranks that are not completed.
+
+        Returns:
+            The errors of those that failed.
+
+        Raises:
+            BrokenProcessPool: a process was killed.
+        """
+        ranks = self.get_incomplete_ranks()
+        if not ranks:
+            return []
+        self.save_executor_as_json()
+        if self.workers == 1:
+            return [error for rank in progress(ranks, len(ranks), "shards") if (error := self._outcome(rank))]
+        with WorkerPool(min(self.workers, len(ranks))) as pool:
+            futures: list[Future[CopolicyError | None]] = [pool.submit(self._outcome, rank) for rank in ranks]
+            done = progress(as_completed(futures), len(futures), "shards")
+            return [error for future in done if (error := future.result())]
+
+    def _outcome(self, rank: int) -> CopolicyError | None:
+        try:
+            with quiet():
+                self._run_for_rank(rank, local_rank=rank)
+        except CopolicyError as error:
+            return error
+        return None
+
+
+@contextmanager
+def quiet():
+    """Keeps datatrove's log off the terminal: it shows its pipeline, paths and tracebacks of what is reported in one
+    line elsewhere."""
+    logger.disable("datatrove")
+    try:
+        yield
+    finally:
+        logger.enable("datatrove")

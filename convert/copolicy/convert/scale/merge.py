@@ -1,25 +1,37 @@
 """All shards to the one data set, with what can only be said of all episodes together."""
 
+import json
 from collections import Counter
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.checks.finding import SEVERITIES
-from copolicy.dataset.edit.subset.numbered_files import numbered_files
+from copolicy.dataset.checks.checking import DATA_SET_RULES, check_table
+from copolicy.dataset.checks.finding import SEVERITIES, Finding
+from copolicy.dataset.checks.read_lerobot import read_lerobot
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, STATISTICS_FILE
+from copolicy.dataset.exceptions import FileFormatError, RunError
+from copolicy.dataset.files.meta_files import (
+    CARD_FILE,
+    EPISODES_FOLDER,
+    INFO_FILE,
+    STATISTICS_FILE,
+    STATS_FILE,
+    TASKS_FILE,
+)
 from copolicy.dataset.files.staging import new_folder, replace_json, require_new
+from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
 
+from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
 from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
+from ..lerobot.shifted_tables import write_like
 from ..lerobot.writer import WrittenDataset
-from .aggregation import aggregate
-from .findings import all_findings
 from .plan import DATA_SET, ShardPlan, ShardRecord
 
 FINDINGS_FILE = "findings.json"
@@ -112,3 +124,60 @@ def _write_statistics(root: Path) -> None:
 
     data, left_out = read_trajectories(root)
     replace_json(root / STATISTICS_FILE, compute_statistics(data, left_out=left_out), allow_nan=False)
+
+
+def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) -> dict[str, Any]:
+    """One data set out of several with the same features, in their order.
+
+    LeRobot joins them, one file of frames (and of video) a part: to pack thousands of parts into one file it would read
+    and write that file thousands of times. What else it does to them is undone: columns change
+    their type, video features lose what names their encoder.
+
+    Args:
+        target: a new folder.
+        cache: a folder for its own use; it goes away at the end.
+
+    Returns:
+        `meta/info.json` of the result.
+
+    Raises:
+        FileFormatError: a part is not complete. LeRobot would look for it on the Hub.
+    """
+    for root in roots:
+        for name in (INFO_FILE, STATS_FILE, TASKS_FILE, EPISODES_FOLDER, "data"):
+            if not (root / name).exists():
+                raise FileFormatError(root, f"a complete data set with {name}", "none; delete the shard's folder")
+    join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
+    info = read_info(target)
+    info["features"] = read_info(roots[0])["features"]
+    (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    example = next(iter(numbered_files(roots[0] / EPISODES_FOLDER).values()))
+    for path in numbered_files(target / EPISODES_FOLDER).values():
+        write_like(read_parquet(path), example, path)
+    return info
+
+
+def all_findings(root: Path, records: Sequence[ShardRecord]) -> list[Finding]:
+    """What the shards found in their recordings, then what the other rules find in the data set; worst first.
+
+    Args:
+        root: the merged data set; episodes are named by their index in it.
+        records: of all shards, in order.
+    """
+    findings: list[Finding] = []
+    totals: Counter[Finding] = Counter()
+    before = 0
+    for record in records:
+        for fields in record["findings"]:
+            finding = Finding(**fields)
+            if finding.episode:
+                findings.append(Finding(**{**fields, "episode": str(before + int(finding.episode))}))
+            elif isinstance(finding.figure, int):  # a number of episodes
+                totals[Finding(**{**fields, "figure": None})] += finding.figure
+            else:
+                findings.append(finding)
+        before += len(record["episodes"])
+    for finding, total in totals.items():
+        findings.append(Finding("", finding.rule, total, finding.limit, finding.severity, finding.message))
+    findings += check_table(read_lerobot(root), DATA_SET_RULES).findings
+    return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))

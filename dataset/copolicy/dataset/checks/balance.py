@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
 
-from copolicy.tasks.table.maps import MAP_SETS, identify
-
+from ..task import PairTask
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit
@@ -21,7 +20,7 @@ _VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
 def _maps(table: EpisodeTable) -> Iterator[Finding]:
     stated = _stated_weights(table)
     for name, counts in _by_set(table).items():
-        weights = _weights(name, counts, stated)
+        weights = _weights(table.task, name, counts, stated)
         maps, episodes = sorted(weights), sum(counts.values())
         share = np.array([weights[one] for one in maps]) / sum(weights.values())
         found = np.array([counts[one] for one in maps])
@@ -83,23 +82,23 @@ def _stated_weights(table: EpisodeTable) -> dict[str, int]:
     return dict(zip(_base_maps(table).tolist(), table.columns["map_weight"].tolist(), strict=True))
 
 
-def _weights(name: str, counts: Counter[str], stated: Mapping[str, int]) -> dict[str, int]:
+def _weights(task: PairTask, name: str, counts: Counter[str], stated: Mapping[str, int]) -> dict[str, int]:
     """How often each map of a family should be there: as often as the set that was recorded repeats it.
 
     Several sets have maps of one family (the paper's 36 carry the names of the training maps): of those with all the
     maps that are there, the one with the fewest others, and of these the one that fits best.
     """
-    if name not in MAP_SETS:
+    if name not in task.scenario_sets:
         return {map_id: max(1, stated.get(map_id, 1)) for map_id in counts}
-    sets = [Counter(map_id for map_id, family in maps if family == name) for maps in _named_sets()]
+    sets = [Counter(map_id for map_id, family in maps if family == name) for maps in _named_sets(task)]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
     return min(fitting, key=lambda weights: (len(weights), _misfit(weights, counts)), default=dict.fromkeys(counts, 1))
 
 
 @functools.cache
-def _named_sets() -> tuple[tuple[tuple[str, str], ...], ...]:
+def _named_sets(task: PairTask) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Name and family of each map of each set."""
-    return tuple(tuple(identify(config) for config in maps) for maps in MAP_SETS.values())
+    return tuple(tuple(task.identify(scenario) for scenario in scenarios) for scenarios in task.scenario_sets.values())
 
 
 def _misfit(weights: Counter[str], counts: Counter[str]) -> float:

@@ -9,22 +9,7 @@ from ..exceptions import FileFormatError
 from ..files.file_kinds import kind_of
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
-from . import (
-    balance,
-    check_sums,
-    consent,
-    contacts,
-    drift,
-    duplicates,
-    inputs,
-    leakage,
-    loading,
-    maps,
-    mixtures,
-    motion,
-    schema,
-    timing,
-)
+from . import balance, check_sums, contacts, inputs, leakage, loading, maps, mixtures, motion, schema, timing
 from .episode_table import EpisodeTable
 from .finding import SEVERITIES, Finding
 from .read_recordings import read_recordings
@@ -36,14 +21,13 @@ RULES: tuple[Rule, ...] = (
     *check_sums.RULES,
     *loading.RULES,
     *timing.RULES,
-    *drift.RULES,
     *inputs.RULES,
     *motion.RULES,
-    *duplicates.RULES,
+    *leakage.DUPLICATE_RULES,
     *maps.RULES,
     *contacts.RULES,
     *balance.RULES,
-    *consent.RULES,
+    *mixtures.CONSENT_RULES,
     *leakage.RULES,
     *mixtures.RULES,
 )

@@ -83,7 +83,7 @@ def _locate(path: str, revision: str | None = None) -> Path:
 def _download(repo_id: str, revision: str | None) -> Path:
     # Heavy packages, which a folder here need not wait for.
     from ..hub.client import hub_errors, snapshot_download
-    from ..hub.download import resolve
+    from ..hub.repository import resolve
 
     # By its commit: asked for a branch or tag while the Hub is away, the client takes an older copy and says nothing.
     commit = resolve(repo_id, revision or "main")[1]

@@ -1,13 +1,15 @@
-"""Whether what a policy is tested on was part of what it was trained on."""
+"""Episodes that are there twice: in one data set, or in what a policy is trained on and what it is tested on."""
 
-from collections.abc import Iterator, Sequence
+import hashlib
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from ..features import ACTION, STATE
-from .duplicates import motion_digests
+from ..lerobot_folder.info import split_range
 from .episode_table import EpisodeTable
 from .finding import Finding, Severity
 from .rule import Rule
@@ -31,14 +33,13 @@ def splits(table: EpisodeTable) -> tuple[list[Part], list[Finding]]:
     entries = table.info.get("splits")
     indices = {label: place for place, label in enumerate(table.labels)}
     for name, text in (entries if isinstance(entries, dict) else {}).items():
-        begin, colon, end = str(text).partition(":")
-        if not (colon and begin.isdecimal() and end.isdecimal()):
+        if (span := split_range(text)) is None:
             findings.append(Finding("", "splits", str(text), "FIRST:END", "error", f"split {name} is no range"))
             continue
-        if int(end) > len(table.labels) or int(begin) > int(end):
+        if span.stop > len(table.labels) or span.start > span.stop:
             message = f"split {name} is not a range of the {len(table.labels)} episodes"
             findings.append(Finding("", "splits", str(text), f"0:{len(table.labels)}", "error", message))
-        places = [indices[str(index)] for index in range(int(begin), int(end)) if str(index) in indices]
+        places = [place for label, place in indices.items() if int(label) in span]
         parts.append(Part(str(name), table, places))
     for one, other in combinations(parts, 2):
         shared = len(set(one.places) & set(other.places))
@@ -96,6 +97,48 @@ def _motions(part: Part) -> dict[str, str]:
 def _people(part: Part) -> bool:
     sources = part.table.columns.get("source")
     return sources is None or bool(np.isin(sources[list(part.places)], ("human", "upstream")).any())
+
+
+def motion_digests(table: EpisodeTable) -> list[str]:
+    """`(F,)` sha256 of each episode's states and actions, in single precision as a data set stores them."""
+    rows = np.ascontiguousarray(np.hstack((table.frames[STATE], table.frames[ACTION])), np.float32)
+    return [
+        hashlib.sha256(rows[start : start + count].tobytes()).hexdigest()
+        for start, count in zip(table.starts, table.counts, strict=True)
+    ]
+
+
+def _by_column(table: EpisodeTable) -> Iterator[Finding]:
+    for column, what in (("episode_uuid", "the same episode_uuid as"), ("source_sha256", "made of the same file as")):
+        if column in table.columns:
+            yield from _repeated(table.columns[column].tolist(), list(table.labels), what)
+
+
+def _by_bits(table: EpisodeTable) -> Iterator[Finding]:
+    labels = [table.labels[place] for place in table.framed]
+    yield from _repeated(motion_digests(table), labels, "the same states and actions, bit for bit, as")
+
+
+def _repeated(values: Iterable[str], labels: list[str], what: str) -> Iterator[Finding]:
+    seen: dict[str, list[str]] = defaultdict(list)
+    for value, label in zip(values, labels, strict=True):
+        if value and seen[value]:
+            message = f"{what} episode {seen[value][0]}"
+            yield Finding(label, "duplicate", len(seen[value]) + 1, 1, "error", message)
+        seen[value].append(label)
+
+
+DUPLICATE_RULES = (
+    Rule(
+        "duplicate_names",
+        "every episode_uuid and every source file once",
+        _by_column,
+        (),
+        ("episode_uuid",),
+        whole=True,
+    ),
+    Rule("duplicate_motion", "no two episodes with the same states and actions", _by_bits, (STATE, ACTION), whole=True),
+)
 
 
 RULES = (

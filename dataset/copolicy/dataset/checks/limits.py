@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ..interaction import IDENTICAL
 
-RULES_VERSION = "1.2.0"
+RULES_VERSION = "1.3.0"
 """Of the rules and their limits: major where a finding means something else, minor where a rule is added or goes,
 patch where a limit moves. Kept findings name it."""
 

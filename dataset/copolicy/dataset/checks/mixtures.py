@@ -1,4 +1,4 @@
-"""Whether a data set mixes episodes of different physics, obstacle sizes, software versions or sources."""
+"""What the episodes say of themselves: consent, licence, and mixtures of physics, obstacle sizes, software, sources."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -10,7 +10,7 @@ from ..physics_text import UNKNOWN, physics_of, physics_summary
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .maps import named_map
-from .rule import Rule
+from .rule import Rule, each
 
 
 def _physics(table: EpisodeTable) -> Iterator[Finding]:
@@ -64,6 +64,34 @@ def _several(table: EpisodeTable, column: str, what: str) -> Iterator[Finding]:
 def _listed(counts: Mapping[str, int]) -> str:
     ordered = sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
     return "; ".join(f"{count} {name}" for name, count in ordered)
+
+
+def _consent(table: EpisodeTable) -> Iterator[Finding]:
+    people = table.columns["source"] == "human"
+    consent = table.columns["consent_id"]
+    missing = people & (np.char.strip(consent) == "")
+    message = "people were recorded, but there is no record of their consent"
+    yield from each(table, missing, "consent", consent, "a consent_id", "error", message)
+
+
+def _license(table: EpisodeTable) -> Iterator[Finding]:
+    licenses = np.char.strip(table.columns["license"])
+    missing = int((licenses == "").sum())
+    if missing:
+        # Recordings get theirs when they are converted (--license); what others load must have one.
+        severity = "error" if table.kind == "lerobot" else "warning"
+        message = f"of {len(licenses)} episodes state no licence; nobody may use them"
+        yield Finding("", "license", missing, 0, severity, message)
+    several = sorted(set(licenses.tolist()) - {""})
+    if len(several) > 1:
+        message = f"several licences in one data set: {', '.join(several)}"
+        yield Finding("", "license", len(several), 1, "warning", message)
+
+
+CONSENT_RULES = (
+    Rule("consent", "people agreed to be recorded", _consent, (), ("source", "consent_id")),
+    Rule("license", "every episode states one licence", _license, (), ("license",), whole=True),
+)
 
 
 RULES = (

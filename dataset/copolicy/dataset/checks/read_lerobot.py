@@ -7,7 +7,7 @@ import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
-from ..features import ACTION, STATE, features_of
+from ..features import ACTION, STATE, VECTORS, features_of
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..lerobot_folder.folder import POSITIONS, other_task
@@ -114,7 +114,7 @@ def _frame_columns(data: "pa.Table", features: dict[str, dict], damage: list[Fin
             values = vectors(data.column(name))
             width = features[name]["shape"][0] if name in features else 1 if name in CLOCK else None
             if width is None or values.size == width * len(values):
-                frames[name] = values if width is None or width > 1 else values.reshape(-1)
+                frames[name] = values if width is None else values.reshape((-1, width) if name in VECTORS else -1)
             # Another width is said by the rule on features.
         except ColumnError as error:
             if name in needed:

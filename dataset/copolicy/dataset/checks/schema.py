@@ -80,7 +80,7 @@ def _columns(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _outcome(table: EpisodeTable) -> Iterator[Finding]:
-    reached = table.columns["termination_reason"] == "goal"
+    reached = np.isin(table.columns["termination_reason"], table.task.spec.successes)
     figures = table.columns["termination_reason"]
     differs = reached & ~table.columns["success"]
     yield from each(table, differs, "outcome", figures, "success", "error", "ended at the goal but is no success")

@@ -1,4 +1,4 @@
-"""Time: late ticks, the rate that was kept, gaps between frames, and whether the motion fits the clock."""
+"""Time: late ticks, the rate that was kept, gaps between frames, whether motion fits the clock, and re-simulation."""
 
 from collections.abc import Iterator
 
@@ -60,10 +60,23 @@ def _jumps(table: EpisodeTable) -> Iterator[Finding]:
     yield from each(table, ~(fastest <= bound), "jump", fastest, bound, "error", message, table.framed)
 
 
+def _drift(table: EpisodeTable) -> Iterator[Finding]:
+    drift = table.columns["replay_drift_px"]
+    warning, error = limit("drift.warning"), limit("drift.error")
+    message = "the actions, played again, leave the recorded path by this many px"
+    yield from each(table, drift > error, "drift", drift, error, "error", message)
+    yield from each(table, (drift > warning) & ~(drift > error), "drift", drift, warning, "warning", message)
+    unknown = int(np.isnan(drift).sum())
+    if unknown:
+        message = "episodes were not re-simulated (stored below 30 Hz, or converted with --no-drift)"
+        yield Finding("", "drift", unknown, 0, "info", message)
+
+
 RULES = (
     Rule("late_ticks", "steps that began late", _late_ticks, (), ("late_ticks", "duration_s")),
     Rule("achieved_hz", "the rate that the recording loop kept", _achieved_hz, (), ("achieved_hz", "source")),
     Rule("timestamps", "timestamps without gaps", _timestamps, ("timestamp",), (), ("lerobot",)),
     Rule("duration", "as many frames as the duration asks for", _duration, (), ("duration_s",)),
     Rule("jumps", "no step is missing from the motion", _jumps, (STATE,)),
+    Rule("drift", "re-simulation follows the recorded path", _drift, (), ("replay_drift_px",), ("lerobot",)),
 )

@@ -1,18 +1,20 @@
 """What every command of every room shares: flags, exit status, progress, and errors of one line."""
 
 import argparse
+import contextlib
+import io
 import json
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.metadata import version
+from typing import Any, TextIO
 
 from tqdm import tqdm
 
 from ..exceptions import CopolicyError
 from ..files.staging import causes, refusal
-from .closed_pipe import quiet_when_closed
 from .extras import extra_behind, require_packages
 
 DISTRIBUTION = "lerobot_policy_copolicy"
@@ -152,3 +154,49 @@ def _lines(summary: dict, indent: str = "") -> Iterable[str]:
             yield f"{indent}{key:<{width}}  {len(value)} entries (see --json)"
         else:
             yield f"{indent}{key:<{width}}  {value}"
+
+
+class _PipeEnd(io.FileIO):
+    """A file descriptor that forgets what nobody reads any more."""
+
+    def write(self, data: Any, /) -> int | None:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            return memoryview(data).nbytes
+
+
+@contextlib.contextmanager
+def quiet_when_closed() -> Iterator[None]:
+    """In this block a closed pipe behind stdout or stderr is no error: the command does its work to the end.
+
+    Streams that are not those of the process, such as a test's, are left as they are.
+    """
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = ours = tuple(map(_tolerant, before))
+    try:
+        yield
+    finally:
+        for stream, old in zip(ours, before, strict=True):
+            if stream is not old and not stream.closed:
+                stream.flush()
+        sys.stdout, sys.stderr = before
+
+
+def _tolerant(stream: TextIO) -> TextIO:
+    if not isinstance(stream, io.TextIOWrapper):
+        return stream
+    if stream.errors in ("strict", "surrogateescape"):
+        # A letter that the terminal's encoding lacks, or a file name of another one, is no reason to stop.
+        stream.reconfigure(errors="backslashreplace")
+    raw = getattr(stream.buffer, "raw", stream.buffer)  # without a buffer under `python -u`
+    if type(raw) is not io.FileIO:
+        return stream
+    stream.flush()
+    return io.TextIOWrapper(
+        io.BufferedWriter(_PipeEnd(raw.fileno(), "w", closefd=False)),
+        encoding=stream.encoding,
+        errors=stream.errors,
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )

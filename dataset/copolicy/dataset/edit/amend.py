@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, get_args
 from ..episode import EPISODE_COLUMNS, Source
 from ..exceptions import InvalidValueError, RunError, UnknownNameError
 from ..files.meta_files import RECORD_FILE
+from ..files.replace_folder import finish_interrupted
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..publication.licences import checked_licence
 from .selection import Selection
-from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import record_text, stored_record
 
 if TYPE_CHECKING:

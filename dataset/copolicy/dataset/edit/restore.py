@@ -13,8 +13,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..checks.duplicates import motion_digests
 from ..checks.episode_table import EpisodeTable
+from ..checks.leakage import motion_digests
 from ..checks.read_lerobot import read_lerobot
 from ..clock import Hold, frame_actions, frame_states
 from ..command_line.commands import progress
@@ -23,11 +23,11 @@ from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION
 from ..files.listing import visible_files
 from ..files.meta_files import RECORD_FILE
+from ..files.replace_folder import finish_interrupted
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
 from ..recording.log import read_episode
 from .amend import today
-from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import record_text, stored_record
 
 _SHOWN = 5
@@ -158,7 +158,7 @@ def _of_recordings(path: Path, root: Path) -> Originals:
 
 
 def _motion(episode: Episode, fps: int, hold: Hold) -> str:
-    """The digest that the frames of a recording have in a data set (`checks.duplicates.motion_digests`)."""
+    """The digest that the frames of a recording have in a data set (`checks.leakage.motion_digests`)."""
     columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
     rows = np.hstack([column.astype(np.float32) for column in columns])
     return hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest()

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import RunError
+from ..files.replace_folder import finish_interrupted
 from ..files.staging import new_folder, require_new
 from .amend import today
 from .selection import Selection
-from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import StoredSet, without_episodes, write_record
 from .subset.writing import kept_splits, write_subset
 

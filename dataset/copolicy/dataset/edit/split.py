@@ -6,12 +6,12 @@ from typing import Any
 
 from ..exceptions import RunError
 from ..features import ACTION, STATE
+from ..files.replace_folder import finish_interrupted
 from ..files.staging import new_folder, require_new
 from .groups import By, base_map, groups
 from .parts import Part, deal
 from .select import selection_record, subset_facts
 from .selection import Row, consents_of
-from .subset.replace_folder import finish_interrupted
 from .subset.stored_set import StoredSet, write_record
 from .subset.writing import kept_splits, write_subset
 

@@ -41,6 +41,11 @@ def read_json[T](path: Path, kind: type[T], what: str) -> T:
     return parse_json(text, kind, what, path)
 
 
+def read_optional_json[T](path: Path, kind: type[T], what: str) -> T | None:
+    """The same, or None where there is no such file."""
+    return read_json(path, kind, what) if path.exists() else None
+
+
 def parse_json[T](text: str | bytes, kind: type[T], what: str, path: Path | str) -> T:
     """The value in a JSON text, see `read_json`.
 

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..episode import EPISODE_COLUMNS
 from ..exceptions import FileFormatError, InvalidValueError
-from ..files.listing import visible_files
-from ..files.meta_files import EPISODES_FOLDER
 from ..files.staging import replacements
-from .info import stripped_hint
+from .info import episode_files, stripped_hint
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -32,9 +30,8 @@ def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Tab
     # The types of all columns, before any of them is rewritten.
     folder = LeRobotFolder.open(root)
     folder.rows([name for name in needed if name in EPISODE_COLUMNS])
-    files = visible_files(root / EPISODES_FOLDER, "*.parquet")
     tables = {}
-    for path in files:
+    for path in episode_files(root):
         tables[path] = read_parquet(path)
         missing = [name for name in needed if name not in tables[path].column_names]
         if missing:

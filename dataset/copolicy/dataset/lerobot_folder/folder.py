@@ -1,6 +1,6 @@
 """A LeRobot v3 data set folder: the first step of every reader."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,12 @@ import numpy as np
 
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
-from ..features import ACTION, STATE, features_of
+from ..features import ACTION, STATE, VECTORS, features_of
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..task import PairTask
-from .info import read_info, require_episodes, stripped_hint, task_of
-from .tables import column_types, damaged, episode_values, pa, read_parquet
+from .info import episode_files, read_info, require_episodes, split_range, stripped_hint, task_of
+from .tables import column_types, damaged, episode_values, feature_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 """The columns of meta/episodes that say which rows of the frames an episode has."""
@@ -68,6 +68,20 @@ class LeRobotFolder:
         return task_of(self.info)
 
     @property
+    def splits(self) -> dict[str, range]:
+        """Episodes of each split of `meta/info.json`.
+
+        Raises:
+            FileFormatError: a split of another form.
+        """
+        found: dict[str, range] = {}
+        for name, text in (self.info.get("splits") or {}).items():
+            if (span := split_range(text)) is None:
+                raise FileFormatError(self.root / INFO_FILE, "splits as FIRST:END", repr(text))
+            found[name] = span
+        return found
+
+    @property
     def lengths(self) -> list[int]:
         """Frames of each episode."""
         return self.episodes.column("length").to_pylist()
@@ -79,7 +93,7 @@ class LeRobotFolder:
         Raises:
             FileFormatError: there is none.
         """
-        files = visible_files(self.root / "data", "*.parquet")
+        files = data_files(self.root)
         if not files:
             raise FileFormatError(self.root, "Parquet files under data", "none")
         return files
@@ -105,6 +119,35 @@ class LeRobotFolder:
                 values[name] = [UNKNOWN_VALUES[name]] * self.episodes.num_rows
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
+    def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+        """Number and columns of each episode in order, `(T, n)` or `(T,)` each; one file is in memory at a time.
+
+        Args:
+            shapes: of the columns, by name.
+
+        Raises:
+            FileFormatError: a data file is missing, damaged, without a column, with a number that is not finite, or
+                holds other episodes than meta/episodes says.
+        """
+        expected = iter(enumerate(self.lengths))
+        for path in data_files(self.root):
+            table = read_parquet(path, ["episode_index", *shapes])
+            numbers = feature_values(table, "episode_index", (1,), path)
+            columns = {name: feature_values(table, name, shape, path) for name, shape in shapes.items()}
+            columns |= {name: columns[name].reshape(len(numbers), -1) for name in VECTORS if name in columns}
+            for name, values in columns.items():
+                if not np.isfinite(values).all():
+                    raise FileFormatError(path, f"finite {name}", "nan or inf")
+            starts = np.flatnonzero(np.diff(numbers, prepend=-1)).tolist()
+            for start, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
+                due, found = next(expected, None), (int(numbers[start]), end - start)
+                if found != due:
+                    named = f"episode {due[0]} with {due[1]} frames" if due else "its end"
+                    raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
+                yield found[0], {name: values[start:end] for name, values in columns.items()}
+        if left := next(expected, None):
+            raise FileFormatError(self.root / "data", f"the frames of episode {left[0]}", "none")
+
     def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:
         """Checks that the data set is one of its task.
 
@@ -117,16 +160,10 @@ class LeRobotFolder:
             expected = f"a data set of {self.task.spec.title} (copolicy-convert)"
             raise FileFormatError(self.root / INFO_FILE, expected, difference)
 
-    def require_frames(self, features: Sequence[str]) -> None:
-        """Checks that every data file has the columns of some features.
 
-        Raises:
-            FileFormatError: a file is no complete Parquet file, or lacks a column.
-        """
-        for path in self.data_files:
-            missing = [name for name in features if name not in column_types(path)]
-            if missing:
-                raise FileFormatError(path, "the columns of this task", f"none named {', '.join(missing)}")
+def data_files(root: Path) -> list[Path]:
+    """The Parquet files of frames, in the order of their paths."""
+    return visible_files(root / "data", "*.parquet")
 
 
 def read_episodes(root: Path) -> pa.Table:
@@ -136,7 +173,7 @@ def read_episodes(root: Path) -> pa.Table:
         FileFormatError: no file, one that is no complete Parquet file, or files that do not fit together.
     """
     folder = root / EPISODES_FOLDER
-    files = visible_files(folder, "*.parquet")
+    files = episode_files(root)
     if not files:
         raise FileFormatError(root, "a LeRobot data set with episodes under meta/episodes", "none")
     tables = []

@@ -1,6 +1,7 @@
 """`meta/info.json` of a LeRobot v3 data set, and what a folder is that has none."""
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
@@ -89,13 +90,24 @@ def read_info(root: Path) -> dict[str, Any]:
     return info
 
 
+def episode_files(root: Path) -> list[Path]:
+    """The files of meta/episodes, in the order of their paths."""
+    return visible_files(root / EPISODES_FOLDER, "*.parquet")
+
+
+def split_range(text: object) -> range | None:
+    """The episodes of a split, FIRST:END as in `meta/info.json`; None for another form."""
+    match = re.fullmatch(r"(\d+):(\d+)", str(text))
+    return range(int(match[1]), int(match[2])) if match else None
+
+
 def require_episodes(root: Path, info: dict[str, Any]) -> None:
     """Refuses a data set into which nothing was recorded yet.
 
     Raises:
         FileFormatError: a data set that says of itself that it has no episode, and has none.
     """
-    if info["total_episodes"] == 0 and not visible_files(root / EPISODES_FOLDER, "*.parquet"):
+    if info["total_episodes"] == 0 and not episode_files(root):
         raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
 
 

@@ -12,6 +12,7 @@ from ..files.json_file import read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, STATS_FILE, TASKS_FILE
 from .folder import POSITIONS, LeRobotFolder
+from .info import episode_files
 from .references import (
     data_path,
     read_tasks,
@@ -209,7 +210,7 @@ def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True
 
 def episode_statistics_problems(root: Path) -> Iterator[Problem]:
     """Columns `stats/...` of meta/episodes that hold something else than lists of numbers, which joining reads."""
-    for path in visible_files(root / EPISODES_FOLDER, "*.parquet"):
+    for path in episode_files(root):
         names = [name for name, kind in column_types(path).items() if name.startswith("stats/") and _flat(kind)]
         table = read_parquet(path, names)
         for name in names:

@@ -1,7 +1,8 @@
-"""What a LeRobot data set refers to: tasks by number, files by template, pictures by time."""
+"""What a LeRobot data set refers to: tasks by number, files by number and template, pictures by time."""
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,12 @@ DATA_TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_TEMPLATE = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 _TASK_NAMES = ("task", "__index_level_0__")
 """pandas calls an index without a name so, and LeRobot before 0.4 left it without one."""
+
+
+Place = tuple[int, int]
+"""Numbers of a chunk and of a file in it."""
+_NAME = r"chunk-(\d+)/file-(\d+)\."
+_FILES_IN_A_CHUNK = 1000  # LeRobot's, where meta/info.json does not say
 
 
 def read_tasks(root: Path) -> dict[int, str]:
@@ -121,3 +128,24 @@ def _filled(name: str, template: Any, row: Mapping[str, Any], columns: str, keys
     if Path(filled).is_absolute() or ".." in Path(filled).parts or "\0" in filled:
         raise ValueError(f"{name} {template!r} in meta/info.json leads out of the data set")
     return filled
+
+
+def numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
+    """The path of a numbered file."""
+    return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
+
+
+def numbered_files(folder: Path, suffix: str = "parquet") -> dict[Place, Path]:
+    """The numbered files of a folder, in the order of their numbers; files of other names are passed over."""
+    found = ((re.fullmatch(_NAME + suffix, path.relative_to(folder).as_posix()), path) for path in folder.glob("*/*"))
+    return dict(sorted(((int(match[1]), int(match[2])), path) for match, path in found if match))
+
+
+def next_place(place: Place | None, info: dict[str, Any]) -> Place:
+    """The numbers after some numbers; the first ones for None."""
+    if place is None:
+        return 0, 0
+    chunk, file = place
+    size = info.get("chunks_size")
+    full = file + 1 >= (size if isinstance(size, int) and size > 0 else _FILES_IN_A_CHUNK)
+    return (chunk + 1, 0) if full else (chunk, file + 1)

@@ -7,14 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, get_args
 
-from ..episode import (
-    EPISODE_COLUMNS,
-    LATER_DEFAULTS,
-    SET_COLUMNS,
-    EpisodeMeta,
-    Source,
-    termination_reasons,
-)
+from ..episode import EPISODE_COLUMNS, SET_COLUMNS, UNKNOWN_VALUES, EpisodeMeta, Source, termination_reasons
 from ..exceptions import InvalidValueError
 from ..task import PairTask, TaskSpec
 
@@ -102,7 +95,7 @@ def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
 def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:
     """The texts of some columns; `true` and `false` for a bool, the shortest exact digits for a float."""
     values = {name: getattr(meta, name) for name in columns}
-    said = (name for name in columns if name not in SET_COLUMNS or values[name] != LATER_DEFAULTS[name])
+    said = (name for name in columns if name not in SET_COLUMNS or values[name] != UNKNOWN_VALUES[name])
     return {name: _encode(values[name]) for name in said}
 
 

@@ -106,7 +106,9 @@ def recorded_task(path: Path) -> PairTask:
         return get_task(name)
     except UnknownNameError:
         installed = ", ".join(installed_tasks())
-        raise ForeignRecordingError(path, f"a recording of a task that is installed ({installed})", name) from None
+        raise ForeignRecordingError(
+            path, f"a recording of a task that is installed ({installed})", f"one of {name!r}"
+        ) from None
 
 
 def read_metadata(path: Path | str) -> dict[str, dict[str, str]]:

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..command_line.commands import progress
-from .activity import activity_statistics
 from .energy_distance import energy_statistics
 from .estimate import rounded
-from .forces import force_statistics
+from .forces import activity_statistics, force_statistics
 from .human_routes import human_distance, human_route_entropy
 from .leadership import leadership_statistics
 from .neighbours import neighbour_statistics

@@ -5,18 +5,13 @@ from collections import Counter
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.metrics import adjusted_rand_score
+from sklearn.mixture import GaussianMixture
 
-from ..exceptions import MissingExtraError
 from .estimate import Estimate
 from .route_entropy import routes_taken
 from .trajectories import Trajectories
-
-try:
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.metrics import adjusted_rand_score
-    from sklearn.mixture import GaussianMixture
-except ModuleNotFoundError:
-    raise MissingExtraError("scikit-learn") from None
 
 POINTS = 20
 """Points, evenly spaced in arc length, that stand for a path."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
+from ..lerobot_folder.info import split_range
 from ..lerobot_folder.tables import feature_values, read_parquet
 from .trajectories import EpisodeRow, Trajectories
 
@@ -70,7 +71,8 @@ def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         table = read_parquet(path, (*parts, "index"))
         order.append(feature_values(table, "index", (1,), path))
         for name in parts:
-            parts[name].append(feature_values(table, name, features[name]["shape"], path))
+            shape = features[name]["shape"]
+            parts[name].append(feature_values(table, name, shape, path).reshape(-1, *shape))
     places = np.concatenate(order)
     if len(places) != sum(lengths) or not np.array_equal(np.sort(places), np.arange(len(places))):
         raise FileFormatError(root / "data", f"{sum(lengths)} frames with index 0, 1, ..., each once", f"{len(places)}")
@@ -96,7 +98,7 @@ def _splits(splits: Mapping[str, str], episodes: int) -> list[str]:
     """Name of the split of each episode, from `{"train": "0:80", "test": "80:100"}`; empty where none has it."""
     names = [""] * episodes
     for name, span in splits.items():
-        first, _, last = str(span).partition(":")
-        if first.isdecimal() and last.isdecimal():
-            names[int(first) : min(int(last), episodes)] = [name] * max(0, min(int(last), episodes) - int(first))
+        numbers = split_range(span) or range(0)
+        for episode in range(numbers.start, min(numbers.stop, episodes)):
+            names[episode] = name
     return names

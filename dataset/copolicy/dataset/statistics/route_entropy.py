@@ -3,6 +3,7 @@
 from collections import Counter
 
 import numpy as np
+from scipy.stats import binomtest
 
 from copolicy.tasks.table.routes import route_class, winding
 
@@ -85,7 +86,9 @@ def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
         entry["episodes"] += 1
         entry["left"] = [left + (letter == "L") for left, letter in zip(entry["left"], word, strict=True)]
     for entry in sides.values():
-        entry["left_interval"] = [_wilson(left, entry["episodes"]) for left in entry["left"]]
+        entry["left_interval"] = [
+            binomtest(left, entry["episodes"]).proportion_ci(method="wilson") for left in entry["left"]
+        ]
     return Estimate(
         len(taken),
         "episodes",
@@ -163,11 +166,3 @@ def _pooled_entropy(data: Trajectories, taken: dict[int, str], rng: np.random.Ge
         note="one value a number of obstacles, in details",
         details=details,
     )
-
-
-def _wilson(successes: int, total: int) -> tuple[float, float]:
-    """95 percent interval of a share (Wilson 1927)."""
-    z = 1.959964
-    centre = (successes + z * z / 2) / (total + z * z)
-    half = z * np.sqrt(successes * (total - successes) / total + z * z / 4) / (total + z * z)
-    return float(max(0.0, centre - half)), float(min(1.0, centre + half))

@@ -1,18 +1,13 @@
 """Whether pairs split where they have to decide: Hartigan's dip test of the steering before the first obstacle."""
 
 import numpy as np
+from diptest import dipstat
+from diptest.consts import Consts
 from scipy.stats import false_discovery_control
 
-from ..exceptions import MissingExtraError
 from .estimate import Estimate, Null
 from .resampling import Bootstrap
 from .trajectories import Trajectories
-
-try:
-    from diptest import dipstat
-    from diptest.consts import Consts
-except ModuleNotFoundError:
-    raise MissingExtraError("diptest") from None
 
 MIN_EPISODES = 8
 """Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""

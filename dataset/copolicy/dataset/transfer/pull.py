@@ -8,7 +8,7 @@ from ..exceptions import FileFormatError, RunError
 from ..files.listing import visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER, RAW_MANIFEST_FILE
 from ..files.staging import about, require_new, sync_folder, sync_tree
-from ..hub.download import download, forget_progress, resolve
+from ..hub.repository import download, forget_progress, resolve
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.manifest import Manifest, file_entry

@@ -61,8 +61,7 @@ def _release(arguments: argparse.Namespace) -> dict:
 
 def _diff(arguments: argparse.Namespace) -> dict:
     from .difference import compare
-    from .sources import read_side
-    from .statistics import compare_statistics
+    from .sources import compare_statistics, read_side
 
     try:
         a, b = read_side(arguments.a), read_side(arguments.b)

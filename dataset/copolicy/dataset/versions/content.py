@@ -20,15 +20,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ..episode import EPISODE_COLUMNS, LATER_DEFAULTS, UNHASHED_DEFAULTS
+from ..episode import EPISODE_COLUMNS, UNHASHED_DEFAULTS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.references import read_tasks, video_span
-from .canonical import digest
-from .digests import Content, EpisodeContent
-from .frames import frame_digests
-from .videos import video_digest
+from .digests import Content, EpisodeContent, digest
+from .frames import frame_digests, video_digest
 
 _LAYOUT = ("data/", "meta/episodes/", "videos/", "stats/")
 _POSITION = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}
@@ -45,7 +43,7 @@ def read_content(root: Path) -> Content:
     folder = LeRobotFolder.open(root)
     info, rows = folder.info, _read_episodes(folder)
     tasks = read_tasks(root)
-    frames = frame_digests(root, info, [row["length"] for row in rows], tasks)
+    frames = frame_digests(folder, tasks)
     episodes = tuple(_episode(root, info, row, features) for row, features in zip(rows, frames, strict=True))
     return Content(
         float(info["fps"]),
@@ -66,7 +64,7 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
         for name, value in row.items()
         if name not in _POSITION
         and not name.startswith(_LAYOUT)
-        and (name not in UNHASHED_DEFAULTS or value not in (None, LATER_DEFAULTS[name]))
+        and (name not in UNHASHED_DEFAULTS or value not in (None, UNKNOWN_VALUES[name]))
     }
     return EpisodeContent(
         row["episode_uuid"],

@@ -1,5 +1,6 @@
-"""Digests of the frames of a data set: one for every episode and feature, blind to how files are cut."""
+"""Digests of the frames of a data set: one for every episode and feature or video, blind to how files are cut."""
 
+import functools
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -7,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..exceptions import FileFormatError
-from ..files.listing import visible_files
+from ..exceptions import FileFormatError, MissingExtraError
 from ..files.meta_files import INFO_FILE, TASKS_FILE
+from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.tables import column_types, feature_values, read_parquet
-from .canonical import encode
+from .digests import encode
 
 POSITION_COLUMNS = ("index", "episode_index")
 """Frame columns that only say where a frame stands; verified instead of hashed, as a merge moves them."""
 
 
-def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[int, str]) -> list[dict[str, str]]:
+def frame_digests(folder: LeRobotFolder, tasks: dict[int, str]) -> list[dict[str, str]]:
     """For each episode the sha256 of each of its features but the positions and videos.
 
     Numbers are hashed as little-endian values of the feature's declared type, row by row, with one NaN for all;
@@ -25,17 +26,13 @@ def frame_digests(root: Path, info: dict, lengths: Sequence[int], tasks: dict[in
     at a time.
 
     Args:
-        info: `meta/info.json`.
-        lengths: frames of each episode, in order.
         tasks: sentence of each task's number.
 
     Raises:
         FileFormatError: files that contradict the features, the lengths, or the order of the frames.
     """
-    files = visible_files(root / "data", "*.parquet")
-    if not files:
-        raise FileFormatError(root, "at least one Parquet file under data", "none")
-    features = {name: feature for name, feature in info["features"].items() if feature["dtype"] != "video"}
+    root, files, lengths = folder.root, folder.data_files, folder.lengths
+    features = {name: feature for name, feature in folder.info["features"].items() if feature["dtype"] != "video"}
     for path in files:
         names = column_types(path)
         if set(names) != set(features):
@@ -112,3 +109,47 @@ def _numbers(files: Sequence[Path], name: str, dtype: str, shape: Sequence[int])
 def _values(files: Sequence[Path], name: str) -> list[Any]:
     """A column of texts or pictures over all files."""
     return [value for path in files for value in read_parquet(path, [name]).column(name).to_pylist()]
+
+
+def video_digest(path: Path, start: float, end: float, fps: float) -> str:
+    """The sha256 of the encoded pictures shown in [start, end) of a file, s.
+
+    The packets are hashed as they are, without decoding: joining videos copies them, encoding anew does not.
+
+    Raises:
+        FileFormatError: no video file.
+        MissingExtraError: PyAV is not installed.
+    """
+    total = hashlib.sha256()
+    half = 0.5 / fps  # times in containers are rounded
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise FileFormatError(path, "a video", error.strerror or str(error)) from None
+    for time, packet in _packets(path, (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)):
+        if start - half <= time < end - half:
+            total.update(packet)
+    return total.hexdigest()
+
+
+@functools.lru_cache(maxsize=4)
+def _packets(path: Path, _: tuple[int, ...]) -> tuple[tuple[float, bytes], ...]:
+    """Time and sha256 of every packet of the first video stream, in the order they are shown.
+
+    Args:
+        _: state of the file: another file may take its place while the program runs.
+    """
+    try:
+        import av
+        from av.error import FFmpegError
+    except ModuleNotFoundError:
+        raise MissingExtraError("av") from None
+    packets = []
+    try:
+        with av.open(str(path)) as container:
+            for packet in container.demux(container.streams.video[0]):
+                if packet.pts is not None and packet.time_base is not None and packet.size:
+                    packets.append((float(packet.pts * packet.time_base), hashlib.sha256(bytes(packet)).digest()))
+    except (FFmpegError, IndexError, OSError) as error:
+        raise FileFormatError(path, "a video", str(error) or "no picture") from None
+    return tuple(sorted(packets))

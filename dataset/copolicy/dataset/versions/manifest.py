@@ -11,7 +11,7 @@ from ..exceptions import FileFormatError
 from ..files.json_file import parse_json, read_json
 from ..files.listing import is_hidden, visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER
-from .canonical import digest
+from .digests import digest
 
 _SCHEMA = "copolicy-manifest-1"
 _WHAT = f"a manifest ({_SCHEMA})"

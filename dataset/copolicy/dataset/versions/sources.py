@@ -1,5 +1,6 @@
-"""What `copolicy-dataset diff` compares: a folder, a release of a folder, or a revision on the Hub."""
+"""What `copolicy-dataset diff` compares: a folder, a release of a folder, or a revision on the Hub; with statistics."""
 
+import math
 import re
 import tempfile
 from dataclasses import dataclass
@@ -7,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ..exceptions import FileFormatError
+from ..files.json_file import read_json
+from ..files.meta_files import STATISTICS_FILE
 from ..publication.data_version import TAG_PREFIX
 from .content import read_content
 from .digests import Content
 from .release_record import read_release
-from .statistics import read_statistics
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,47 @@ def read_side(text: str) -> Side:
         return Side(text, record.content, None, record.content_hash)
     if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
         from ..files.meta_files import RAW_FOLDER
-        from ..hub.download import download, resolve
+        from ..hub.repository import download, resolve
 
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder) / "data_set"
             download(name, root, resolve(name, revision or None)[1], skip=f"{RAW_FOLDER}/*")
             return Side(text, read_content(root), read_statistics(root))
     raise FileFormatError(text, f"a folder, FOLDER@{TAG_PREFIX}x.y.z, or U/N[@REVISION] on the Hub", "none of them")
+
+
+def read_statistics(root: Path) -> dict[str, Any] | None:
+    """The stored statistics of a folder by the path of each value, `None` where there are none.
+
+    Raises:
+        FileFormatError: a file that is no JSON object.
+    """
+    path = root / STATISTICS_FILE
+    if not path.exists():
+        return None
+    return dict(_flat(read_json(path, dict, "statistics of copolicy-dataset stats")))
+
+
+def compare_statistics(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """For each value that differs, before and after; `None` where one side lacks it."""
+    names = [*before, *(name for name in after if name not in before)]
+    return {
+        name: (before.get(name), after.get(name)) for name in names if not _equal(before.get(name), after.get(name))
+    }
+
+
+def _flat(value: Any, name: str = ""):
+    if isinstance(value, dict) and value:
+        for key, item in value.items():
+            yield from _flat(item, f"{name}.{key}" if name else str(key))
+    elif isinstance(value, list) and any(isinstance(item, (dict, list)) for item in value):
+        for place, item in enumerate(value):
+            yield from _flat(item, f"{name}[{place}]")
+    else:
+        yield name, value
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b):
+        return True
+    return a == b

@@ -123,8 +123,7 @@ def _add_summarise(steps: argparse._SubParsersAction) -> None:
 def _plan(arguments: argparse.Namespace) -> dict:
     from ..partner_study.command import split_name
     from ..partner_study.configurations import study_configurations
-    from .latin_square import williams_square
-    from .plan import Robot, make_plan
+    from .plan import Robot, make_plan, williams_square
 
     require_new(arguments.out, overwrite=arguments.overwrite)
     chosen = get_task().scenario_set(arguments.maps)

@@ -18,8 +18,6 @@ from copolicy.dataset.task import get_task
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from .latin_square import williams_square
-
 _VERSION = 1
 _WHAT = "a plan of copolicy-eval human plan"
 
@@ -220,3 +218,17 @@ def _digest(plan: StudyPlan) -> str:
             if not one[later]:
                 del one[later]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]
+
+
+def williams_square(count: int) -> list[list[int]]:
+    """Williams' design (1949): rows are orders of `count` conditions, one for each participant in turn.
+
+    With an even number, one square of `count` rows; with an odd one, that square and its mirror image.
+    """
+    first = [0]
+    low, high = 1, count - 1
+    while len(first) < count:
+        first.append(low if len(first) % 2 else high)
+        low, high = (low + 1, high) if len(first) % 2 == 0 else (low, high - 1)
+    square = [[(condition + row) % count for condition in first] for row in range(count)]
+    return square if count % 2 == 0 or count == 1 else square + [row[::-1] for row in square]

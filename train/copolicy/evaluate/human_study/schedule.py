@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.collect.agents import PolicyController
-from copolicy.collect.agents.policy import JointPlanner
+from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.play.settings import PlaySettings
 from copolicy.collect.session import Balance, Counts
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
 
 from .plan import PlannedTrial, StudyPlan
 
@@ -30,11 +27,11 @@ class StudySettings(PlaySettings):
     plan: StudyPlan = field(kw_only=True)
 
     @property
-    def physics(self) -> Physics:
+    def physics(self) -> Any:
         """The plan's."""
         return self.plan.physics
 
-    def map_configs(self) -> tuple[MapConfig, ...]:
+    def map_configs(self) -> tuple[Any, ...]:
         """The plan's starts."""
         return self.plan.configurations
 
@@ -43,67 +40,71 @@ class StudySettings(PlaySettings):
         return {"study_plan": self.plan.plan_id, "participant": self.pair}
 
 
-class BlindPlanner:
-    """Several robots behind one name: which of them plans changes between episodes, and nothing tells which it is.
-
-    Attributes:
-        frames: observations that the present one plans from.
-    """
+class BlindPolicy:
+    """Several robots behind one name: which of them acts changes between episodes, and nothing tells which it is."""
 
     name = CODE_PREFIX
 
-    def __init__(self, planners: Mapping[str, JointPlanner], actions_per_plan: int):
-        self.actions_per_plan = actions_per_plan
-        self._planners = dict(planners)
-        self._present = next(iter(self._planners.values()))
-        self.frames = self._present.frames
+    def __init__(self, policies: Mapping[str, Policy], n_action_steps: int):
+        self.n_action_steps = n_action_steps
+        self._policies = dict(policies)
+        self._present = next(iter(self._policies.values()))
         self._lock = threading.Lock()
 
     def choose(self, robot: str) -> None:
         """Puts a robot in charge, from the next episode on."""
-        with self._lock:  # a plan that is still being made belongs to the episode before
-            self._present = self._planners[robot]
-            self.frames = self._present.frames
+        with self._lock:  # a chunk that is still being made belongs to the episode before
+            self._present = self._policies[robot]
+
+    @property
+    def n_obs_steps(self) -> int:
+        """Frames of history that the present one wants."""
+        return self._present.n_obs_steps
+
+    @property
+    def keeps_history(self) -> bool:
+        """The present one remembers frames itself."""
+        return self._present.keeps_history
 
     @property
     def fps(self) -> int:
-        """Frames a second of the present one's plans."""
+        """Frames a second of the present one's actions."""
         return self._present.fps
 
-    def seed(self, seed: int) -> None:
-        """Sets the source of noise."""
+    def reset(self, seed: int) -> None:
+        """Begins an episode of the present one."""
         with self._lock:
-            self._present.seed(seed)
+            self._present.reset(seed)
 
-    def plan(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        """Plans with the present one."""
+    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+        """Predicts with the present one."""
         with self._lock:
-            return self._present.plan(history)
+            return self._present.predict_action_chunk(observations)
 
 
 class StudySchedule(Balance):
     """Plays a participant's trials in their order; a discarded one comes again at once, the seats never change."""
 
-    def __init__(self, plan: StudyPlan, participant: str, planner: BlindPlanner, controller: PolicyController):
+    def __init__(self, plan: StudyPlan, participant: str, policy: BlindPolicy, agent: PolicyAgent):
         self._plan = plan
         self._participant = participant
         self._trials = plan.of(participant)
-        self._planner = planner
-        self._controller = controller
+        self._policy = policy
+        self._agent = agent
         super().__init__(plan.configurations, len(self._trials), plan.seed, participant, swap=False)
 
-    def next(self, counts: Counts) -> tuple[MapConfig, int]:
+    def next(self, counts: Counts) -> tuple[Any, int]:
         """Start and seats of the next trial; puts its robot in charge."""
         trial = self._trials[min(counts.kept_here.total(), len(self._trials) - 1)]
         return self._play(trial, trial.code), 0
 
-    def practice(self, number: int) -> MapConfig:
+    def practice(self, number: int) -> Any:
         """A trial to get used to the stick: one robot after the other, on the participant's own starts."""
         blocks = list({trial.block: trial for trial in reversed(self._trials)}.values())[::-1]
         return self._play(blocks[number % len(blocks)], "practice")
 
-    def _play(self, trial: PlannedTrial, code: str) -> MapConfig:
-        self._planner.choose(trial.robot)
-        self._controller.name = f"{CODE_PREFIX}:{self._plan.plan_id}:{self._participant}:{code}"
-        self._controller.latencies.clear()  # the recording tells those of its own episode
+    def _play(self, trial: PlannedTrial, code: str) -> Any:
+        self._policy.choose(trial.robot)
+        self._agent.name = f"{CODE_PREFIX}:{self._plan.plan_id}:{self._participant}:{code}"
+        self._agent.latencies.clear()  # the recording tells those of its own episode
         return self._plan.configurations[trial.configuration]

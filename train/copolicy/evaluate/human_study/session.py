@@ -5,14 +5,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from copolicy.collect.agents import PolicyController
-from copolicy.collect.agents.checkpoint import Checkpoint
+from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.train.checkpoint import Checkpoint
 
 from .plan import StudyPlan, weights_digest
-from .schedule import BlindPlanner, StudySchedule, StudySettings
+from .schedule import BlindPolicy, StudySchedule, StudySettings
 
 _PLACEHOLDER = PilotSpec("scripted", "S01")  # sits at the robot's seat until the robots of the plan take over
 
@@ -50,12 +50,12 @@ def run_session(
     robots: dict[str, Checkpoint] = {}
     load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
     with prepared(settings, load) as application, ExitStack() as stack:
-        planner = BlindPlanner(robots, plan.actions_per_plan)
-        controller = PolicyController(planner)
-        stack.callback(controller.close)
+        policy = BlindPolicy(robots, plan.actions_per_plan)
+        agent = PolicyAgent(policy, real_time=True)
+        stack.callback(agent.close)
         game = application.game
-        game.players[0].controller = controller
-        game.balance = StudySchedule(plan, participant, planner, controller)
+        game.players[0].agent = agent
+        game.balance = StudySchedule(plan, participant, policy, agent)
         with stopped_by_signals(game):
             application.run()
         return {"participant": participant, "plan": plan.plan_id, **application.summary()}
@@ -74,5 +74,5 @@ def load_robots(plan: StudyPlan, device: str = "cpu") -> Mapping[str, Checkpoint
             raise FileFormatError(
                 robot.checkpoint, f"the plan's weights {robot.weights_sha256[:12]}", f"weights {found[:12]}"
             )
-        robots[robot.name] = Checkpoint(robot.checkpoint, device=device, settings=plan.settings)
+        robots[robot.name] = Checkpoint(robot.checkpoint, device, plan.settings)
     return robots

@@ -1,9 +1,10 @@
 """`copolicy-eval partner`."""
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, whole_number
@@ -11,10 +12,9 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import get_task
-from copolicy.tasks.table.agents.partners import PARTNERS
 
 from ..result_file import write_json
-from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs, study_settings
+from ..study_flags import add_study_flags, policy_of, protocol_of, study_needs, study_settings
 
 if TYPE_CHECKING:
     from .robots import Robot
@@ -27,6 +27,7 @@ LABEL = (
 
 def add_partner_command(commands: argparse._SubParsersAction) -> None:
     """Adds `partner` to the commands of `copolicy-eval`."""
+    kinds = _profiles()
     command = add_command(
         commands,
         "partner",
@@ -53,7 +54,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         help="starts: a quarter as many maps, spread over the set, each in four orientations (default: 60)",
     )
     command.add_argument(
-        "--partners", nargs="+", default=list(PARTNERS), metavar="KIND", help=f"of {', '.join(PARTNERS)} (default: all)"
+        "--partners", nargs="+", default=list(kinds), metavar="KIND", help=f"of {', '.join(kinds)} (default: all)"
     )
     command.add_argument(
         "--repeats",
@@ -77,9 +78,10 @@ def _partner(arguments: argparse.Namespace) -> dict:
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     partners = list(dict.fromkeys(arguments.partners))
+    profiles = _profiles()
     for kind in partners:
-        if kind not in PARTNERS:
-            raise UnknownNameError("kind of partner", kind, PARTNERS)
+        if kind not in profiles:
+            raise UnknownNameError("kind of partner", kind, profiles)
     chosen = get_task().scenario_set(arguments.maps)
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .configurations import study_configurations
@@ -92,11 +94,11 @@ def _partner(arguments: argparse.Namespace) -> dict:
     names = [robot.name for robot in robots]
     if len(set(names)) < len(names):
         raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
-    policies = [(robot.name, robot.planner.checkpoint.conditions) for robot in robots if robot.planner is not None]
+    policies = [(robot.name, robot.policy.conditions) for robot in robots if robot.policy is not None]
     protocol = protocol_of(arguments, policies)
     # Each policy plans at its own rate; a scripted robot acts at every step of the world.
     rates = [
-        protocol.fps if arguments.fps is not None or robot.planner is None else robot.planner.fps for robot in robots
+        protocol.fps if arguments.fps is not None or robot.policy is None else robot.policy.fps for robot in robots
     ]
     found = []
     episodes = len(maps) * len(partners) * arguments.repeats
@@ -111,12 +113,10 @@ def _partner(arguments: argparse.Namespace) -> dict:
                 fps=fps,
                 seed=arguments.seed,
                 partner_seed=arguments.partner_seed,
-                on_frame=lambda finished, done=place * episodes: bar.update(done + finished - bar.n),
+                on_step=lambda finished, done=place * episodes: bar.update(done + finished - bar.n),
             )
             found.append(outcomes)
-    summaries = [
-        summarise_with_partners(outcomes, robot.planner) for robot, outcomes in zip(robots, found, strict=True)
-    ]
+    summaries = [summarise_with_partners(outcomes, robot.policy) for robot, outcomes in zip(robots, found, strict=True)]
     described = [
         {
             "name": robot.name,
@@ -138,7 +138,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
             "map_count": len(maps),
             "complete_set": len(maps) == len({config.digest for config in get_task().turned(chosen).scenarios}),
             "orientations": True,
-            "partners": {kind: asdict(PARTNERS[kind]) for kind in partners},
+            "partners": {kind: asdict(profiles[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
             **study_settings(arguments, protocol),
@@ -171,13 +171,19 @@ def make_robot(text: str, arguments: argparse.Namespace) -> "Robot":
         FileFormatError: no such checkpoint.
         InvalidValueError: it plans fewer actions than are to be executed.
     """
-    from .robots import SCRIPTED_ROBOTS, PolicyRobot
+    from .robots import policy_robot, scripted_robots
 
-    if text in SCRIPTED_ROBOTS:
-        return SCRIPTED_ROBOTS[text]()
+    scripted = scripted_robots(get_task())
+    if text in scripted:
+        return scripted[text]
     name, path = split_name(text)
-    planner = planner_of(path, arguments)
-    return PolicyRobot(name or planner.checkpoint.name, planner, arguments.actions_per_plan)
+    policy = policy_of(path, arguments)
+    return policy_robot(name or policy.name, policy)
+
+
+def _profiles() -> Mapping[str, Any]:
+    agents = get_task().agents
+    return {} if agents is None else agents.partners
 
 
 def split_name(text: str) -> tuple[str, str]:

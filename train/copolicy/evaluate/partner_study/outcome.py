@@ -17,6 +17,12 @@ DEADLOCK_S = 1.0
 """A table that stands for so long on end, while the episode runs, is in a deadlock."""
 
 
+def stands(states: np.ndarray) -> np.ndarray:
+    """`(T,)` whether the table stands in recorded states `(T, 6)`."""
+    vx, vy, omega = states[:, 3:].T
+    return (vx * vx + vy * vy < STILL_SPEED**2) & (np.abs(omega) < STILL_SPIN)
+
+
 @dataclass(frozen=True)
 class PartnerOutcome(Outcome):
     """One episode of a robot with a simulated partner.

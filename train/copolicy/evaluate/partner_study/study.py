@@ -1,27 +1,32 @@
-"""The loop: all tables side by side, thirty steps a second, one call of the policy for all of them a frame."""
+"""A robot with every kind of partner from every start, all episodes side by side."""
 
+import zlib
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from copolicy.dataset.clock import stride
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
+import numpy as np
 
-from .outcome import PartnerOutcome
+from copolicy.collect.agents import ScriptedAgent
+from copolicy.collect.agents.scripted import simulated_players
+from copolicy.collect.rollout import Rollout, Trace
+from copolicy.dataset.task import get_task
+
+from ..coplan.rollouts import measured
+from .outcome import PartnerOutcome, stands
 from .robots import Robot
-from .table import PartnerTable
 
 
 def carry_with_partners(
     robot: Robot,
-    maps: Sequence[MapConfig],
+    maps: Sequence[Any],
     partners: Sequence[str],
-    physics: Physics,
+    physics: Any,
     *,
     repeats: int = 1,
     fps: int = 10,
     seed: int = 0,
     partner_seed: int = 0,
-    on_frame: Callable[[int], object] = lambda finished: None,
+    on_step: Callable[[int], object] = lambda finished: None,
 ) -> list[PartnerOutcome]:
     """Lets a robot carry the table with every kind of partner from every start.
 
@@ -34,28 +39,47 @@ def carry_with_partners(
         fps: rate of the data set that the policy was trained on.
         seed: of the robot's random numbers.
         partner_seed: of the partners'; equal ones give every robot the same partners.
-        on_frame: called after each frame with the number of finished episodes.
+        on_step: called after each step with the number of finished episodes.
 
     Returns:
         One outcome for each map, kind and repeat, in that order.
     """
-    steps = stride(fps)
-    tables = [
-        PartnerTable(index, config, partner, repeat, physics, partner_seed, robot.frames)
+    task = get_task()
+    players = simulated_players(task)
+    episodes = [
+        (index, config, kind, repeat)
         for index, config in enumerate(maps)
-        for partner in partners
+        for kind in partners
         for repeat in range(repeats)
     ]
-    robot.begin(tables, seed)
-    frame = 0
-    while running := [table for table in tables if table.running]:
-        for step in range(steps):
-            running = [table for table in running if table.running]
-            for table, force in zip(running, robot.act(running, frame, begins=step == 0), strict=True):
-                table.step(force)
-        for table in running:
-            if table.running:
-                table.end_frame(steps, fps)
-        frame += 1
-        on_frame(sum(not table.running for table in tables))
-    return [table.outcome() for table in tables]
+    scenarios = [config for _, config, _, _ in episodes]
+    agent = robot.agent(seed, fps)
+    partner = ScriptedAgent(
+        "partner", lambda seat, index, start: players.make_partner(start.scenario, episodes[index][2], start.seed)
+    )
+    # Neither the robot nor the order of episodes is in it: every robot meets the same partner on the same start.
+    seeds = [_seed(partner_seed, config, repeat) for _, config, _, repeat in episodes]
+    rollout = Rollout(task, scenarios, (agent, partner), seeds=seeds, settings=physics)
+    trace = Trace(rollout.worlds)
+    rollout.observers.append(trace)
+    while len(rollout.running):
+        rollout.step()
+        on_step(len(episodes) - len(rollout.running))
+    return [
+        PartnerOutcome(
+            index,
+            config,
+            repeat,
+            *measured(rollout, trace, agent, place),
+            kind,
+            trace.actions(place),
+            stands(trace.states(place)[1:]),
+            partner.players[place].changes,
+        )
+        for place, (index, config, kind, repeat) in enumerate(episodes)
+    ]
+
+
+def _seed(partner_seed: int, config: Any, repeat: int) -> int:
+    entropy = [partner_seed, zlib.crc32(config.digest.encode()), repeat]
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])

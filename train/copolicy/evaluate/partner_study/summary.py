@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from copolicy.dataset.task import RECORD_HZ
 
 from ..comparison.paired import BOOTSTRAP, episode_values, paired_differences
-from ..planner import Planner
 from ..summary import summarise
 from .outcome import DEADLOCK_S, STILL_SPEED, STILL_SPIN, PartnerOutcome
+
+if TYPE_CHECKING:
+    from copolicy.train.checkpoint import Checkpoint
 
 DEFINITIONS = {
     "success": "share of episodes that touch the goal; standard error binomial, over episodes of one training",
@@ -26,7 +28,7 @@ DEFINITIONS = {
 }
 
 
-def summarise_with_partners(outcomes: Sequence[PartnerOutcome], planner: Planner | None) -> dict[str, Any]:
+def summarise_with_partners(outcomes: Sequence[PartnerOutcome], policy: "Checkpoint | None") -> dict[str, Any]:
     """The summary of `eval.json`: that of co-planning, and what concerns the partner, in all and for each kind."""
     by_partner: dict[str, list[PartnerOutcome]] = {}
     by_orientation: dict[int, list[PartnerOutcome]] = {}
@@ -34,7 +36,7 @@ def summarise_with_partners(outcomes: Sequence[PartnerOutcome], planner: Planner
         by_partner.setdefault(outcome.partner, []).append(outcome)
         by_orientation.setdefault(round(math.degrees(outcome.map_config.start[2])) % 360, []).append(outcome)
     return {
-        **summarise(outcomes, planner),
+        **summarise(outcomes, policy),
         **_with_partner(outcomes),
         "by_partner": {kind: _short(part) for kind, part in by_partner.items()},
         "by_orientation_deg": {

@@ -13,7 +13,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import RECORD_HZ, get_task
 
-from ..study_flags import add_study_flags, planner_of, protocol_of, study_needs
+from ..study_flags import add_study_flags, policy_of, protocol_of, study_needs
 
 if TYPE_CHECKING:
     from .sampling import Decision
@@ -63,15 +63,14 @@ def _plans(arguments: argparse.Namespace) -> dict:
     from .figure import save_plans
     from .sampling import sample_plans
 
-    planner = planner_of(arguments.policy, arguments)
-    protocol = protocol_of(arguments, [(str(arguments.policy), planner.checkpoint.conditions)])
+    policy = policy_of(arguments.policy, arguments)
+    protocol = protocol_of(arguments, [(str(arguments.policy), policy.conditions)])
     decision = sample_plans(
-        planner,
+        policy,
         maps[arguments.map],
         protocol.physics,
         samples=arguments.samples,
         seconds=arguments.seconds,
-        actions_per_plan=arguments.actions_per_plan,
         fps=protocol.fps,
         seed=arguments.seed,
     )
@@ -86,7 +85,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     )
     return {
         "map": map_id,
-        "map_set": chosen.describe(),
+        **({"map_set": chosen.describe()} if chosen.from_file else {}),
         "seconds": seconds,
         "samples": len(decision.samples),
         "fps": protocol.fps,

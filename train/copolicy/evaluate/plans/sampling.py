@@ -1,18 +1,19 @@
 """Many plans from one state: which ways does a co-policy see there?"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from copolicy.collect.agents import PolicyAgent, RecordedAgent
+from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.task import RECORD_HZ, World, get_task
 from copolicy.tasks.table.routes import route_class
 
-from ..coplan.rollouts import Outcome, PlannedTable, carry_on, histories
-from ..planner import Planner
+from ..coplan.rollouts import Outcome, measured, together
 
 
 @dataclass(frozen=True)
@@ -44,78 +45,79 @@ class Decision:
         way: `(steps + 1, 2)` how the table came there from the map's start, px.
     """
 
-    map_config: MapConfig
+    map_config: Any
     pose: tuple[float, float, float]
     way: np.ndarray
     samples: tuple[PlanSample, ...]
 
 
 def sample_plans(
-    planner: Planner,
-    config: MapConfig,
-    physics: Physics,
+    policy: Any,
+    config: Any,
+    physics: Any,
     *,
     samples: int,
     seconds: float = 0.0,
-    actions_per_plan: int = 8,
-    fps: int = 10,
+    fps: int | None = None,
     seed: int = 0,
 ) -> Decision:
     """Samples plans in one state and lets the policy carry on from each, as in co-planning.
 
     Args:
+        policy: whose `wanted` actions of a chunk are predicted everywhere else than in that state.
         samples: number of plans.
         seconds: how long the policy carries before, to the nearest frame.
-        actions_per_plan: actions executed before the next plan.
-        fps: rate of the data set that the policy was trained on.
+        fps: rate at which its actions are held; that of the data set that it was trained on if None.
 
     Raises:
-        RunError: the episode ended before `seconds`.
+        RunError: the episode ended before `seconds`, or the policy cannot go on from there in several ways.
     """
+    fps = policy.fps if fps is None else fps
     hold = clock.stride(fps)
-    planner.seed(seed)
-    table = _carried(planner, PlannedTable(0, config, 0, physics, planner.frames), round(seconds * fps), hold,
-                     actions_per_plan)  # fmt: skip
-    tables = [table.branch(number) for number in range(samples)]
-    planner.actions, wanted = None, planner.actions
-    plans = planner.plan(histories(tables))
-    planner.actions = wanted
-    planned_paths = []
-    for branch, plan in zip(tables, plans, strict=True):
-        planned_paths.append(_path_of(table, plan, hold))
-        branch.plans += 1
-        _execute(branch, plan[:actions_per_plan], hold)
-    carry_on(planner, tables, actions_per_plan, hold)
+    agent = PolicyAgent(policy, get_task(), fps=fps, seed=seed)
+    rollout, trace = together(agent, [config], physics)
+    rollout.run(round(seconds * fps) * hold)
+    if rollout.outcomes[0].done:
+        raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / RECORD_HZ:.1f} s")
+    if seconds and policy.keeps_history:
+        raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
+    here = rollout.worlds[0]
+    agent = agent.branch(samples)
+    branch = _branched(here, (agent, agent.other_half()), [config] * samples, physics, trace)
+    policy.wanted, wanted = None, policy.wanted
+    branch.step()
+    policy.wanted = wanted
+    plans = list(agent.predicted)
+    paths = _paths_of(here, plans, [config] * samples, physics, hold)
+    branch.run()
+    (whole,) = branch.observers
     return Decision(
         config,
-        table.world.pose,
-        np.array(table.path),
+        (*here.recorded[:3],),
+        trace.states(0)[:, :2],
         tuple(
-            PlanSample(plan, path, branch.result())
-            for plan, path, branch in zip(plans, planned_paths, tables, strict=True)
+            PlanSample(plan, path, Outcome(0, config, k, *measured(branch, whole, agent, k)))
+            for k, (plan, path) in enumerate(zip(plans, paths, strict=True))
         ),
     )
 
 
-def _carried(planner: Planner, table: PlannedTable, frames: int, hold: int, actions_per_plan: int) -> PlannedTable:
-    while frames > 0:
-        plan = planner.plan(histories([table]))[0][: min(frames, actions_per_plan)]
-        table.plans += 1
-        frames -= len(plan)
-        _execute(table, plan, hold)
-        if table.outcome is not None:
-            ended = (len(table.path) - 1) / RECORD_HZ
-            raise RunError(f"--seconds: expected a moment before the end, found one at {ended:.1f} s")
-    return table
+def _branched(here: World, agents: Any, configs: Sequence[Any], physics: Any, before: Trace | None) -> Rollout:
+    """A rollout that goes on from a world, in as many copies as there are maps."""
+    worlds = [get_task().make_world(config, physics) for config in configs]
+    for world in worlds:
+        world.restore(here.recorded)
+        world.step_count = here.step_count
+    trace = Trace(worlds, before)
+    return Rollout(get_task(), configs, agents, worlds=worlds, observers=[trace], begin=before is None)
 
 
-def _path_of(table: PlannedTable, plan: np.ndarray, hold: int) -> np.ndarray:
-    branch = table.branch(0)
-    _execute(branch, plan, hold)
-    return np.array(branch.path[len(table.path) - 1 :])
-
-
-def _execute(table: PlannedTable, actions: np.ndarray, hold: int) -> None:
-    for action in actions:
-        if table.outcome is None:
-            table.execute(action, hold)
+def _paths_of(
+    here: World, plans: Sequence[np.ndarray], configs: Sequence[Any], physics: Any, hold: int
+) -> list[np.ndarray]:
+    """The table's centre while each plan is executed and nothing else."""
+    actions = [np.repeat(plan, hold, axis=0) for plan in plans]
+    rollout = _branched(here, (RecordedAgent(actions), RecordedAgent(actions)), configs, physics, None)
+    rollout.run(len(actions[0]))
+    (trace,) = rollout.observers
+    return [trace.states(k)[:, :2] for k in range(len(plans))]

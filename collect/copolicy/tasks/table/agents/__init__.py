@@ -8,20 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .habits import Habits
-    from .pair_habits import PAIRS
-    from .pairs import simulated_pair
-    from .partners import PARTNERS, simulated_partner
+    from .players import scripted_robot, simulated_pair, simulated_partner
+    from .profiles import NEVER_YIELDS, PAIRS, PARTNERS, ROBOTS
     from .scripted import ScriptedPilot
 
-__all__ = ["PAIRS", "PARTNERS", "Habits", "ScriptedPilot", "simulated_pair", "simulated_partner"]
+__all__ = [
+    "NEVER_YIELDS",
+    "PAIRS",
+    "PARTNERS",
+    "ROBOTS",
+    "Habits",
+    "ScriptedPilot",
+    "scripted_robot",
+    "simulated_pair",
+    "simulated_partner",
+]
 
 _MODULES = {
-    "PAIRS": "pair_habits",
-    "PARTNERS": "partners",
     "Habits": "habits",
     "ScriptedPilot": "scripted",
-    "simulated_pair": "pairs",
-    "simulated_partner": "partners",
+    **dict.fromkeys(("scripted_robot", "simulated_pair", "simulated_partner"), "players"),
+    **dict.fromkeys(("NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS"), "profiles"),
 }
 
 

@@ -58,6 +58,11 @@ class ScriptedPilot:
         # Spin that a unit difference of the two forces across the table keeps up, rad/s.
         self._spin = physics.lever / 2 * physics.force_scale / physics.angular_damping
 
+    @property
+    def changes(self) -> int:
+        """How often it has changed its mind about the route."""
+        return self.intention.changes
+
     def act(self, state: np.ndarray) -> np.ndarray:
         """The own force `(2,)`, x and y in [-1, 1], for a state `(7,)` of the table; called once a step.
 

@@ -1,4 +1,4 @@
-"""What the table offers to policies beside the generic input. This folder alone imports torch; the task imports it late."""
+"""What the table offers to policies beside the generic input: torch modules, imported by `TableTask.features` alone."""
 
 from copolicy.dataset.task import PolicyFeatures
 

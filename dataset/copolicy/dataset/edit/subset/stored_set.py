@@ -7,8 +7,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from ...episode import EPISODE_COLUMNS
-from ...exceptions import FileFormatError, MissingExtraError
+from ...exceptions import FileFormatError
 from ...files.json_file import read_json
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from ...lerobot_folder.documents import ConversionRecord
@@ -19,11 +21,6 @@ from ...publication.minimal_card import is_minimal_card
 from ...versions.content import read_content
 from ...versions.digests import Content
 from ...versions.manifest import data_set_files
-
-try:
-    import pyarrow as pa
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
 
 _ELSEWHERE = ("data/", "meta/", "videos/", "stats/")  # columns of meta/episodes that say where an episode lies
 _PLACES = ("episode_index", "length", "dataset_from_index", "dataset_to_index", "data/chunk_index", "data/file_index")
@@ -45,7 +42,7 @@ class StoredSet:
 
     root: Path
     info: dict[str, Any]
-    episodes: "pa.Table"
+    episodes: pa.Table
     content: Content
     record: dict[str, Any]
 

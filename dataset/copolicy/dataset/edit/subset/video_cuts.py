@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...exceptions import FileFormatError, MissingExtraError
-from ...lerobot_folder.references import video_span
-from .numbered_files import Place, next_place, numbered
+from ...lerobot_folder.references import Place, next_place, numbered, video_span
 
 Row = dict[str, Any]
 _NOT_WRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

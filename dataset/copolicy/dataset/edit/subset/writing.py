@@ -7,23 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
-from ...exceptions import FileFormatError, MissingExtraError, RunError
+from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
-from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, data_file
+from ...lerobot_folder.info import split_range
+from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
 from ...lerobot_folder.tables import read_parquet
 from ...publication.minimal_card import minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
-from .numbered_files import Place, next_place, numbered
 from .stored_set import StoredSet
 from .video_cuts import cut_videos
-
-try:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
 
 _DATA_MB = 100  # LeRobot's size of a data file, where meta/info.json does not say
 _FIXED = ("count", "std")  # statistics that do not move with the values
@@ -83,10 +79,9 @@ def kept_splits(info: Mapping[str, Any], numbers: Sequence[int]) -> dict[str, st
     splits: dict[str, str] = {}
     entries = info.get("splits")
     for name, text in (entries if isinstance(entries, dict) else {}).items():
-        first, colon, end = str(text).partition(":")
-        if not (colon and first.isdecimal() and end.isdecimal()):
+        if (span := split_range(text)) is None:
             return {"train": f"0:{len(numbers)}"}
-        inside = [place for place, number in enumerate(numbers) if int(first) <= number < int(end)]
+        inside = [place for place, number in enumerate(numbers) if number in span]
         if inside:
             splits[name] = f"{inside[0]}:{inside[-1] + 1}"
     return splits or {"train": f"0:{len(numbers)}"}
@@ -126,7 +121,7 @@ def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray,
     return places
 
 
-def _frames(source: StoredSet, numbers: Sequence[int]) -> "Iterator[pa.Table]":
+def _frames(source: StoredSet, numbers: Sequence[int]) -> Iterator[pa.Table]:
     """The frames of each episode; one data file is in memory at a time."""
     opened: tuple[Path, pa.Table, np.ndarray] | None = None
     keys = source.episodes.select(["data/chunk_index", "data/file_index"]).to_pylist()
@@ -143,7 +138,7 @@ def _frames(source: StoredSet, numbers: Sequence[int]) -> "Iterator[pa.Table]":
         yield table.take(pa.array(rows[np.argsort(index, kind="stable")]))
 
 
-def _read(path: Path, number: int) -> "tuple[pa.Table, np.ndarray]":
+def _read(path: Path, number: int) -> tuple[pa.Table, np.ndarray]:
     if not path.is_file():
         raise FileFormatError(path, f"the frames of episode {number}", "no file")
     table = read_parquet(path)
@@ -157,7 +152,7 @@ def _write_videos(source: StoredSet, key: str, numbers: Sequence[int], folder: P
     return {name: [cut[number][name] for number in numbers] for name in names}
 
 
-def _moved_statistics(rows: "pa.Table", firsts: Mapping[str, Sequence[int]]) -> "pa.Table":
+def _moved_statistics(rows: pa.Table, firsts: Mapping[str, Sequence[int]]) -> pa.Table:
     """Rows whose statistics of the running numbers begin where the numbers themselves now do."""
     for feature, values in firsts.items():
         least = f"stats/{feature}/min"
@@ -185,7 +180,7 @@ def _verified(source: StoredSet, numbers: Sequence[int], folder: Path) -> str:
     return content.hash
 
 
-def _replaced(table: "pa.Table", name: str, values: Any) -> "pa.Table":
+def _replaced(table: pa.Table, name: str, values: Any) -> pa.Table:
     position = table.schema.get_field_index(name)
     if position < 0:
         raise FileFormatError(EPISODES_FOLDER, f"the column {name}", "none")
@@ -193,7 +188,7 @@ def _replaced(table: "pa.Table", name: str, values: Any) -> "pa.Table":
     return table.set_column(position, field, pa.array(values, field.type))
 
 
-def _plain(table: "pa.Table") -> "pa.Table":
+def _plain(table: pa.Table) -> pa.Table:
     """Without what pandas notes about rows that are no longer there."""
     metadata = {key: value for key, value in (table.schema.metadata or {}).items() if key != b"pandas"}
     return table.replace_schema_metadata(metadata or None)

@@ -26,12 +26,12 @@ from ...files.meta_files import (
     TASKS_FILE,
     WITHDRAWALS_FILE,
 )
+from ...files.replace_folder import delete_folder, is_unfinished, replaced_folder
 from ...versions.digests import EpisodeContent
 from ...versions.manifest import Manifest
 from ...versions.release_record import ReleaseRecord
 from ...versions.withdrawals import anonymised, read_withdrawals, withdrawals_text
 from ..amend import today
-from ..subset.replace_folder import delete_folder, is_unfinished, replaced_folder
 from ..subset.stored_set import StoredSet, without_episodes, write_record
 from ..subset.writing import kept_splits, write_subset
 from .traces import Traces

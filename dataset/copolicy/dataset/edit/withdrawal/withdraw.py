@@ -9,10 +9,10 @@ from typing import Any
 from ...exceptions import FileFormatError, InvalidValueError, RunError
 from ...files.json_file import read_json
 from ...files.meta_files import INFO_FILE
+from ...files.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
 from ...lerobot_folder.folder import LeRobotFolder
 from ...lerobot_folder.info import stripped_hint
 from ..selection import consents_of
-from ..subset.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
 from ..subset.stored_set import StoredSet
 from .data_set import PEOPLE, FoundSet, describe, people_of, without_withdrawn
 from .recordings import FoundRecording, delete_recordings, hard_links, is_recording, read_recording

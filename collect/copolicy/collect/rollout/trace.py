@@ -1,0 +1,35 @@
+"""What happened in each world of a rollout, step by step."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from copolicy.dataset.task import World
+
+from .rollout import Rollout
+
+
+class Trace:
+    """Keeps the states and joint actions of worlds from now on."""
+
+    def __init__(self, worlds: Sequence[World], before: "Trace | None" = None):
+        """
+        Args:
+            before: of the one world whose present state all of these start in.
+        """
+        self._states = [[*before._states[0]] if before else [world.recorded] for world in worlds]
+        self._actions = [[*before._actions[0]] if before else [] for _ in worlds]
+
+    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+        """See `Observer`."""
+        for index, action in zip(worlds.tolist(), actions, strict=True):
+            self._states[index].append(rollout.worlds[index].recorded)
+            self._actions[index].append(action)
+
+    def states(self, world: int) -> np.ndarray:
+        """`(T + 1, k)` recorded states, the first before the first step."""
+        return np.array(self._states[world])
+
+    def actions(self, world: int) -> np.ndarray:
+        """`(T, 2 m)` joint actions as they acted."""
+        return np.array(self._actions[world])

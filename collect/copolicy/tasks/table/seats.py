@@ -1,0 +1,31 @@
+"""The exchange of seats: who held the robot's end holds the human's."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from .map_config import MapConfig
+
+_HALF_TURN = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])  # of x, y, cos_theta, sin_theta, vx, vy, omega
+
+
+class TableSeats:
+    """A table turned by pi has its ends exchanged; place, velocity and forces keep their axes, those of the window.
+
+    The dynamics are the same to rounding. The two ends are of unlike outline, so that a touch may come a step earlier
+    or later.
+    """
+
+    def scenario(self, scenario: MapConfig) -> MapConfig:
+        """The map with its start turned by pi."""
+        x, y, theta = scenario.start
+        return replace(scenario, start=(x, y, (theta + math.pi) % (2 * math.pi)))
+
+    def states(self, states: np.ndarray) -> np.ndarray:
+        """States `(..., 7)` turned by pi."""
+        return states * _HALF_TURN
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Joint actions `(..., 4)` with the players' halves exchanged."""
+        return np.concatenate((actions[..., 2:], actions[..., :2]), axis=-1)

@@ -1,0 +1,133 @@
+"""Two players push a peg along a line to a mark."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.task import RUNNING, Outcome, PairTask, TaskSpec, Vector
+
+LENGTH = 2.0  # m, the line from -LENGTH / 2 to LENGTH / 2
+_CLOSE, _SLOW = 0.02, 0.05  # m, m/s: the peg is at the mark
+_HZ = 20
+
+
+@dataclass(frozen=True)
+class Line:
+    """Where the peg begins and where its mark is, m."""
+
+    start: float
+    mark: float
+
+    def __post_init__(self):
+        if not all(abs(place) < LENGTH / 2 for place in (self.start, self.mark)):
+            raise InvalidValueError("Line", f"places within {LENGTH / 2} m", (self.start, self.mark))
+
+    @property
+    def digest(self) -> str:
+        """Of the JSON."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()[:8]
+
+    def to_json(self) -> str:
+        """Canonical JSON."""
+        return json.dumps({"start": self.start, "mark": self.mark}, sort_keys=True)
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Settings of the peg's world."""
+
+    step_limit: int = 200
+    damping: float = 1.5  # 1/s
+    push: float = 1.0  # m/s^2 of a player's full force
+
+
+class PegWorld:
+    """The peg: pushed by the sum of both forces, slowed by friction."""
+
+    def __init__(self, line: Line, settings: Friction | None = None):
+        self.line, self.settings = line, settings or Friction()
+        self.restore((line.start, 0.0))
+
+    @property
+    def recorded(self) -> tuple[float, ...]:
+        """Position and velocity (m, m/s)."""
+        return self.position, self.velocity
+
+    @property
+    def observation(self) -> np.ndarray:
+        """The same, `(2,)`."""
+        return np.array(self.recorded)
+
+    def restore(self, recorded: Sequence[float]) -> None:
+        """Puts the peg into a state."""
+        self.position, self.velocity = recorded
+        self.step_count = 0
+
+    def step(self, action: np.ndarray) -> Outcome:
+        """Advances by 1/20 s."""
+        action = np.asarray(action, float)
+        if action.shape != (2,):
+            raise ShapeError("action", (2,), action.shape)
+        force = float(np.clip(action, -1.0, 1.0).sum())
+        acceleration = self.settings.push * force - self.settings.damping * self.velocity
+        self.velocity += acceleration / _HZ
+        self.position += self.velocity / _HZ
+        self.step_count += 1
+        if abs(self.position - self.line.mark) < _CLOSE and abs(self.velocity) < _SLOW:
+            return Outcome(True, True, "mark")
+        if abs(self.position) >= LENGTH / 2:
+            return Outcome(True, False, "off_the_line")
+        return Outcome(True, False, "timeout") if self.step_count >= self.settings.step_limit else RUNNING
+
+    def reward(self) -> float:
+        """Minus the distance from the mark, m."""
+        return -abs(self.position - self.line.mark)
+
+
+class PegTask(PairTask):
+    """Numbers alone: everything optional is lacking."""
+
+    spec = TaskSpec(
+        name="peg",
+        title="pushing a peg",
+        sentence="Push the peg to the mark together.",
+        state=Vector(("position", "velocity"), ("m", "m/s"), (-LENGTH / 2, -1.5), (LENGTH / 2, 1.5)),
+        recorded=Vector(("position", "velocity"), ("m", "m/s"), (-LENGTH / 2, -1.5), (LENGTH / 2, 1.5)),
+        scenario=Vector(("start", "mark"), ("m", "m"), (-LENGTH / 2, -LENGTH / 2), (LENGTH / 2, LENGTH / 2)),
+        action=Vector(("push",), ("a player's full force",), (-1.0,), (1.0,)),
+        reasons=("mark", "off_the_line", "timeout"),
+        successes=("mark",),
+        record_hz=_HZ,
+    )
+    scenario_type = Line
+    settings_type = Friction
+
+    @property
+    def scenario_sets(self) -> Mapping[str, Sequence[Line]]:
+        """Marks to the right, and marks to the left."""
+        places = (0.2, 0.4, 0.6)
+        return {"right": tuple(Line(-0.5, place) for place in places), "left": tuple(Line(0.5, -p) for p in places)}
+
+    def scenario_of_json(self, text: str | bytes) -> Line:
+        """The inverse of `Line.to_json`."""
+        try:
+            return Line(**json.loads(text))
+        except (TypeError, ValueError):
+            raise InvalidValueError("scenario", "JSON of a line", text) from None
+
+    def scenario_vector(self, scenario: Line) -> np.ndarray:
+        """`(2,)`."""
+        return np.array((scenario.start, scenario.mark))
+
+    def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> Line:
+        """The inverse of `scenario_vector`, to single precision."""
+        return Line(*(float(value) for value in vector))
+
+    def make_world(self, scenario: Line, settings: Friction | None = None) -> PegWorld:
+        """A peg at rest."""
+        return PegWorld(scenario, settings)
