@@ -1,4 +1,4 @@
-"""The symmetries of the task: mirrored samples obey the mirrored world."""
+"""The symmetries of the table: mirrored samples obey the mirrored world."""
 
 import math
 
@@ -9,8 +9,8 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.tasks.table.features import environment_state, map_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.policy.symmetries import mirror, permute_obstacles
 from copolicy.tasks.table.world import TableWorld
-from lerobot_policy_copolicy.copolicy.augmentation import mirror, permute_obstacles
 
 ALL = torch.tensor([True])
 

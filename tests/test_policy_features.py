@@ -9,8 +9,10 @@ import torch
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.tasks.table.features import BOUNDS, environment_state, state_vector
 from copolicy.tasks.table.map_config import MapConfig
-from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
-from lerobot_policy_copolicy.copolicy.range_scan import RANGE, RAYS, RangeScan
+from copolicy.tasks.table.policy.encoders import RelativeFeatures, ScanFeatures
+from copolicy.tasks.table.policy.range_scan import RANGE, RAYS, RangeScan
+from copolicy.tasks.table.spec import SPEC
+from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures
 
 
 def observation(pose=(240.0, 120.0, 3.14), obstacles=((480.0, 300.0),), human=(0.5, -1.0)) -> dict[str, torch.Tensor]:
@@ -26,19 +28,19 @@ def observation(pose=(240.0, 120.0, 3.14), obstacles=((480.0, 300.0),), human=(0
 @pytest.mark.parametrize(("end", "value"), [(0, -1.0), (1, 1.0)])
 def test_absolute_features_map_the_bounds_to_one(end, value):
     columns = {key: torch.tensor(BOUNDS[key][end], dtype=torch.float32) for key in BOUNDS}
-    scaled = AbsoluteFeatures(past_human_action=True)(columns)
+    scaled = AbsoluteFeatures(SPEC, past_human_action=True)(columns)
     torch.testing.assert_close(scaled, torch.full((20,), value), atol=1e-6, rtol=0)
 
 
 def test_absolute_features_are_the_papers_columns_in_order():
-    scaled = AbsoluteFeatures(past_human_action=True)(observation())
+    scaled = AbsoluteFeatures(SPEC, past_human_action=True)(observation())
     assert scaled[:2].tolist() == pytest.approx([240 / 600 - 1, 120 / 300 - 1])
     assert scaled[2:4].tolist() == pytest.approx([math.cos(3.14), math.sin(3.14)])
     assert scaled[4:7].tolist() == pytest.approx([0.2, -0.4, 0.5 / (math.pi / 2)])
     assert scaled[7:10].tolist() == pytest.approx([240 / 600 - 1, 120 / 300 - 1, 3.14 / math.pi - 1], abs=1e-6)
     assert scaled[14:18].tolist() == [-1.0] * 4  # padding
     assert scaled[18:].tolist() == [0.5, -1.0]
-    assert AbsoluteFeatures(past_human_action=False)(observation()).shape == (18,)
+    assert AbsoluteFeatures(SPEC, past_human_action=False)(observation()).shape == (18,)
 
 
 def test_relative_features_move_with_the_table():
@@ -66,7 +68,7 @@ def test_far_things_are_clipped():
     assert seen[11:15].tolist() == pytest.approx([-3.0, -589 / 300, -1.5, -1.5])
 
 
-@pytest.mark.parametrize("features", [AbsoluteFeatures(True), RelativeFeatures(True), ScanFeatures(True)])
+@pytest.mark.parametrize("features", [AbsoluteFeatures(SPEC, True), RelativeFeatures(True), ScanFeatures(True)])
 def test_batches_and_histories_broadcast(features):
     single = observation()
     stacked = {key: values.expand(5, 3, -1) for key, values in single.items()}

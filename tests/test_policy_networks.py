@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from copolicy.tasks.table.spec import SPEC
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
 from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures
@@ -23,7 +24,7 @@ def inputs(batch: int = 2) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
 
 @pytest.mark.parametrize(("past_human_action", "parameters"), [(False, 8_964_868), (True, 8_965_380)])
 def test_transformer_has_as_many_parameters_as_the_original(past_human_action, parameters):
-    network = TransformerDenoiser(4, AbsoluteFeatures(past_human_action).size, HORIZON, FRAMES)
+    network = TransformerDenoiser(4, AbsoluteFeatures(SPEC, past_human_action).size, HORIZON, FRAMES)
     assert sum(parameter.numel() for parameter in network.parameters()) == parameters
 
 

@@ -4,6 +4,7 @@ The bounds come from the task, never from data: a goal that is constant in the t
 min-max statistics on any other map.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,12 @@ def features_of(spec: TaskSpec) -> dict[str, dict[str, Any]]:
 def bounds_of(spec: TaskSpec) -> dict[str, np.ndarray]:
     """Lowest and highest value of each column of numbers, `(2, n)`."""
     return {column: vector.bounds for column, vector in _vectors(spec).items()}
+
+
+def scaling_of(spec: TaskSpec, columns: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Factor and offset `(n,)`, float32, that bring columns, one beside the other, from their bounds to [-1, 1]."""
+    low, high = np.concatenate([bounds_of(spec)[column] for column in columns], axis=1)
+    return (2 / (high - low)).astype(np.float32), (-(high + low) / (high - low)).astype(np.float32)
 
 
 def _vectors(spec: TaskSpec) -> dict[str, Vector]:

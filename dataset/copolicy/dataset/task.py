@@ -11,8 +11,8 @@ Player 0 is the robot seat, player 1 the human seat. A joint action is both play
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
@@ -248,6 +248,20 @@ class TaskSpec:
         return Vector(names, one.units * 2, one.low * 2, one.high * 2)
 
 
+@dataclass(frozen=True)
+class PolicyFeatures:
+    """What a task offers to policies beside the generic input, which is its scaled columns; by name.
+
+    Attributes:
+        encoders: each is called with whether the human's past action is seen, and gives a torch module with a `size`
+            that makes `(..., size)` of observation columns `(..., n)` in physical units.
+        symmetries: each makes other training samples `{column: (B, T, n)}`, as true, of some; applied in this order.
+    """
+
+    encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
+    symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
+
+
 class PairTask(ABC):
     """A task for two players. A subclass says what is abstract here; every other part is optional.
 
@@ -381,6 +395,11 @@ class PairTask(ABC):
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
+
+    @property
+    def features(self) -> PolicyFeatures:
+        """Observation encoders and symmetries of policies; torch is imported for them here, and nowhere before."""
+        return PolicyFeatures()
 
     def settings_summary(self, settings: Any) -> str:
         """Settings in words: what is not the default."""

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from lerobot.policies.factory import make_pre_post_processors
 from torch import Tensor
@@ -18,8 +19,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, Outp
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.files.replace_folder import replaced_folder
 from copolicy.dataset.files.staging import new_folder, replace_json
-from copolicy.tasks.table.features import environment_state, state_vector
-from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.dataset.task import get_task
 
 from .checkpoint import Checkpoint
 from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe
@@ -111,15 +111,18 @@ def _averaged(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 @torch.inference_mode()
 def _difference(one: Any, other: Any) -> float:
-    """Largest difference between the plans of two policies from the same noise, on the training maps' starts."""
-    histories = []
-    for config in MAP_SETS["training"]:
-        state = torch.tensor(state_vector(config.start, (0.0, 0.0, 0.0)), dtype=torch.float32)
-        histories.append((state, torch.tensor(environment_state(config), dtype=torch.float32)))
-    frames = one.config.n_obs_steps
-    states, maps = (torch.stack(column)[:, None].repeat(1, frames, 1) for column in zip(*histories, strict=True))
-    batch = {STATE: states, ENVIRONMENT_STATE: maps, HUMAN_ACTION: torch.zeros(len(states), frames, 2)}
-    noise = torch.randn(len(states), one.config.horizon, 4, generator=torch.Generator().manual_seed(0))
+    """Largest difference between the plans of two policies from the same noise, at the starts of a task's first set."""
+    task, frames = get_task(one.config.task), one.config.n_obs_steps
+    scenarios = next(iter(task.scenario_sets.values()))
+    starts = task.states_of(np.array([task.start_of(scenario) for scenario in scenarios]))
+    vectors = np.array([task.scenario_vector(scenario) for scenario in scenarios])
+    still = np.zeros((len(scenarios), len(task.spec.action)))
+    batch = {
+        key: torch.tensor(values, dtype=torch.float32)[:, None].repeat(1, frames, 1)
+        for key, values in ((STATE, starts), (ENVIRONMENT_STATE, vectors), (HUMAN_ACTION, still))
+    }
+    shape = len(scenarios), one.config.horizon, len(task.spec.joint_action)
+    noise = torch.randn(*shape, generator=torch.Generator().manual_seed(0))
     plans = [policy.plan(batch, torch.Generator().manual_seed(1), noise) for policy in (one, other)]
     return float((plans[0] - plans[1]).abs().max())
 

@@ -1,5 +1,6 @@
 """Settings of the diffusion co-policy."""
 
+import logging
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,7 +9,7 @@ from lerobot.optim import AdamWConfig
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 
 from .bounds import require_bounds
 from .fast.backend import AUTO, BACKENDS
@@ -17,12 +18,13 @@ from .presets import PRESETS
 
 _CHOICES = {
     "network": ("transformer", "mlp"),
-    "observation_features": ("absolute", "relative", "scan"),
     "prediction_type": ("epsilon", "sample", "v_prediction"),
     "sampler": ("ddpm", "ddim", "dpmsolver++"),
     "planner": ("fast", "plain"),
     "backend": tuple(BACKENDS),
 }
+_FEATURES, _GENERIC = "observation_features", "absolute"
+_SYMMETRIES = ("mirror", "permute_obstacles")
 
 
 def _identity() -> dict[str, NormalizationMode]:
@@ -35,7 +37,8 @@ class CopolicyConfig(PreTrainedConfig):
     """Settings of the diffusion co-policy, which predicts the actions of both players.
 
     A setting left open (None) takes the value of `preset`; a value given explicitly wins. The saved configuration
-    holds the values, so changing `preset` of a saved one changes nothing.
+    holds the values, so changing `preset` of a saved one changes nothing. What a preset wants of a task that the task
+    does not offer is left out.
 
     `normalization_mapping` is IDENTITY throughout: LeRobot puts the statistics of the current data set into the
     processors, also when a checkpoint is fine-tuned on another set, and a column that was constant there (a goal, an
@@ -46,6 +49,7 @@ class CopolicyConfig(PreTrainedConfig):
         InvalidValueError: a setting outside what is allowed.
     """
 
+    task: str | None = None  # whose columns, bounds, features and symmetries; that of the data, or else the table
     preset: str = "default"  # "default", "paper" (the paper exactly) or "small" (trains on a CPU in minutes)
     past_human_action: bool = True  # condition on the human's past action (the paper's CoDP-H); false is CoDP
 
@@ -55,9 +59,12 @@ class CopolicyConfig(PreTrainedConfig):
     drop_n_last_frames: int | None = None  # frames at the end of an episode that start no training sample
     do_mask_loss_for_padding: bool = False  # leave actions beyond either end of the episode out of the loss
 
-    observation_features: str | None = None  # "absolute" positions, "relative" ones, or "scan": those and a range scan
-    mirror: bool | None = None  # mirror half of the training samples in y
+    observation_features: str | None = (
+        None  # "absolute"; of the table also "relative", or "scan": that and a range scan
+    )
+    mirror: bool | None = None  # mirror half of the training samples (the table: in y)
     permute_obstacles: bool | None = None  # shuffle the order of the obstacles in training samples
+    symmetries: list[str] = field(default_factory=list)  # further ones that the task offers, by name
 
     network: str | None = None  # "transformer" decoder or residual "mlp"
     n_layers: int | None = None  # decoder layers, or residual blocks of the mlp
@@ -100,15 +107,59 @@ class CopolicyConfig(PreTrainedConfig):
         super().__post_init__()
         if self.preset not in PRESETS:
             raise UnknownNameError("preset", self.preset, PRESETS)
-        for name, value in PRESETS[self.preset].items():
-            if getattr(self, name) is None:
-                setattr(self, name, value)
-        self._validate()
+        self._open = {name for name in ("task", *PRESETS[self.preset]) if getattr(self, name) is None}
+        self._fill(get_task() if self.task is None else get_task(self.task))
 
     @property
     def filled(self) -> Any:
         """Itself, for a type checker, which cannot know that the preset has filled in every open setting."""
         return self
+
+    def use_task(self, task: PairTask) -> None:
+        """Takes the task of the data that are trained on, unless the settings name theirs.
+
+        Raises:
+            InvalidValueError: they name another task, or something that this one does not offer.
+        """
+        if "task" in self._open:
+            self._fill(task)
+        elif task.spec.name != self.task:
+            raise InvalidValueError("task", f"{task.spec.name!r}, that of the data", self.task)
+
+    def _fill(self, task: PairTask) -> None:
+        """Gives the open settings their values for a task, and checks all of them."""
+        self.task = task.spec.name
+        for name in self._open - {"task"}:
+            setattr(self, name, PRESETS[self.preset][name])
+        lacking = {name: found for name, found in self._lacking(task).items() if name in self._open}
+        for name in lacking:
+            setattr(self, name, _GENERIC if name == _FEATURES else False)
+        if lacking:
+            wanted = ", ".join(f"{name}={value}" for name, (_, value) in lacking.items())
+            logging.info("%s", task.missing(f"{wanted} (preset {self.preset!r})"))
+        for name, (expected, found) in self._lacking(task).items():
+            raise InvalidValueError(name, expected, found)
+        self._validate()
+
+    def _lacking(self, task: PairTask) -> dict[str, tuple[str, Any]]:
+        """Settings that ask for what a task does not offer: what is expected, and what they are."""
+        offered = task.features
+        found: dict[str, tuple[str, Any]] = {}
+        if self.observation_features not in (choices := (_GENERIC, *offered.encoders)):
+            expected = f"{', '.join(choices)} (the task {self.task!r} offers no other features)"
+            found[_FEATURES] = expected, self.observation_features
+        for name in _SYMMETRIES:
+            if getattr(self, name) and name not in offered.symmetries:
+                found[name] = f"false (the task {self.task!r} has no such symmetry)", True
+        if not set(self.symmetries) <= offered.symmetries.keys():
+            expected = f"some of {', '.join(offered.symmetries) or 'none'} (the task {self.task!r} has no others)"
+            found["symmetries"] = expected, self.symmetries
+        return found
+
+    @property
+    def used_symmetries(self) -> frozenset[str]:
+        """Names of the symmetries that training samples are varied by."""
+        return frozenset(self.symmetries).union(name for name in _SYMMETRIES if getattr(self, name))
 
     def _validate(self) -> None:
         filled = self.filled
@@ -174,20 +225,21 @@ class CopolicyConfig(PreTrainedConfig):
         return WarmupCosineSchedulerConfig(self.scheduler_warmup_steps, self.filled.scheduler_final_lr_fraction)
 
     def validate_features(self) -> None:
-        """Checks that the data set or the environment has the columns of this task.
+        """Checks that the data set or the environment has the columns of the task.
 
         Raises:
             InvalidValueError: a column is missing.
             ShapeError: a column has another shape.
         """
+        columns = features_of(get_task(self.filled.task).spec)
         for name in self.observation_keys:
-            _check_feature(name, self.input_features or {})
-        _check_feature(ACTION, self.output_features or {})
+            _check_feature(name, columns[name]["shape"], self.input_features or {})
+        _check_feature(ACTION, columns[ACTION]["shape"], self.output_features or {})
 
 
-def _check_feature(name: str, features: dict[str, PolicyFeature]) -> None:
+def _check_feature(name: str, expected: tuple[int, ...], features: dict[str, PolicyFeature]) -> None:
     if name not in features:
         raise InvalidValueError("features of the data set or environment", name, sorted(features))
-    expected, given = features_of(get_task().spec)[name]["shape"], tuple(features[name].shape)
+    given = tuple(features[name].shape)
     if given != expected:
         raise ShapeError(name, expected, given)

@@ -5,6 +5,7 @@ Ng, Liu and Kennedy, "Diffusion Co-Policy for Synergistic Human-Robot Collaborat
 
 import logging
 from collections import deque
+from functools import partial
 from pathlib import Path
 from typing import Unpack
 
@@ -15,11 +16,11 @@ from torch import Tensor
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
 from copolicy.dataset.features import ACTION, features_of
+from copolicy.dataset.lerobot_folder.info import task_of
 from copolicy.dataset.task import get_task
 from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
 from copolicy.train.finite_weights import non_finite_weight
 
-from .augmentation import mirror, permute_obstacles
 from .configuration_copolicy import CopolicyConfig
 from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
@@ -27,16 +28,13 @@ from .diffusion import PlanDiffusion
 from .ema import ExponentialMovingAverage
 from .fast.backend import require_backend
 from .fast.planner import FastPlanner
-from .features import AbsoluteFeatures, RelativeFeatures, ScanFeatures
+from .features import AbsoluteFeatures, ActionScale
 from .training_data import prepare_training, require_same_rate
 
-_COLUMNS = features_of(get_task().spec)
-_ACTION_SIZE = _COLUMNS[ACTION]["shape"][0]
 _PADDING = f"{ACTION}_is_pad"
 _EPISODE = "episode_index"
 _SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
 _DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
-_FEATURES = {"absolute": AbsoluteFeatures, "relative": RelativeFeatures, "scan": ScanFeatures}
 _NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": (MlpDenoiser, _SIZES)}
 
 
@@ -59,7 +57,8 @@ class CopolicyPolicy(PreTrainedPolicy):
     of the episode repeat its first or last action; the "paper" preset starts no sample in the last 9 frames, so that
     only the beginning is padded.
 
-    Everything here is in physical units: observations in px, rad and s, actions in [-1, 1].
+    Everything here is in the units of the task, which for actions of the table is [-1, 1]; the network's input and
+    plans are scaled by the bounds of the task.
     """
 
     config_class = CopolicyConfig  # pyright: ignore[reportAssignmentType]
@@ -67,8 +66,14 @@ class CopolicyPolicy(PreTrainedPolicy):
 
     def __init__(self, config: CopolicyConfig, **kwargs):
         super().__init__(config)
-        config.validate_features()
         meta = kwargs.get("dataset_meta")
+        if meta is not None:
+            config.use_task(task_of({"robot_type": getattr(meta, "robot_type", None)}))
+        config.validate_features()
+        task = get_task(config.filled.task)
+        self._sizes = {name: column["shape"][0] for name, column in features_of(task.spec).items()}
+        offered = task.features
+        self._symmetries = [vary for name, vary in offered.symmetries.items() if name in config.used_symmetries]
         # Episodes that must not come up in a batch, where the constructor could not see which ones are trained on.
         self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
         require_same_rate(config)
@@ -78,8 +83,13 @@ class CopolicyPolicy(PreTrainedPolicy):
         if unused:
             logging.info("the co-policy does not read %s", ", ".join(unused))
         self.config = config
-        self.features = _FEATURES[config.filled.observation_features](config.past_human_action)
-        self.denoiser: TransformerDenoiser | MlpDenoiser = _make_denoiser(config, self.features.size)
+        encoders = {**offered.encoders, "absolute": partial(AbsoluteFeatures, task.spec)}
+        self.features = encoders[config.filled.observation_features](config.past_human_action)
+        self.action_scale = ActionScale(task.spec)
+        network, names = _NETWORKS[config.filled.network]
+        self.denoiser: TransformerDenoiser | MlpDenoiser = network(
+            self._sizes[ACTION], self.features.size, **{name: getattr(config, name) for name in names}
+        )
         self.diffusion = PlanDiffusion(config)
         require_backend(config.backend)
         self._fast = FastPlanner(self.diffusion.table, config.backend) if config.planner == "fast" else None
@@ -141,8 +151,8 @@ class CopolicyPolicy(PreTrainedPolicy):
         """The training loss: mean squared error of the prediction over all tokens and both players.
 
         Args:
-            batch: observation columns `(B, To, n)`, action `(B, T, 4)`, and its padding mask `(B, T)` where
-                `do_mask_loss_for_padding` is set.
+            batch: observation columns `(B, To, n)`, action `(B, T, m)` of both players, and its padding mask
+                `(B, T)` where `do_mask_loss_for_padding` is set.
             reduction: "mean", or "none" for one loss a sample (LeRobot's sample weighting).
 
         Returns:
@@ -156,11 +166,11 @@ class CopolicyPolicy(PreTrainedPolicy):
         if self.training:
             self._require_finite_loss()
             self._require_no_excluded(batch)
-        sample = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
-        sample[ACTION] = _column(batch, ACTION, self.config.horizon)
-        if self.training:
-            sample = self._augmented(sample)
-        noisy, steps, target = self.diffusion.noised(sample[ACTION])
+        sample = self._observation(batch)
+        sample[ACTION] = self._column(batch, ACTION, self.config.horizon)
+        for vary in self._symmetries if self.training else ():
+            sample = vary(sample)
+        noisy, steps, target = self.diffusion.noised(self.action_scale.scaled(sample[ACTION]))
         prediction = self.denoiser(noisy, steps, self.features(sample))
         error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
         loss = self._reduced(error, batch, reduction)
@@ -209,21 +219,20 @@ class CopolicyPolicy(PreTrainedPolicy):
         Args:
             batch: observation columns `(B, To, n)`, oldest frame first, in physical units.
             generator: source of the noise; the global one if None.
-            noise: `(B, T, 4)` standard normal to start from, instead of a draw.
+            noise: `(B, T, m)` standard normal to start from, instead of a draw.
             actions: how many are wanted from the current frame on. The plan ends there and is the same up to there;
                 the fewer, the faster. All of them if None.
 
         Returns:
-            `(B, To - 1 + actions, 4)` in [-1, 1], a whole plan being `(B, T, 4)`; token `To - 1` is that of the
-            current frame.
+            `(B, To - 1 + actions, m)` within the bounds of the task, a whole plan being `(B, T, m)`; token `To - 1`
+            is that of the current frame.
 
         Raises:
             InvalidValueError: a column is missing, or more actions are wanted than a plan holds.
             ShapeError: a column has another shape.
         """
-        observation = {key: _column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
-        condition = self.features(observation)
-        shape = (len(condition), self.config.horizon, _ACTION_SIZE)
+        condition = self.features(self._observation(batch))
+        shape = (len(condition), self.config.horizon, self._sizes[ACTION])
         if noise is None:
             # On the CPU, so that a seed means the same on every device.
             noise = torch.randn(shape, generator=generator, device="cpu" if generator is None else generator.device)
@@ -232,10 +241,10 @@ class CopolicyPolicy(PreTrainedPolicy):
         noise, tokens = noise.to(condition.device), self._tokens(actions)
         network = self.denoiser if self.ema is None else self.ema.model
         if self._fast is not None:
-            return self._fast.plan(network, condition, noise, tokens, generator)
-        return self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)[
-            :, :tokens
-        ]
+            plan = self._fast.plan(network, condition, noise, tokens, generator)
+        else:
+            plan = self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)
+        return self.action_scale.physical(plan[:, :tokens])
 
     @property
     def planned_with(self) -> tuple[str, ...]:
@@ -252,7 +261,7 @@ class CopolicyPolicy(PreTrainedPolicy):
             kwargs: `noise` to start from, see `plan`.
 
         Returns:
-            `(B, n_action_steps, 4)` in [-1, 1].
+            `(B, n_action_steps, m)` within the bounds of the task.
         """
         if all(key in batch and batch[key].ndim == 2 for key in self.config.observation_keys):
             batch = self._observe(batch)
@@ -268,7 +277,7 @@ class CopolicyPolicy(PreTrainedPolicy):
             kwargs: `noise` to start from, see `plan`.
 
         Returns:
-            `(B, 4)` in [-1, 1].
+            `(B, m)` within the bounds of the task.
         """
         history = self._observe(batch)
         if not self._queue:
@@ -278,7 +287,7 @@ class CopolicyPolicy(PreTrainedPolicy):
     def _observe(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
         """Appends a frame to the history, which starts as copies of its first frame; returns the history stacked."""
         for key, frames in self._history.items():
-            frames.append(_column(batch, key))
+            frames.append(self._column(batch, key))
             while len(frames) < self.config.n_obs_steps:
                 frames.append(frames[-1])
         return {key: torch.stack(tuple(frames), dim=1) for key, frames in self._history.items()}
@@ -290,26 +299,15 @@ class CopolicyPolicy(PreTrainedPolicy):
             raise InvalidValueError("actions", f"1 to {most}", actions)
         return self.config.n_obs_steps - 1 + (actions or most)
 
-    def _augmented(self, sample: dict[str, Tensor]) -> dict[str, Tensor]:
-        if self.config.mirror:
-            actions = sample[ACTION]
-            sample = mirror(sample, torch.rand(len(actions), device=actions.device) < 0.5)
-        if self.config.permute_obstacles:
-            sample = permute_obstacles(sample)
-        return sample
+    def _observation(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
+        return {key: self._column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
 
-
-def _make_denoiser(config: CopolicyConfig, condition_size: int) -> TransformerDenoiser | MlpDenoiser:
-    network, names = _NETWORKS[config.filled.network]
-    return network(_ACTION_SIZE, condition_size, **{name: getattr(config, name) for name in names})
-
-
-def _column(batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
-    """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames."""
-    if key not in batch:
-        raise InvalidValueError("batch", f"the column {key}", sorted(batch))
-    values, size = batch[key], _COLUMNS[key]["shape"][0]
-    expected = (size,) if frames is None else (frames, size)
-    if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
-        raise ShapeError(key, ("B", *expected), tuple(values.shape))
-    return values
+    def _column(self, batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
+        """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames."""
+        if key not in batch:
+            raise InvalidValueError("batch", f"the column {key}", sorted(batch))
+        values, size = batch[key], self._sizes[key]
+        expected = (size,) if frames is None else (frames, size)
+        if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
+            raise ShapeError(key, ("B", *expected), tuple(values.shape))
+        return values

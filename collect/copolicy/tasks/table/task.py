@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask
+from copolicy.dataset.task import PairTask, PolicyFeatures
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -138,6 +138,13 @@ class TableTask(PairTask):
         from .recording import TableMessages  # protobuf
 
         return TableMessages()
+
+    @property
+    def features(self) -> PolicyFeatures:
+        """The map as seen from the table, mirroring, and the order of the obstacles."""
+        from .policy import FEATURES  # torch
+
+        return FEATURES
 
     def settings_summary(self, settings: Physics) -> str:
         """The bound on the angular acceleration, and whatever else is not the default."""

@@ -5,7 +5,7 @@ import math
 import torch
 from torch import Tensor, nn
 
-from copolicy.tasks.table.map_config import WINDOW
+from ..map_config import WINDOW
 
 RAYS = 36
 """Directions of the scan, 10 degrees apart, the first along x."""

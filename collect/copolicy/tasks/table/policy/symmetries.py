@@ -1,4 +1,4 @@
-"""The symmetries of the task, applied to training samples: mirror in y, and the order of the obstacles.
+"""The symmetries of the table, applied to training samples: mirror in y, and the order of the obstacles.
 
 Both act on batches in physical units, `{column: (B, T, n)}`, and leave padding (obstacles at zero) where it is.
 """
@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.tasks.table.features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES
-from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
+
+from ..features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES
+from ..map_config import MAX_OBSTACLES, WINDOW
 
 _HEIGHT = float(WINDOW[1])
 _OBSTACLES = ENVIRONMENT_NAMES.index("obstacle_0_x")
@@ -44,6 +45,12 @@ def mirror(batch: dict[str, Tensor], chosen: Tensor) -> dict[str, Tensor]:
             turned[..., _OBSTACLES + 1 :: 2] += _HEIGHT * (centres != 0).any(dim=-1)
         mirrored[key] = torch.where(chosen[:, None, None], turned, values)
     return mirrored
+
+
+def mirror_half(batch: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Each sample mirrored with a probability of one half."""
+    state = batch[STATE]
+    return mirror(batch, torch.rand(len(state), device=state.device) < 0.5)
 
 
 def permute_obstacles(batch: dict[str, Tensor], generator: torch.Generator | None = None) -> dict[str, Tensor]:
