@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from copolicy.dataset.features import environment_state, map_of
-from copolicy.dataset.task import PairTask, TaskSpec, Vector
+from copolicy.dataset.task import PairTask, SimulatedPlayers, TaskSpec, Vector
 
 from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
 from .maps import MAP_SETS, identify
@@ -15,7 +15,6 @@ from .physics import Physics
 from .seats import TableSeats
 
 if TYPE_CHECKING:
-    from .agents.players import TablePlayers
     from .world import TableWorld
 
 _WIDTH, _HEIGHT = (float(side) for side in WINDOW)
@@ -58,11 +57,11 @@ class TableTask(PairTask):
     exchange = TableSeats()
 
     @property
-    def agents(self) -> "TablePlayers":
+    def agents(self) -> SimulatedPlayers:
         """Simulated pairs, partners and robots."""
-        from .agents.players import TablePlayers
+        from .agents.players import PLAYERS
 
-        return TablePlayers()
+        return PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:
