@@ -152,33 +152,25 @@ class Player(Protocol):
         ...
 
 
-class SimulatedPlayers(Protocol):
+@dataclass(frozen=True)
+class SimulatedPlayers:
     """The part `agents` of a task: players that need neither a person nor a policy.
 
     Attributes:
         pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
         partners: profiles of kinds of partner for the human seat, which robots are judged with.
         robots: profile and description of scripted robots, which policies are compared with.
+        make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
+        make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
+        make_robot: a player from scenario, name and seed.
     """
 
-    @property
-    def pairs(self) -> Mapping[str, tuple[Any, Any]]: ...
-    @property
-    def partners(self) -> Mapping[str, Any]: ...
-    @property
-    def robots(self) -> Mapping[str, tuple[Any, str]]: ...
-
-    def make_pair(self, scenario: Any, name: str, seed: int, /, *options: Any) -> tuple[Player, Player]:
-        """The players of a pair for one episode; `options` are the task's own."""
-        ...
-
-    def make_partner(self, scenario: Any, kind: str, seed: int, /) -> Player:
-        """A partner for one episode; equal seeds make equal ones, whoever the robot is."""
-        ...
-
-    def make_robot(self, scenario: Any, name: str, seed: int, /) -> Player:
-        """A scripted robot for one episode."""
-        ...
+    pairs: Mapping[str, tuple[Any, Any]]
+    partners: Mapping[str, Any]
+    robots: Mapping[str, tuple[Any, str]]
+    make_pair: Callable[..., tuple[Player, Player]]
+    make_partner: Callable[[Any, str, int], Player]
+    make_robot: Callable[[Any, str, int], Player]
 
 
 class SeatExchange(Protocol):

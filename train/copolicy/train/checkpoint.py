@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import torch
 from lerobot.configs.policies import PreTrainedConfig
-from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.utils.import_utils import register_third_party_plugins
 
@@ -47,6 +46,7 @@ class Checkpoint:
         weights_sha256: digest of the weights.
         policy: LeRobot's policy.
         conditions: rate and physics that it learned at.
+        fps: the rate, frames a second, for which an action is held.
         n_obs_steps: frames of history that a chunk is predicted from.
         n_action_steps: actions of a chunk that are executed before the next chunk.
         chunk_size: actions that a chunk holds at most, from the newest frame on.
@@ -69,6 +69,7 @@ class Checkpoint:
         """
         self.folder = folder = checkpoint_folder(path)
         self.conditions = training_conditions(folder)
+        self.fps = self.conditions.fps
         register_third_party_plugins()
         try:
             self.policy, self._preprocess, self._postprocess = _loaded(folder, device, settings or {})
@@ -95,11 +96,6 @@ class Checkpoint:
         self._device = device
         self._answered = False
         self.reset(0)
-
-    @property
-    def fps(self) -> int:
-        """Frames a second of the data that it learned from; an action is held so long."""
-        return self.conditions.fps
 
     def reset(self, seed: int) -> None:
         """Episodes begin: forgets the queues of the policy, and sets the source of its noise."""
@@ -188,7 +184,7 @@ class Checkpoint:
                     _set_random_state(device, state)
 
 
-def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[PreTrainedPolicy, Any, Any]:
+def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any, Any, Any]:
     config: Any = PreTrainedConfig.from_pretrained(folder)
     config.device = device
     config.pretrained_path = folder

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -23,7 +23,6 @@ from .seats import TableSeats
 from .spec import SPEC
 
 if TYPE_CHECKING:
-    from .agents.players import TablePlayers
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -40,11 +39,11 @@ class TableTask(PairTask):
     exchange = TableSeats()
 
     @property
-    def agents(self) -> "TablePlayers":
+    def agents(self) -> SimulatedPlayers:
         """Simulated pairs, partners and robots."""
-        from .agents.players import TablePlayers
+        from .agents.players import PLAYERS
 
-        return TablePlayers()
+        return PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:

@@ -50,7 +50,7 @@ def run_session(
     robots: dict[str, Checkpoint] = {}
     load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
     with prepared(settings, load) as application, ExitStack() as stack:
-        policy = BlindPolicy(robots, plan.actions_per_plan)
+        policy: Any = BlindPolicy(robots, plan.actions_per_plan)
         agent = PolicyAgent(policy, real_time=True)
         stack.callback(agent.close)
         game = application.game
