@@ -7,7 +7,8 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.rollout import Rollout, Trace
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.interaction import interaction_force
 
 

@@ -10,7 +10,8 @@ from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ, World, get_task
+from copolicy.dataset.task import World, get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.routes import route_class
 
 from ..coplan.rollouts import Outcome, measured, together
