@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -131,7 +130,7 @@ class TableTask(PairTask):
         for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
             yield image.draw((x, y, theta))
 
-    @cached_property
+    @property
     def recording(self) -> "TableMessages":
         """The table's own messages."""
         from .recording import TableMessages  # protobuf

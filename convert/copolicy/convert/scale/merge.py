@@ -21,7 +21,7 @@ from copolicy.dataset.files.meta_files import (
     TASKS_FILE,
 )
 from copolicy.dataset.files.staging import new_folder, replace_json, require_new, write_as_lerobot
-from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
@@ -73,7 +73,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     conversion = plan.conversion
     written = WrittenDataset(
         plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
-        sum(row["success"] for row in rows), Mixtures.of(rows),
+        sum(row["success"] for row in rows), Mixtures.of(rows, task_of(info)),
     )  # fmt: skip
     counts = Counter(finding.severity for finding in findings)
     return {
@@ -109,6 +109,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "version": version("lerobot_policy_copolicy"),
         "files": len(plan.files),
         "left_out": left_out.record(),
+        "task": task_of(read_info(root)).spec.to_dict(),
         "fps": plan.conversion.fps,
         "hold": plan.conversion.hold,
         "notes": notes,
