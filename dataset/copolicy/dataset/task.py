@@ -174,20 +174,17 @@ class PairTask(ABC):
         spec: what it is.
         scenario_type: class of its scenarios, which is constructed from JSON by `scenario_of_json`.
         settings_type: class of its settings.
+        exchange: how an episode looks from the other seat.
     """
 
     spec: ClassVar[TaskSpec]
     scenario_type: ClassVar[type]
     settings_type: ClassVar[type]
+    exchange: ClassVar[SeatExchange | None] = None
 
     @property
     def agents(self) -> SimulatedPlayers | None:
         """Simulated players."""
-        return None
-
-    @property
-    def exchange(self) -> SeatExchange | None:
-        """How an episode looks from the other seat."""
         return None
 
     @property

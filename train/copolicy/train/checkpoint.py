@@ -93,7 +93,7 @@ class Checkpoint:
         self.keeps_history = getattr(self._config, "temporal_ensemble_coeff", None) is not None
         self.planning_seconds: list[float] = []
         self.batch_sizes: list[int] = []
-        self._device = device
+        self._devices = ["cpu", device] if torch.device(device).type == "cuda" else ["cpu"]
         self._answered = False
         self.reset(0)
 
@@ -101,8 +101,7 @@ class Checkpoint:
         """Episodes begin: forgets the queues of the policy, and sets the source of its noise."""
         with _LOCK:
             self.policy.reset()
-        devices = {"cpu", torch.device(self._device).type} & {"cpu", "cuda"}
-        self._noise = {device: torch.Generator(device).manual_seed(seed).get_state() for device in sorted(devices)}
+        self._noise = {device: torch.Generator(device).manual_seed(seed).get_state() for device in self._devices}
 
     def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         """Predicts for several worlds at once.
@@ -213,11 +212,11 @@ def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any
 
 
 def _random_state(device: str) -> torch.Tensor:
-    return torch.cuda.get_rng_state() if device == "cuda" else torch.get_rng_state()
+    return torch.get_rng_state() if device == "cpu" else torch.cuda.get_rng_state(device)
 
 
 def _set_random_state(device: str, state: torch.Tensor) -> None:
-    if device == "cuda":
-        torch.cuda.set_rng_state(state)
-    else:
+    if device == "cpu":
         torch.set_rng_state(state)
+    else:
+        torch.cuda.set_rng_state(state, device)

@@ -13,6 +13,7 @@ from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 
 from ..recording.wall_clock import WallClockAnchor
+from ..rollout import Agent
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
 from ..ticker import MonotonicClock, Ticker
@@ -75,6 +76,10 @@ class Game:
         self._view: TableView | None = None
 
     # The schedule.
+
+    def play_by(self, balance: Balance, robot: Agent) -> None:
+        """Plays by another schedule, with an agent at the robot's seat; before the first episode."""
+        self.balance, self.players[0].agent = balance, robot
 
     @property
     def finished(self) -> bool:

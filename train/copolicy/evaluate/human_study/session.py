@@ -54,8 +54,7 @@ def run_session(
         agent = PolicyAgent(policy, real_time=True)
         stack.callback(agent.close)
         game = application.game
-        game.players[0].agent = agent
-        game.balance = StudySchedule(plan, participant, policy, agent)
+        game.play_by(StudySchedule(plan, participant, policy, agent), agent)
         with stopped_by_signals(game):
             application.run()
         return {"participant": participant, "plan": plan.plan_id, **application.summary()}
