@@ -13,7 +13,7 @@ from copolicy.collect.agents.scripted import simulated_players
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
-from copolicy.dataset.features import BOUNDS, OBSERVATION_KEYS, SCENE_SIZE
+from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.features import BOUNDS, environment_state, theta_of
 from copolicy.tasks.table.interaction import interaction_force
