@@ -5,8 +5,8 @@ from typing import Any
 import torch
 from lerobot.configs import FeatureType, PolicyFeature
 
-from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.tasks.table.features import BOUNDS, FEATURES
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, bounds_of, features_of
+from copolicy.dataset.task import get_task
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
@@ -15,15 +15,16 @@ TRANSFORMER = {"network": "transformer", "n_layers": 1, "width": 16, "n_heads": 
 MLP = {"network": "mlp", "n_layers": 2, "width": 32}
 
 
-def policy(seed: int = 0, **settings) -> Any:
+def policy(seed: int = 0, task: str = "table", **settings) -> Any:
     """An untrained policy: one layer of a transformer, planning with torch, unless said otherwise."""
-    kinds = {ENVIRONMENT_STATE: FeatureType.ENV}
+    kinds, features = {ENVIRONMENT_STATE: FeatureType.ENV}, features_of(get_task(task).spec)
     config = CopolicyConfig(
+        task=task,
         device="cpu",
         input_features={
-            key: PolicyFeature(kinds.get(key, FeatureType.STATE), FEATURES[key]["shape"]) for key in OBSERVATIONS
+            key: PolicyFeature(kinds.get(key, FeatureType.STATE), features[key]["shape"]) for key in OBSERVATIONS
         },
-        output_features={ACTION: PolicyFeature(FeatureType.ACTION, (4,))},
+        output_features={ACTION: PolicyFeature(FeatureType.ACTION, features[ACTION]["shape"])},
         **{"backend": "torch", **TRANSFORMER, **settings},
     )
     torch.manual_seed(seed)
@@ -45,11 +46,11 @@ def lively_policy(seed: int = 0, **settings) -> Any:
     return planner
 
 
-def columns(*shape: int, seed: int = 0) -> dict[str, torch.Tensor]:
+def columns(*shape: int, seed: int = 0, task: str = "table") -> dict[str, torch.Tensor]:
     """Random observations within the bounds of the task, `shape + (n,)` each."""
     generator = torch.Generator().manual_seed(seed)
-    batch = {}
+    batch, bounds = {}, bounds_of(get_task(task).spec)
     for key in OBSERVATIONS:
-        low, high = (torch.tensor(BOUNDS[key][end], dtype=torch.float32) for end in (0, 1))
+        low, high = (torch.tensor(bounds[key][end], dtype=torch.float32) for end in (0, 1))
         batch[key] = low + (high - low) * torch.rand(*shape, len(low), generator=generator)
     return batch

@@ -16,8 +16,10 @@ from accelerate.state import AcceleratorState
 from lerobot.datasets import LeRobotDataset
 from safetensors.torch import load_file
 
-from copolicy.dataset.features import ACTION
-from copolicy.tasks.table.features import FEATURES, TASK
+from copolicy.dataset.features import ACTION, features_of
+from copolicy.dataset.lerobot_folder.info import robot_type
+from copolicy.dataset.task import get_task
+from copolicy.tasks.table.features import FEATURES
 from copolicy.train.cli import with_defaults
 
 LENGTHS = (14, 5, 20, 11, 17, 8)
@@ -30,24 +32,31 @@ _WINDOWS = {
 _SMALL = ["--policy.preset=small", "--policy.width=16", "--policy.n_layers=1", "--policy.device=cpu"]
 
 
-def write_table(root: Path, lengths: tuple[int, ...] = LENGTHS, learnable: bool = False) -> Path:
+def write_table(
+    root: Path, lengths: tuple[int, ...] = LENGTHS, learnable: bool = False, task: str | None = None
+) -> Path:
     """Writes random frames with LeRobot's own writer; no episode is marked as discarded.
 
-    Where it shall be learnable, both players push to the right in all of them.
+    Where it shall be learnable, both players push to the right in all of them. No task named: the table, and data that
+    do not say so.
     """
-    dataset = LeRobotDataset.create("local/table", 10, FEATURES, root=root, use_videos=False, video_backend="pyav")
+    spec = get_task(task or "table").spec
+    features, robot = features_of(spec), robot_type(task) if task else None
+    dataset = LeRobotDataset.create(
+        "local/table", 10, features, root=root, robot_type=robot, use_videos=False, video_backend="pyav"
+    )
     random = np.random.default_rng(0)
     for length in lengths:
         for frame in range(length):
             values = {
                 key: random.uniform(-1, 1, feature["shape"]).astype(feature["dtype"])
-                for key, feature in FEATURES.items()
+                for key, feature in features.items()
                 if feature["dtype"] == "float32"
             }
             if learnable:
                 values[ACTION] = np.array([0.9, 0.0, 0.6, 0.0], np.float32) + 0.1 * values[ACTION]
             last = np.array([frame == length - 1])
-            dataset.add_frame({**values, "next.done": last, "next.success": last, "task": TASK})
+            dataset.add_frame({**values, "next.done": last, "next.success": last, "task": spec.sentence})
         dataset.save_episode()
     dataset.finalize()
     mark_discarded(root, ())

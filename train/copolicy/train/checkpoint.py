@@ -110,7 +110,7 @@ class Checkpoint:
             observations: columns `(B, n_obs_steps, n)`, oldest frame first, in physical units.
 
         Returns:
-            `(B, wanted, 4)` joint actions, the first for the newest frame; `(B, 1, 4)` where `keeps_history`.
+            `(B, wanted, m)` joint actions, the first for the newest frame; `(B, 1, m)` where `keeps_history`.
 
         Raises:
             RunError: the policy answers neither way.
@@ -196,7 +196,8 @@ def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any
     if unknown := sorted(set(config.input_features) - set(_OBSERVATIONS)):
         expected = f"a policy that observes {', '.join(_OBSERVATIONS)} at most"
         raise FileFormatError(folder, expected, f"one that also needs {', '.join(unknown)}")
-    size, feature = len(get_task().spec.joint_action), config.action_feature
+    task = get_task(getattr(config, "task", None) or "table")
+    size, feature = len(task.spec.joint_action), config.action_feature
     if feature is None or tuple(feature.shape) != (size,):
         found = "none" if feature is None else f"actions of {tuple(feature.shape)}"
         raise FileFormatError(folder, f"a policy for both players, with actions of ({size},)", found)
