@@ -1,4 +1,4 @@
-"""The policy on the spec of its task: another task trains without a line of torch, with features of its own where it has some."""
+"""The policy on the spec of its task: another task trains without a line of torch, or with features of its own."""
 
 import json
 import logging
@@ -103,9 +103,9 @@ def test_what_a_task_lacks_is_refused_where_it_is_asked_for(peg, tmp_path, capsy
         "mirror=true": "false (the task 'peg' has no such symmetry), found True",
         "symmetries=[turn]": "some of none (the task 'peg' has no others), found ['turn']",
     }.items():
+        name, _, value = setting.partition("=")
+        values: dict[str, Any] = {"true": True, "[turn]": ["turn"]}
         with pytest.raises(InvalidValueError) as caught:
-            name, _, value = setting.partition("=")
-            values = {"true": True, "[turn]": ["turn"]}
             CopolicyConfig(task="peg", device="cpu", **{name: values.get(value, value)})
         assert str(caught.value) == f"{name}: expected {expected}"
     out = tmp_path / "out"

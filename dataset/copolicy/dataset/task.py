@@ -21,10 +21,31 @@ import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
-from .task_spec import TaskSpec
+from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
+
+# The whole contract from one place, for packages that bring a task.
+__all__ = [
+    "ENTRY_POINTS",
+    "PLAYERS",
+    "RECORD_HZ",
+    "RUNNING",
+    "Outcome",
+    "PairTask",
+    "Player",
+    "PolicyFeatures",
+    "Scenario",
+    "SeatExchange",
+    "Settings",
+    "SimulatedPlayers",
+    "TaskSpec",
+    "Vector",
+    "World",
+    "get_task",
+    "installed_tasks",
+]
 
 ENTRY_POINTS = "copolicy.tasks"
 """The entry point group in which tasks are registered."""

@@ -308,6 +308,8 @@ class CopolicyPolicy(PreTrainedPolicy):
             raise InvalidValueError("batch", f"the column {key}", sorted(batch))
         values, size = batch[key], self._sizes[key]
         expected = (size,) if frames is None else (frames, size)
+        if size == 1 and values.ndim == len(expected):
+            values = values.unsqueeze(-1)  # LeRobot stores a vector of one number as that number
         if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
             raise ShapeError(key, ("B", *expected), tuple(values.shape))
         return values
