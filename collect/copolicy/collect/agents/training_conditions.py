@@ -8,7 +8,6 @@ from typing import Any, TypedDict
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE
-from copolicy.dataset.lerobot_folder.info import INFO_FILE
 from copolicy.dataset.task import get_task
 
 ASSUMED_FPS = 10
