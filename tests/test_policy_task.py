@@ -13,6 +13,7 @@ from training_table import flags, write_table
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
+from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.cli import main
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.features import ActionScale
@@ -92,6 +93,7 @@ def test_another_task_trains_on_its_scaled_numbers_alone(peg, tmp_path, capsys):
 
     # Trained on, and given away.
     assert main([f"--policy.path={trained(out)}", *flags(data, tmp_path / "on", steps=1)[:2], "--steps=1"]) == 0
+    assert Checkpoint(out).conditions.physics == peg.settings_type()
     assert main(["export", str(out), "--out", str(tmp_path / "model"), "--json"]) == 0
     assert json.loads((tmp_path / "model" / "config.json").read_text(encoding="utf-8"))["task"] == "peg"
 
