@@ -106,7 +106,8 @@ def test_what_a_task_lacks_is_refused_where_it_is_asked_for(peg, tmp_path, capsy
         ("symmetries", ["turn"], "some of none (the task 'peg' has no others)"),
     ):
         with pytest.raises(InvalidValueError) as caught:
-            CopolicyConfig(task="peg", device="cpu", **{name: value})
+            settings: dict[str, Any] = {name: value}
+            CopolicyConfig(task="peg", device="cpu", **settings)
         assert str(caught.value) == f"{name}: expected {expected}, found {value!r}"
     out = tmp_path / "out"
     assert main([*flags(data, out), "--policy.observation_features=scan"]) == 2
@@ -148,7 +149,8 @@ def test_a_saved_configuration_without_a_task_is_of_the_table(tmp_path):
 def test_every_backend_plans_for_players_of_one_number_each(peg, backend, network):
     plans = []
     for settings in ({"planner": "plain"}, {"backend": backend}):
-        planner = lively_policy(task="peg", **network, **settings)
+        more: dict[str, Any] = {**network, **settings}
+        planner = lively_policy(task="peg", **more)
         plans.append(planner.plan(columns(3, 3, task="peg"), torch.Generator().manual_seed(0)))
     assert plans[0].shape == (3, 12, 2)
     torch.testing.assert_close(*plans, atol=1e-5, rtol=1e-5)
