@@ -105,8 +105,8 @@ def test_what_a_task_lacks_is_refused_where_it_is_asked_for(peg, tmp_path, capsy
         ("mirror", True, "false (the task 'peg' has no such symmetry)"),
         ("symmetries", ["turn"], "some of none (the task 'peg' has no others)"),
     ):
+        settings: dict[str, Any] = {name: value}
         with pytest.raises(InvalidValueError) as caught:
-            settings: dict[str, Any] = {name: value}
             CopolicyConfig(task="peg", device="cpu", **settings)
         assert str(caught.value) == f"{name}: expected {expected}, found {value!r}"
     out = tmp_path / "out"
