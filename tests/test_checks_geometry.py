@@ -7,7 +7,7 @@ import pytest
 
 from copolicy.dataset.checks.geometry import INNER, OUTER, final_poses, separation
 from copolicy.dataset.checks.limits import limit
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import GOAL_SIZE

@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, make_data_set, make_recordings, set_columns
@@ -14,6 +15,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.lerobot_folder.info import split_range
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 
 COMMANDS = {
@@ -181,3 +183,72 @@ def test_each_episode_once(root):
     set_columns(root, episode_index=[0, 0])
     with pytest.raises(FileFormatError, match="episodes 0 to 1, each once, found episode 0 twice"):
         LeRobotFolder.open(root)
+
+
+def test_frames_come_episode_by_episode(sound):
+    folder = LeRobotFolder.open(sound)
+    shapes = {"action": (4,), "index": (1,)}
+    read = list(folder.frames(shapes))
+    assert [number for number, _ in read] == list(range(len(folder.lengths)))
+    assert [columns["action"].shape for _, columns in read] == [(length, 4) for length in folder.lengths]
+    np.testing.assert_array_equal(
+        np.concatenate([columns["index"] for _, columns in read]), np.arange(sum(folder.lengths))
+    )
+
+
+def _change_frames(root, change):
+    (path,) = (root / "data").rglob("*.parquet")
+    pq.write_table(change(pq.read_table(path)), path)
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (lambda table: table.slice(1), r"expected episode 0 with \d+ frames as in meta/episodes, found episode 0 with"),
+        (lambda table: pa.concat_tables([table, table.slice(0, 1)]), "expected its end as in meta/episodes, found"),
+        (lambda table: table.filter(pc.field("episode_index") == 0), "expected the frames of episode 1"),
+        (lambda table: table.drop_columns("next.reward"), "none named next.reward"),
+    ],
+)
+def test_frames_that_the_episodes_do_not_tell_of_are_refused(root, change, found):
+    _change_frames(root, change)
+    with pytest.raises(FileFormatError, match=found):
+        list(LeRobotFolder.open(root).frames({"next.reward": (1,)}))
+
+
+def test_frames_are_finite(root):
+    def with_nan(table):
+        values = table["next.reward"].to_pylist()
+        values[3] = float("nan")
+        place = table.column_names.index("next.reward")
+        return table.set_column(place, "next.reward", pa.array(values, pa.float32()))
+
+    _change_frames(root, with_nan)
+    with pytest.raises(FileFormatError, match=r"expected finite next.reward, found nan or inf"):
+        list(LeRobotFolder.open(root).frames({"next.reward": (1,)}))
+
+
+@pytest.mark.parametrize(
+    ("text", "span"),
+    [
+        ("0:40", range(40)),
+        ("7:7", range(7, 7)),
+        ("5:2", range(5, 2)),
+        ("0-40", None),
+        (":3", None),
+        ("1:2:3", None),
+        ("-1:2", None),
+    ],
+)
+def test_a_split_is_a_range_of_episodes(text, span):
+    assert split_range(text) == span
+
+
+def test_splits_of_another_form_are_named(root):
+    path = root / "meta" / "info.json"
+    info = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps({**info, "splits": {"train": "0:1", "test": "1-2"}}), encoding="utf-8")
+    with pytest.raises(FileFormatError, match="expected splits as FIRST:END, found '1-2'"):
+        _ = LeRobotFolder.open(root).splits
+    path.write_text(json.dumps({**info, "splits": {"train": "0:1", "test": "1:2"}}), encoding="utf-8")
+    assert LeRobotFolder.open(root).splits == {"train": range(1), "test": range(1, 2)}

@@ -81,7 +81,9 @@ def test_make_writes_a_file_that_passes(tmp_path, capsys):
 
 
 def test_schema_is_printed(capsys):
-    assert json.loads(output(capsys, "maps", "schema")[1]) == get_task().scenario_files.schema
+    files = get_task().scenario_files
+    assert files is not None
+    assert json.loads(output(capsys, "maps", "schema")[1]) == files.schema
 
 
 def test_weights_steer_the_schedule_of_play(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,7 +129,7 @@ def test_recordings_become_a_data_set(peg, tmp_path, capsys):
     document = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
     assert document["task"] == json.loads(json.dumps(peg.spec.to_dict()))
     dataset = LeRobotDataset("lab/peg", root)
-    first = dataset[0]
+    first: Any = dataset[0]
     assert {key: tuple(first[key].shape) for key in (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)} == {
         STATE: (2,), ENVIRONMENT_STATE: (2,), HUMAN_ACTION: (), ACTION: (2,),  # LeRobot stores one number as it is
     }  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.agents import NEVER_YIELDS, Habits
 from copolicy.tasks.table.agents.hand import UnsteadyHand
 

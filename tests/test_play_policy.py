@@ -99,8 +99,10 @@ def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(agent, 
 
 
 def test_at_the_humans_seat_a_policy_sees_the_seats_exchanged(counter):
-    agent, world = PolicyAgent(counter), TableWorld(MAP)
+    agent, world, exchange = PolicyAgent(counter), TableWorld(MAP), get_task().exchange
+    assert exchange is not None
     begin(agent, seat=1)
+    seen = world.observation
     for step in range(6):
         (force,) = agent.act(world.observation[None], ONE)
         assert force.tolist() == pytest.approx([0.1, 0.1 * (step // 3)])  # its robot's half
@@ -112,7 +114,7 @@ def test_at_the_humans_seat_a_policy_sees_the_seats_exchanged(counter):
     counter.n_action_steps = 2
     agent.act(world.observation[None], ONE)
     first, second = counter.histories
-    turned = get_task().exchange.states
+    turned = exchange.states
     np.testing.assert_array_equal(first[STATE][0], turned(TableWorld(MAP).observation))
     np.testing.assert_array_equal(second[STATE], turned(np.array([seen, world.observation])))
     np.testing.assert_allclose(second[HUMAN_ACTION], [[0.01, 0.5], [0.04, 0.5]])  # what the robot really did

@@ -58,13 +58,11 @@ def test_agents_are_told_start_state_and_what_acted():
 
 def test_worlds_side_by_side_go_as_each_alone():
     together = pairs()
-    trace = Trace(together.worlds)
-    together.observers.append(trace)
+    trace = Trace(together)
     together.run()
     for index, config in enumerate(MAPS):
         alone = pairs(index, [config])
-        own = Trace(alone.worlds)
-        alone.observers.append(own)
+        own = Trace(alone)
         alone.run()
         np.testing.assert_array_equal(trace.states(index), own.states(0))
         np.testing.assert_array_equal(trace.actions(index), own.actions(0))
@@ -86,8 +84,7 @@ def test_recorded_actions_end_with_rest():
     actions = np.arange(8.0).reshape(2, 4) / 10
     agents = (RecordedAgent([actions]), RecordedAgent([actions]))
     rollout = Rollout(TASK, MAPS[:1], agents)
-    trace = Trace(rollout.worlds)
-    rollout.observers.append(trace)
+    trace = Trace(rollout)
     rollout.run(3)
     np.testing.assert_array_equal(trace.actions(0), [*actions, np.zeros(4)])
 

@@ -7,7 +7,8 @@ import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
-from copolicy.dataset.task import Vector, get_task, installed_tasks
+from copolicy.dataset.task import get_task, installed_tasks
+from copolicy.dataset.task_spec import Vector
 from copolicy.tasks.table.features import ACTION_NAMES, BOUNDS, ENVIRONMENT_NAMES, STATE_NAMES, state_vector
 
 

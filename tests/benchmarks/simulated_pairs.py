@@ -29,7 +29,7 @@ from copolicy.dataset.statistics.human_routes import human_distance
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import EpisodeRow, Trajectories
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.agents.clearance import square_clearance
 from copolicy.tasks.table.features import theta_of

@@ -6,6 +6,7 @@ from huggingface_hub import DatasetCardData
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.exclusions import FLAG
+from copolicy.dataset.lerobot_folder.info import task_of
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
@@ -132,7 +133,7 @@ def _overview(facts: DatasetFacts, title: str) -> str:
 
 def _physics(facts: DatasetFacts) -> str:
     try:
-        counts = physics_counts(episode["physics"] for episode in facts.episodes)
+        counts = physics_counts((episode["physics"] for episode in facts.episodes), task_of(facts.info))
     except InvalidValueError as error:
         raise FileFormatError(facts.root, "episodes whose settings of the dynamics can be read", str(error)) from None
     total = len(facts.episodes)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 DT_NS = 10**9 // RECORD_HZ
 """Length of a step, ns."""

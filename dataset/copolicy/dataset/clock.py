@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from .exceptions import InvalidValueError
-from .task import RECORD_HZ
+from .task_spec import RECORD_HZ
 
 Hold = Literal["mean", "first"]
 """How the actions between two frames become one: their mean (reproduces the motion), or the first of them."""

@@ -6,7 +6,8 @@ from typing import Any, Literal
 import numpy as np
 
 from .exceptions import InvalidValueError, ShapeError
-from .task import TaskSpec, get_task
+from .task import get_task
+from .task_spec import TaskSpec
 
 Source = Literal["human", "simulated", "upstream"]
 

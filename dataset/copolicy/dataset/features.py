@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .task import TaskSpec, Vector
+from .task_spec import TaskSpec, Vector
 
 STATE = "observation.state"
 ENVIRONMENT_STATE = "observation.environment_state"

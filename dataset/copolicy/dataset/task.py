@@ -21,55 +21,34 @@ import numpy as np
 
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
+from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
 
-RECORD_HZ = 30
-"""Steps of simulation and recording per second."""
-
-PLAYERS = ("robot", "human")
+# The whole contract from one place, for packages that bring a task.
+__all__ = [
+    "ENTRY_POINTS",
+    "PLAYERS",
+    "RECORD_HZ",
+    "RUNNING",
+    "Outcome",
+    "PairTask",
+    "Player",
+    "PolicyFeatures",
+    "Scenario",
+    "SeatExchange",
+    "Settings",
+    "SimulatedPlayers",
+    "TaskSpec",
+    "Vector",
+    "World",
+    "get_task",
+    "installed_tasks",
+]
 
 ENTRY_POINTS = "copolicy.tasks"
 """The entry point group in which tasks are registered."""
-
-
-@dataclass(frozen=True)
-class Vector:
-    """A vector of numbers with what each of them means.
-
-    Attributes:
-        names: one a number.
-        units: of each, `1` for none.
-        low: lowest value of each that the task knows; what scales a policy's input.
-        high: highest value of each.
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-
-    def __post_init__(self):
-        sizes = {name: len(getattr(self, name)) for name in ("names", "units", "low", "high")}
-        if len(set(sizes.values())) != 1:
-            raise InvalidValueError("Vector", "as many units, low and high values as names", sizes)
-        if not all(low < high for low, high in zip(self.low, self.high, strict=True)):
-            raise InvalidValueError("Vector", "low values below the high ones", (self.low, self.high))
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def bounds(self) -> np.ndarray:
-        """Lowest and highest values, `(2, n)`."""
-        return np.array((self.low, self.high), float)
-
-    @property
-    def range(self) -> str:
-        """The bounds in words: `[-1, 1]` where all are the same."""
-        one = len(set(self.low)) == len(set(self.high)) == 1
-        return f"[{self.low[0]:g}, {self.high[0]:g}]" if one else f"their bounds, {self.low} to {self.high}"
 
 
 class Scenario(Protocol):
@@ -152,33 +131,25 @@ class Player(Protocol):
         ...
 
 
-class SimulatedPlayers(Protocol):
+@dataclass(frozen=True)
+class SimulatedPlayers:
     """The part `agents` of a task: players that need neither a person nor a policy.
 
     Attributes:
         pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
         partners: profiles of kinds of partner for the human seat, which robots are judged with.
         robots: profile and description of scripted robots, which policies are compared with.
+        make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
+        make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
+        make_robot: a player from scenario, name and seed.
     """
 
-    @property
-    def pairs(self) -> Mapping[str, tuple[Any, Any]]: ...
-    @property
-    def partners(self) -> Mapping[str, Any]: ...
-    @property
-    def robots(self) -> Mapping[str, tuple[Any, str]]: ...
-
-    def make_pair(self, scenario: Any, name: str, seed: int, /, *options: Any) -> tuple[Player, Player]:
-        """The players of a pair for one episode; `options` are the task's own."""
-        ...
-
-    def make_partner(self, scenario: Any, kind: str, seed: int, /) -> Player:
-        """A partner for one episode; equal seeds make equal ones, whoever the robot is."""
-        ...
-
-    def make_robot(self, scenario: Any, name: str, seed: int, /) -> Player:
-        """A scripted robot for one episode."""
-        ...
+    pairs: Mapping[str, tuple[Any, Any]]
+    partners: Mapping[str, Any]
+    robots: Mapping[str, tuple[Any, str]]
+    make_pair: Callable[..., tuple[Player, Player]]
+    make_partner: Callable[[Any, str, int], Player]
+    make_robot: Callable[[Any, str, int], Player]
 
 
 class SeatExchange(Protocol):
@@ -199,53 +170,6 @@ class SeatExchange(Protocol):
     def actions(self, actions: np.ndarray) -> np.ndarray:
         """Joint actions `(..., 2 m)` with the seats exchanged."""
         ...
-
-
-@dataclass(frozen=True)
-class TaskSpec:
-    """What a task is, in plain data; recordings, data sets and checkpoints carry it.
-
-    Attributes:
-        name: by which `get_task` finds it.
-        sentence: LeRobot's task sentence.
-        state: what agents and policies see of the world.
-        recorded: the state as recordings hold it; from it `PairTask.states_of` makes `state`.
-        scenario: the vector of a scenario in a data set.
-        action: one player's action.
-        reasons: how a world can end an episode.
-        successes: which of them mean success.
-        record_hz: steps a second.
-        players: names of the seats.
-        title: what it is called in messages; its name where none is given.
-    """
-
-    name: str
-    sentence: str
-    state: Vector
-    recorded: Vector
-    scenario: Vector
-    action: Vector
-    reasons: tuple[str, ...]
-    record_hz: int = RECORD_HZ
-    players: tuple[str, str] = PLAYERS
-    title: str = ""
-    successes: tuple[str, ...] = ("goal",)
-
-    def __post_init__(self):
-        object.__setattr__(self, "title", self.title or self.name)
-        if not set(self.successes) <= set(self.reasons):
-            raise InvalidValueError(f"TaskSpec.successes of {self.name!r}", f"some of {self.reasons}", self.successes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The spec as data sets and recordings carry it, JSON-able."""
-        return asdict(self)
-
-    @property
-    def joint_action(self) -> Vector:
-        """Both players' actions, robot first; names begin with the player's."""
-        one = self.action
-        names = tuple(f"{player}_{name}" for player in self.players for name in one.names)
-        return Vector(names, one.units * 2, one.low * 2, one.high * 2)
 
 
 @dataclass(frozen=True)
@@ -271,20 +195,17 @@ class PairTask(ABC):
         spec: what it is.
         scenario_type: class of its scenarios, which is constructed from JSON by `scenario_of_json`.
         settings_type: class of its settings.
+        exchange: how an episode looks from the other seat.
     """
 
     spec: ClassVar[TaskSpec]
     scenario_type: ClassVar[type]
     settings_type: ClassVar[type]
+    exchange: ClassVar[SeatExchange | None] = None
 
     @property
     def agents(self) -> SimulatedPlayers | None:
         """Simulated players."""
-        return None
-
-    @property
-    def exchange(self) -> SeatExchange | None:
-        """How an episode looks from the other seat."""
         return None
 
     @property

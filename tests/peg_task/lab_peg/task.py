@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.task import RUNNING, Outcome, PairTask, TaskSpec, Vector
+from copolicy.dataset.task import RUNNING, Outcome, PairTask
+from copolicy.dataset.task_spec import TaskSpec, Vector
 
 LENGTH = 2.0  # m, the line from -LENGTH / 2 to LENGTH / 2
 _CLOSE, _SLOW = 0.02, 0.05  # m, m/s: the peg is at the mark

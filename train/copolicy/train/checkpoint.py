@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import torch
 from lerobot.configs.policies import PreTrainedConfig
-from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.utils.import_utils import register_third_party_plugins
 
@@ -47,6 +46,7 @@ class Checkpoint:
         weights_sha256: digest of the weights.
         policy: LeRobot's policy.
         conditions: rate and physics that it learned at.
+        fps: the rate, frames a second, for which an action is held.
         n_obs_steps: frames of history that a chunk is predicted from.
         n_action_steps: actions of a chunk that are executed before the next chunk.
         chunk_size: actions that a chunk holds at most, from the newest frame on.
@@ -69,6 +69,7 @@ class Checkpoint:
         """
         self.folder = folder = checkpoint_folder(path)
         self.conditions = training_conditions(folder)
+        self.fps = self.conditions.fps
         register_third_party_plugins()
         try:
             self.policy, self._preprocess, self._postprocess = _loaded(folder, device, settings or {})
@@ -92,21 +93,15 @@ class Checkpoint:
         self.keeps_history = getattr(self._config, "temporal_ensemble_coeff", None) is not None
         self.planning_seconds: list[float] = []
         self.batch_sizes: list[int] = []
-        self._device = device
+        self._devices = ["cpu", device] if torch.device(device).type == "cuda" else ["cpu"]
         self._answered = False
         self.reset(0)
-
-    @property
-    def fps(self) -> int:
-        """Frames a second of the data that it learned from; an action is held so long."""
-        return self.conditions.fps
 
     def reset(self, seed: int) -> None:
         """Episodes begin: forgets the queues of the policy, and sets the source of its noise."""
         with _LOCK:
             self.policy.reset()
-        devices = {"cpu", torch.device(self._device).type} & {"cpu", "cuda"}
-        self._noise = {device: torch.Generator(device).manual_seed(seed).get_state() for device in sorted(devices)}
+        self._noise = {device: torch.Generator(device).manual_seed(seed).get_state() for device in self._devices}
 
     def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
         """Predicts for several worlds at once.
@@ -188,7 +183,7 @@ class Checkpoint:
                     _set_random_state(device, state)
 
 
-def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[PreTrainedPolicy, Any, Any]:
+def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any, Any, Any]:
     config: Any = PreTrainedConfig.from_pretrained(folder)
     config.device = device
     config.pretrained_path = folder
@@ -218,11 +213,11 @@ def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Pre
 
 
 def _random_state(device: str) -> torch.Tensor:
-    return torch.cuda.get_rng_state() if device == "cuda" else torch.get_rng_state()
+    return torch.get_rng_state() if device == "cpu" else torch.cuda.get_rng_state(device)
 
 
 def _set_random_state(device: str, state: torch.Tensor) -> None:
-    if device == "cuda":
-        torch.cuda.set_rng_state(state)
-    else:
+    if device == "cpu":
         torch.set_rng_state(state)
+    else:
+        torch.cuda.set_rng_state(state, device)

@@ -12,13 +12,7 @@ from pathlib import Path
 
 from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
-from copolicy.dataset.exceptions import (
-    CopolicyError,
-    FileFormatError,
-    MissingExtraError,
-    OutputExistsError,
-    RunError,
-)
+from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
 from copolicy.dataset.files.local_path import require_hub_name, similar_path
 from copolicy.dataset.files.staging import about, refusal
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder

@@ -49,10 +49,7 @@ def _datasets_in_memory() -> Iterator[None]:
         "make_train_eval_datasets": lambda config: _make_datasets(config, original),
         "EpisodeAwareSampler": WholeEpochSampler,
     }
-    with (
-        _replaced(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}),
-        _replaced(lerobot_train, ours),
-    ):
+    with _replaced(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}), _replaced(lerobot_train, ours):
         yield
 
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, bounds_of, scaling_of
-from copolicy.dataset.task import TaskSpec
+from copolicy.dataset.task_spec import TaskSpec
 
 
 class AbsoluteFeatures(nn.Module):

@@ -158,13 +158,13 @@ class TableCarryingEnv(gymnasium.Env):
         given = np.clip(given, -1.0, 1.0)
         for agent, half in zip(self._given, (given[:2], given[2:]), strict=True):
             agent.action = half
-        trace = Trace([self.world])
-        self._rollout.observers = [trace]
+        self._rollout.observers.clear()
+        trace = Trace(self._rollout)
         for _ in range(self._stride):
             self._rollout.step()
-            (outcome,) = self._rollout.outcomes
-            if outcome.done:
+            if self._rollout.outcomes[0].done:
                 break
+        (outcome,) = self._rollout.outcomes
         # The past human action is that of the frame: of several held steps their mean, as in a data set.
         self._action = np.mean(trace.actions(0), axis=0)
         forces = interaction_force(trace.states(0)[1:, 2], trace.actions(0))

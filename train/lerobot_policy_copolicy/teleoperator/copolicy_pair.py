@@ -13,7 +13,8 @@ from lerobot.utils.errors import DeviceNotConnectedError
 from copolicy.collect.devices import follow_pads, open_pads
 from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, TwinWatch, user_config_folder
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import PLAYERS, RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 
 from .config_copolicy_pair import CopolicyPairConfig
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.map_config import WINDOW
 from copolicy.tasks.table.physics import GOAL_SIZE
 

@@ -4,15 +4,12 @@ from collections.abc import Mapping
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from copolicy.dataset.command_line.extras import POLICIES, require_packages
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.listing import is_hidden
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
-
-if TYPE_CHECKING:
-    from .policy import LearnedPolicy
 
 PRETRAINED = "pretrained"
 """In the place of a path: the model that comes with the package."""
@@ -21,8 +18,8 @@ _PLUGIN = "lerobot_policy_copolicy"
 _ENTRY_POINTS = "copolicy.policies"
 
 
-def load_policy(path: Path | str, device: str = "cpu", settings: Mapping[str, Any] | None = None) -> "LearnedPolicy":
-    """A policy as it can act at a seat.
+def load_policy(path: Path | str, device: str = "cpu", settings: Mapping[str, Any] | None = None) -> Any:
+    """A policy as it can act at a seat: a `Policy` with the `TrainingConditions` that it learned at, `conditions`.
 
     Collecting needs no torch: what loads a checkpoint is found by its name, `lerobot`, in the entry point group
     `copolicy.policies`.

@@ -14,7 +14,6 @@ from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import PairTask, get_task
 
 from ..rollout import Agent, Start
-from .training_conditions import TrainingConditions
 
 
 class Policy(Protocol):
@@ -24,36 +23,23 @@ class Policy(Protocol):
         name: in recordings.
         n_obs_steps: frames of history that it wants.
         n_action_steps: actions of a chunk that are executed before the next chunk.
+        fps: frames a second of the data that it learned from.
         keeps_history: it remembers frames itself: it must see each one, always of all worlds, and gives one action.
     """
 
     name: str
     n_obs_steps: int
     n_action_steps: int
+    fps: int
     keeps_history: bool
 
-    @property
-    def fps(self) -> int:
-        """Frames a second of the data that it learned from."""
-        ...
-
-    def reset(self, seed: int) -> None:
+    def reset(self, seed: int, /) -> None:
         """Episodes begin: forgets, and sets the source of what it draws at random."""
         ...
 
-    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+    def predict_action_chunk(self, observations: dict[str, np.ndarray], /) -> np.ndarray:
         """Joint actions `(B, actions, 2 m)` from the newest frame on, from observations `(B, n_obs_steps, n)`."""
         ...
-
-
-class LearnedPolicy(Policy, Protocol):
-    """A policy from a checkpoint.
-
-    Attributes:
-        conditions: rate and physics that it learned at.
-    """
-
-    conditions: TrainingConditions
 
 
 class _Chunk(NamedTuple):

@@ -10,7 +10,8 @@ from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.agents import PAIRS
 
 from ..agents.checkpoint_folder import PRETRAINED

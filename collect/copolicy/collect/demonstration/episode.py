@@ -26,10 +26,9 @@ def demonstrate(policy: Policy, scenario: Any, partner: str = "S01", seed: int =
     task = get_task()
     robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
     settings = settings or task.settings_type()
-    world = task.make_world(scenario, settings)
-    trace = Trace([world])
     try:
-        rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], worlds=[world], observers=[trace])
+        rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], settings=settings)
+        trace = Trace(rollout)
         while len(rollout.running):
             robot.wait()
             rollout.step()

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.artist.table_view import TableView
 
 from ..replay.track import Track, sampled

@@ -7,11 +7,13 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 
 from ..recording.wall_clock import WallClockAnchor
+from ..rollout import Agent
 from ..screen.hud import Hud, SeatStatus
 from ..session import Balance, SessionFolder
 from ..ticker import MonotonicClock, Ticker
@@ -74,6 +76,10 @@ class Game:
         self._view: TableView | None = None
 
     # The schedule.
+
+    def play_by(self, balance: Balance, robot: Agent) -> None:
+        """Plays by another schedule, with an agent at the robot's seat; before the first episode."""
+        self.balance, self.players[0].agent = balance, robot
 
     @property
     def finished(self) -> bool:

@@ -11,7 +11,8 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
-from copolicy.dataset.task import PLAYERS, RECORD_HZ, RUNNING, Outcome, get_task
+from copolicy.dataset.task import RUNNING, Outcome, get_task
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 from copolicy.tasks.table.interaction import interaction_force
 
 from ..agents import PersonAgent, PolicyAgent

@@ -12,7 +12,7 @@ from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
 from copolicy.dataset.recording.topics import EVENT, INPUTS, LOOP_TIMING, Record
-from copolicy.dataset.task import TaskSpec
+from copolicy.dataset.task_spec import TaskSpec
 
 from .wall_clock import WallClockAnchor
 

@@ -15,9 +15,9 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunErr
 from copolicy.dataset.files.staging import about
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.generic_messages import messages_of
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
-from copolicy.dataset.recording.task_messages import messages_of
 from copolicy.dataset.recording.topics import Record
 from copolicy.dataset.task import get_task
 

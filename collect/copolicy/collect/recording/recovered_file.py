@@ -18,9 +18,9 @@ from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.files.staging import about, sync_folder
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
+from copolicy.dataset.recording.generic_messages import messages_of
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.soundness import RECOVERY, UNVERIFIED
-from copolicy.dataset.recording.task_messages import messages_of
 from copolicy.dataset.recording.topics import EVENT, Record, is_ours
 from copolicy.dataset.task import PairTask
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """What a replay can be shown at, times real time."""

@@ -10,7 +10,7 @@ from typing import Any
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import new_file, require_new
-from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 from copolicy.tasks.table.artist.table_view import SEAT_POINTS, board_outline
 from copolicy.tasks.table.map_config import WINDOW
 from copolicy.tasks.table.outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 from copolicy.tasks.table.map_config import WINDOW
 
 from ..screen.canvas import Canvas

@@ -9,7 +9,7 @@ import numpy as np
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.recording.log import Recording, read_recording
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.artist.table_view import between
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.interaction import interaction_force

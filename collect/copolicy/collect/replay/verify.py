@@ -90,10 +90,10 @@ def _simulate(track: Track, angular_limit: float) -> tuple[np.ndarray, np.ndarra
     task = get_task()
     world = task.make_world(episode.map_config, physics)
     world.restore((*track.poses[0], *states[0, 4:].tolist()))
-    trace = Trace([world])
     agents = (RecordedAgent([episode.actions]), RecordedAgent([episode.actions]))
     # To the last recorded action, also where the world ends the episode before.
-    rollout = Rollout(task, [episode.map_config], agents, worlds=[world], observers=[trace], beyond_end=True)
+    rollout = Rollout(task, [episode.map_config], agents, worlds=[world], beyond_end=True)
+    trace = Trace(rollout)
     rollout.run(track.steps)
     simulated, (first,) = trace.states(0), rollout.outcomes
     px = np.linalg.norm(simulated[:, :2] - states[:, :2], axis=1)

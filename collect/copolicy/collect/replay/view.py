@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 from copolicy.tasks.table.artist.table_view import TableView
 
 from ..screen.canvas import Canvas

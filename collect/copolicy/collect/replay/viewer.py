@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..sdl import NoDisplayError, open_display, pygame
 from .pictures import write_png

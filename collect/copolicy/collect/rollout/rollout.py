@@ -29,7 +29,7 @@ class Rollout:
         ends: steps after which each ended.
         running: indices of those that still run.
         agents: at the robot's seat and at the human's.
-        observers: who look on.
+        observers: who look on, told after each step.
         actions: `(B, 2 m)` joint actions of the last step.
     """
 
@@ -41,7 +41,6 @@ class Rollout:
         *,
         seeds: Sequence[int] = (),
         settings: Any = None,
-        observers: Sequence[Observer] = (),
         worlds: Sequence[World] = (),
         begin: bool = True,
         beyond_end: bool = False,
@@ -60,7 +59,7 @@ class Rollout:
         self.outcomes: list[Outcome] = [RUNNING] * len(self.worlds)
         self.ends = [0] * len(self.worlds)
         self.running = np.arange(len(self.worlds))
-        self.observers = list(observers)
+        self.observers: list[Observer] = []
         self._beyond_end = beyond_end
         self._bounds = task.spec.joint_action.bounds
         self.actions = np.zeros((0, self._bounds.shape[1]))

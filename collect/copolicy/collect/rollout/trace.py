@@ -1,24 +1,21 @@
 """What happened in each world of a rollout, step by step."""
 
-from collections.abc import Sequence
-
 import numpy as np
-
-from copolicy.dataset.task import World
 
 from .rollout import Rollout
 
 
 class Trace:
-    """Keeps the states and joint actions of worlds from now on."""
+    """Keeps the states and joint actions of a rollout's worlds from now on."""
 
-    def __init__(self, worlds: Sequence[World], before: "Trace | None" = None):
+    def __init__(self, rollout: Rollout, before: "Trace | None" = None):
         """
         Args:
             before: of the one world whose present state all of these start in.
         """
-        self._states = [[*before._states[0]] if before else [world.recorded] for world in worlds]
-        self._actions = [[*before._actions[0]] if before else [] for _ in worlds]
+        self._states = [[*before._states[0]] if before else [world.recorded] for world in rollout.worlds]
+        self._actions = [[*before._actions[0]] if before else [] for _ in rollout.worlds]
+        rollout.observers.append(self)
 
     def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
         """See `Observer`."""

@@ -29,8 +29,8 @@ class EpisodeJob:
     def record(self) -> "EpisodeResult":
         """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, carry the table."""
         options = () if self.clearance is None else (self.clearance,)
-        agents = tuple(ScriptedAgent.of_pair(self.meta.pair_id, None, *options) for _ in range(2))
-        return record_episode(self.path, self.map_config, agents, self.meta, self.anchor, self.physics)
+        robot, human = (ScriptedAgent.of_pair(self.meta.pair_id, None, *options) for _ in range(2))
+        return record_episode(self.path, self.map_config, (robot, human), self.meta, self.anchor, self.physics)
 
 
 @dataclass(frozen=True)

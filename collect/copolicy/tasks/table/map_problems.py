@@ -93,7 +93,9 @@ def _parts(squares: _Squares) -> np.ndarray:
     for centre, size in squares:
         free = free & (square_clearance(x, y, theta, centre, size) > 0)
     # The first angle once more behind the last one, since half a turn on the table lies as at the first.
-    labels, count = label(np.concatenate((free, free[:1])), np.ones((3, 3, 3)))
+    labels = np.empty((grid.ANGLES + 1, grid.ROWS, grid.COLUMNS), np.int32)
+    label(np.concatenate((free, free[:1])), np.ones((3, 3, 3)), output=labels)
+    count = int(labels.max())
     ends = labels[0][free[0]], labels[-1][free[0]]
     graph = csr_matrix((np.ones(len(ends[0]), np.int64), ends), shape=(count + 1, count + 1))
     parts = connected_components(graph, directed=False)[1][labels[:-1]]

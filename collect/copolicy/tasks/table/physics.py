@@ -8,7 +8,7 @@ import math
 from dataclasses import asdict, dataclass
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 GOAL_SIZE = 92
 """Side of the solid goal square, px."""

@@ -7,7 +7,7 @@ import numpy as np
 from copolicy.dataset.recording.messages.copolicy_pb2 import Interaction, PlayerAction, TableState
 from copolicy.dataset.recording.task_messages import SceneWriter, TaskMessages
 from copolicy.dataset.recording.topics import Record, Topic, of_player
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from .artist.scene import SCENE, SCENE_MAP, TableScene, map_scene
 from .artist.scene_solids import MAP_SOLIDS, TABLE_FRAME, TABLE_SOLIDS, TableFrame, solid_records

@@ -2,7 +2,7 @@
 
 import math
 
-from copolicy.dataset.task import TaskSpec, Vector
+from copolicy.dataset.task_spec import TaskSpec, Vector
 
 from .map_config import MAX_OBSTACLES, WINDOW
 

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -23,7 +22,6 @@ from .seats import TableSeats
 from .spec import SPEC
 
 if TYPE_CHECKING:
-    from .agents.players import TablePlayers
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -40,11 +38,11 @@ class TableTask(PairTask):
     exchange = TableSeats()
 
     @property
-    def agents(self) -> "TablePlayers":
+    def agents(self) -> SimulatedPlayers:
         """Simulated pairs, partners and robots."""
-        from .agents.players import TablePlayers
+        from .agents.players import PLAYERS
 
-        return TablePlayers()
+        return PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:
@@ -132,7 +130,7 @@ class TableTask(PairTask):
         for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
             yield image.draw((x, y, theta))
 
-    @cached_property
+    @property
     def recording(self) -> "TableMessages":
         """The table's own messages."""
         from .recording import TableMessages  # protobuf

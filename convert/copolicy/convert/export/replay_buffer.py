@@ -24,7 +24,7 @@ import numpy as np
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.files.staging import new_folder
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.dynamics import step_angular, step_linear
 from copolicy.tasks.table.features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES, theta_of
 from copolicy.tasks.table.physics import Physics

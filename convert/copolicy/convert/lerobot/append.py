@@ -1,6 +1,5 @@
 """Adds recordings to a data set without rewriting what is there: new files beside the old ones."""
 
-import json
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
-from copolicy.dataset.files.staging import about
+from copolicy.dataset.files.staging import about, write_as_lerobot
 from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.references import Place, numbered_files
@@ -189,7 +188,7 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     for name in (INFO_FILE, STATS_FILE, RECORD_FILE):
         (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
     write_stats(aggregate_stats(statistics), whole)
-    (whole / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    write_as_lerobot(whole / INFO_FILE, info)
     write_record(whole, record)
     return info
 

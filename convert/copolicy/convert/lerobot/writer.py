@@ -23,7 +23,8 @@ from copolicy.dataset.files.staging import new_folder
 from copolicy.dataset.lerobot_folder.info import robot_type
 from copolicy.dataset.publication.licences import licence_identifier
 from copolicy.dataset.publication.minimal_card import minimal_card
-from copolicy.dataset.task import TaskSpec, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import TaskSpec
 
 from ..column_statistics import episode_statistics
 from ..video.scene_video import SCENE, scene_encoder, scene_feature

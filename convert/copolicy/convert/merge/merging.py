@@ -20,7 +20,7 @@ from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VAL
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
-from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
@@ -37,11 +37,7 @@ _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
 
 
 def merge_datasets(
-    roots: Sequence[Path],
-    root: Path,
-    repo_id: str,
-    prefixes: Sequence[str] | None = None,
-    same_people: bool = False,
+    roots: Sequence[Path], root: Path, repo_id: str, prefixes: Sequence[str] | None = None, same_people: bool = False
 ) -> dict[str, Any]:
     """Writes the episodes of several data sets, one after the other, as one at `root`.
 
@@ -99,7 +95,7 @@ def merge_datasets(
 def _mixtures(episodes: pa.Table, sources: Sequence[StoredSet]) -> Mixtures:
     named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
     try:
-        mixtures = Mixtures.of(episodes.select(named).to_pylist())
+        mixtures = Mixtures.of(episodes.select(named).to_pylist(), task_of(sources[0].info))
     except InvalidValueError as error:
         roots = ", ".join(str(source.root) for source in sources)
         raise FileFormatError(roots, "episodes that say their physics", str(error)) from None
@@ -210,6 +206,7 @@ def _record(sources: Sequence[StoredSet], prefixes: Sequence[str] | None) -> dic
         "converter": "copolicy-convert merge",
         "version": version("lerobot_policy_copolicy"),
         "merged": merged,
+        "task": task_of(info).spec.to_dict(),
         "fps": info["fps"],
         "hold": info["features"]["action"].get("hold", ""),
         "notes": notes,

@@ -117,12 +117,7 @@ def scale_of(arguments: argparse.Namespace) -> Scale | None:
 
 
 def convert_in_shards(
-    folders: Sequence[Path],
-    root: Path,
-    repo_id: str,
-    conversion: Conversion,
-    skip_damaged: bool,
-    scale: Scale,
+    folders: Sequence[Path], root: Path, repo_id: str, conversion: Conversion, skip_damaged: bool, scale: Scale
 ) -> dict[str, Any]:
     """Converts the recordings in `folders` in shards and merges these; see `recordings.convert_recordings`.
 

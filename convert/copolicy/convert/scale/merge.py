@@ -1,6 +1,5 @@
 """All shards to the one data set, with what can only be said of all episodes together."""
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -21,8 +20,8 @@ from copolicy.dataset.files.meta_files import (
     STATS_FILE,
     TASKS_FILE,
 )
-from copolicy.dataset.files.staging import new_folder, replace_json, require_new
-from copolicy.dataset.lerobot_folder.info import read_info
+from copolicy.dataset.files.staging import new_folder, replace_json, require_new, write_as_lerobot
+from copolicy.dataset.lerobot_folder.info import read_info, task_of
 from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import minimal_card
@@ -74,7 +73,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     conversion = plan.conversion
     written = WrittenDataset(
         plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
-        sum(row["success"] for row in rows), Mixtures.of(rows),
+        sum(row["success"] for row in rows), Mixtures.of(rows, task_of(info)),
     )  # fmt: skip
     counts = Counter(finding.severity for finding in findings)
     return {
@@ -110,6 +109,7 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "version": version("lerobot_policy_copolicy"),
         "files": len(plan.files),
         "left_out": left_out.record(),
+        "task": task_of(read_info(root)).spec.to_dict(),
         "fps": plan.conversion.fps,
         "hold": plan.conversion.hold,
         "notes": notes,
@@ -150,7 +150,7 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
     info = read_info(target)
     info["features"] = read_info(roots[0])["features"]
-    (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    write_as_lerobot(target / INFO_FILE, info)
     example = next(iter(numbered_files(roots[0] / EPISODES_FOLDER).values()))
     for path in numbered_files(target / EPISODES_FOLDER).values():
         write_like(read_parquet(path), example, path)

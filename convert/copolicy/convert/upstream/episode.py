@@ -21,7 +21,7 @@ import numpy as np
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.lerobot_folder.exclusions import FLAG
 from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.features import states_7, theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import identify

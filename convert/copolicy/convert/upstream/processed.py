@@ -12,7 +12,7 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.dynamics import step_linear, torque
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics

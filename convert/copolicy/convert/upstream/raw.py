@@ -13,7 +13,7 @@ import numpy as np
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.file_kinds import kind_of
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics

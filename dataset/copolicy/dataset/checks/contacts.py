@@ -9,7 +9,7 @@ from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
 from copolicy.tasks.table.physics import GOAL_SIZE
 
 from ..features import ENVIRONMENT_STATE, STATE
-from ..task import RECORD_HZ
+from ..task_spec import RECORD_HZ
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .geometry import INNER, OUTER, final_poses, separation

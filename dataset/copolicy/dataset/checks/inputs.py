@@ -6,7 +6,7 @@ import numpy as np
 
 from ..features import ACTION, STATE
 from ..interaction import alike, may_be_one_device, pushing
-from ..task import PLAYERS
+from ..task_spec import PLAYERS
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit

@@ -17,7 +17,7 @@ def _physics(table: EpisodeTable) -> Iterator[Finding]:
     counts: Counter[str] = Counter()
     for label, text in zip(table.labels, table.columns["physics"].tolist(), strict=True):
         try:
-            counts[physics_summary(physics_of(text))] += 1
+            counts[physics_summary(physics_of(text, table.task), table.task)] += 1
         except InvalidValueError as error:
             yield Finding(label, "physics", None, None, "error", str(error))
     unknown = counts.pop(UNKNOWN, 0)

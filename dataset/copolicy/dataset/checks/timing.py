@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..features import STATE
-from ..task import RECORD_HZ
+from ..task_spec import RECORD_HZ
 from .episode_table import EpisodeTable
 from .finding import Finding
 from .limits import limit

@@ -55,11 +55,7 @@ def selection_record(source: StoredSet, numbers: list[int], asked: dict[str, Any
         "command": command,
         "version": version("lerobot_policy_copolicy"),
         "date": today(),
-        "from": {
-            "name": source.root.resolve().name,
-            "content_hash": source.content.hash,
-            "episodes": len(source.rows),
-        },
+        "from": {"name": source.root.resolve().name, "content_hash": source.content.hash, "episodes": len(source.rows)},
         "asked": asked,
         "episodes": len(numbers),
     }

@@ -41,8 +41,8 @@ def read_json[T](path: Path, kind: type[T], what: str) -> T:
     return parse_json(text, kind, what, path)
 
 
-def read_optional_json[T](path: Path, kind: type[T], what: str) -> T | None:
-    """The same, or None where there is no such file."""
+def read_optional_json(path: Path, kind: Any, what: str) -> dict[str, Any] | None:
+    """The same for an object, or None where there is no such file."""
     return read_json(path, kind, what) if path.exists() else None
 
 

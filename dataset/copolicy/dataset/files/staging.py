@@ -114,6 +114,11 @@ def replace_json(path: Path, value: Any, indent: int = 2, allow_nan: bool = True
     replace_text(path, json.dumps(value, indent=indent, allow_nan=allow_nan) + "\n")
 
 
+def write_as_lerobot(path: Path, value: Any) -> None:
+    """Writes JSON into a folder in the making in the form that LeRobot gives its own."""
+    path.write_text(json.dumps(value, indent=4, ensure_ascii=False), encoding="utf-8")
+
+
 @contextmanager
 def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, Path] | None = None) -> Iterator[None]:
     """Gives an error of the system the name of the file that a user knows.

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Iterator
 
 from ..exceptions import CopolicyError, MissingExtraError, RunError
-from ..files.staging import refusal
+from ..files.staging import causes, refusal
 
 try:
     import httpx
@@ -78,12 +78,8 @@ def hub_errors(repo_id: str, doing: str) -> Iterator[None]:
 
 def _meaning(error: BaseException) -> str:
     """The innermost cause that says something; the client wraps errors of uploads and downloads in others."""
-    causes = []
-    cause: BaseException | None = error
-    while cause is not None and cause not in causes:
-        causes.append(cause)
-        cause = cause.__cause__ or cause.__context__
-    for cause in causes:
+    chain = list(causes(error))
+    for cause in chain:
         if isinstance(cause, OfflineModeIsEnabled):
             return "the Hub's client is offline (HF_HUB_OFFLINE is set)"
         if isinstance(cause, LocalTokenNotFoundError):
@@ -95,7 +91,7 @@ def _meaning(error: BaseException) -> str:
             if status >= 500:
                 return f"the Hub has trouble (HTTP {status}); run the command again, it goes on where it stopped"
             return _MEANINGS.get(status) or f"HTTP {status}: {cause.server_message or _first_line(cause)}"
-    for cause in causes:
+    for cause in chain:
         if isinstance(cause, httpx.TransportError):
             reason = _first_line(cause) or type(cause).__name__
             return f"the connection broke off ({reason}); run the command again, it goes on where it stopped"

@@ -13,13 +13,7 @@ from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, STATS_FILE, TASKS_FILE
 from .folder import POSITIONS, LeRobotFolder
 from .info import episode_files
-from .references import (
-    data_path,
-    read_tasks,
-    tasks_are_indexed,
-    video_features,
-    video_span,
-)
+from .references import data_path, read_tasks, tasks_are_indexed, video_features, video_span
 from .tables import (
     ColumnError,
     column_types,

@@ -17,6 +17,7 @@ from ..exceptions import FileFormatError, ForeignRecordingError
 from ..physics_text import physics_text
 from ..task import PairTask
 from . import episode_records
+from .generic_messages import messages_of
 from .mcap_chunks import MESSAGE_HEAD, chunk_records, walk_chunk
 from .mcap_records import RecordWalk
 from .messages.copolicy_pb2 import EpisodeEvent
@@ -30,7 +31,6 @@ from .soundness import (
     require_version,
     sole_records,
 )
-from .task_messages import messages_of
 from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
 
 

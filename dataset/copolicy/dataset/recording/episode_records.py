@@ -9,7 +9,8 @@ from typing import Any, get_args
 
 from ..episode import EPISODE_COLUMNS, SET_COLUMNS, UNKNOWN_VALUES, EpisodeMeta, Source, termination_reasons
 from ..exceptions import InvalidValueError
-from ..task import PairTask, TaskSpec
+from ..task import PairTask
+from ..task_spec import TaskSpec
 
 SCHEMA_VERSION = "1"
 """Version of what a recording holds; a reader refuses one that it does not know."""

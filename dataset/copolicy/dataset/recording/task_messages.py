@@ -1,16 +1,11 @@
 """The messages of a recording that depend on its task: states, actions, what is measured, and the scene."""
 
 import functools
-import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
-from ..task import PairTask, Vector
-from .messages.copolicy_task_pb2 import Action, Measures, State
-from .topics import EVENT, INPUTS, LOOP_TIMING, Record, Topic, of_player
+from .topics import EVENT, INPUTS, LOOP_TIMING, Record, Topic
 
 SceneWriter = Callable[[int, Sequence[float], Sequence[float]], list[Record]]
 """Records of a scene from a time (ns), a recorded state and the joint action that acts in it."""
@@ -69,58 +64,3 @@ class TaskMessages(ABC):
     def scene_writer(self) -> SceneWriter:
         """What writes the rest of the scene, in each step."""
         return lambda time_ns, recorded, action: []
-
-
-class GenericMessages(TaskMessages):
-    """How a task is recorded that brings no messages of its own: numbers, whose meaning stands in the channels."""
-
-    def __init__(self, task: PairTask):
-        spec = task.spec
-        self._task, self._hz, self._sizes = task, spec.record_hz, (len(spec.recorded), len(spec.action))
-        self.state = Topic("/state", State, _meaning(spec.recorded))
-        first, second = (
-            Topic(f"/player/{player}/action", Action, {**_meaning(spec.action), **of_player(player)})
-            for player in range(2)
-        )
-        self.actions = first, second
-        self.measures = Topic("/measures", Measures)
-
-    def encode_state(self, step: int, recorded: Sequence[float], monotonic_ns: int) -> bytes:
-        sim_time = step / self._hz
-        return State(step=step, sim_time=sim_time, values=recorded, monotonic_ns=monotonic_ns).SerializeToString()
-
-    def decode_state(self, payload: bytes) -> tuple[int, Sequence[float]]:
-        state = State.FromString(payload)
-        return state.step, _sized(state.values, self._sizes[0], "state")
-
-    def encode_action(self, step: int, action: Sequence[float]) -> bytes:
-        return Action(step=step, values=action).SerializeToString()
-
-    def decode_action(self, payload: bytes) -> tuple[int, Sequence[float]]:
-        action = Action.FromString(payload)
-        return action.step, _sized(action.values, self._sizes[1], "action")
-
-    def encode_measures(self, step: int, recorded: Sequence[float], action: Sequence[float], reward: float) -> bytes:
-        states = self._task.states_of(np.array([recorded]))
-        measured = self._task.interaction(states, np.array([action]))
-        interaction = None if measured is None else float(measured[0])
-        return Measures(step=step, reward=reward, interaction=interaction).SerializeToString()
-
-    def decode_reward(self, payload: bytes) -> float:
-        return Measures.FromString(payload).reward
-
-
-@functools.cache
-def messages_of(task: PairTask) -> TaskMessages:
-    """How a task is recorded: in messages of its own, or in the generic ones."""
-    return task.recording or GenericMessages(task)
-
-
-def _meaning(vector: Vector) -> dict[str, str]:
-    return {"names": json.dumps(vector.names), "units": json.dumps(vector.units)}
-
-
-def _sized(values: Sequence[float], size: int, what: str) -> Sequence[float]:
-    if len(values) != size:
-        raise ValueError(f"a {what} of {len(values)} numbers instead of {size}")
-    return values

@@ -12,7 +12,7 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from ..task import PLAYERS
+from ..task_spec import PLAYERS
 from .messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
 
 ENCODING = "protobuf"

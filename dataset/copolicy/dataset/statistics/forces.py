@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..task import PLAYERS
+from ..task_spec import PLAYERS
 from .estimate import Estimate, Null
 from .resampling import Bootstrap, circular_shift, interval
 from .trajectories import Trajectories

@@ -13,7 +13,8 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.rollout import Rollout, Trace
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.interaction import interaction_force
 
 
@@ -81,19 +82,17 @@ def coplan(
     """
     episodes = [(index, config, repeat) for index, config in enumerate(maps) for repeat in range(repeats)]
     agent = PolicyAgent(policy, get_task(), fps=fps, seed=seed)
-    rollout, trace = together(agent, [config for _, config, _ in episodes], physics)
+    rollout = together(agent, [config for _, config, _ in episodes], physics)
+    trace = Trace(rollout)
     while len(rollout.running):
         rollout.step()
         on_step(len(episodes) - len(rollout.running))
     return [Outcome(*episode, *measured(rollout, trace, agent, k)) for k, episode in enumerate(episodes)]
 
 
-def together(agent: PolicyAgent, maps: Sequence[Any], physics: Any) -> tuple[Rollout, Trace]:
-    """A rollout at the start of maps in which both players act on the agent's chunks, and its trace."""
-    rollout = Rollout(get_task(), maps, (agent, agent.other_half()), settings=physics)
-    trace = Trace(rollout.worlds)
-    rollout.observers.append(trace)
-    return rollout, trace
+def together(agent: PolicyAgent, maps: Sequence[Any], physics: Any) -> Rollout:
+    """A rollout at the start of maps in which both players act on the agent's chunks."""
+    return Rollout(get_task(), maps, (agent, agent.other_half()), settings=physics)
 
 
 def measured(rollout: Rollout, trace: Trace, agent: Any, index: int) -> tuple[bool, str, int, np.ndarray, np.ndarray]:

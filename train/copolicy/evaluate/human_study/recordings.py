@@ -10,7 +10,8 @@ from copolicy.collect.session import recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.recording.log import Recording, read_recording
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX

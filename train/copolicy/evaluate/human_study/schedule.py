@@ -56,20 +56,9 @@ class BlindPolicy:
         with self._lock:  # a chunk that is still being made belongs to the episode before
             self._present = self._policies[robot]
 
-    @property
-    def n_obs_steps(self) -> int:
-        """Frames of history that the present one wants."""
-        return self._present.n_obs_steps
-
-    @property
-    def keeps_history(self) -> bool:
-        """The present one remembers frames itself."""
-        return self._present.keeps_history
-
-    @property
-    def fps(self) -> int:
-        """Frames a second of the present one's actions."""
-        return self._present.fps
+    def __getattr__(self, name: str) -> Any:
+        """What else an agent asks of a policy: of the present one."""
+        return getattr(self._present, name)
 
     def reset(self, seed: int) -> None:
         """Begins an episode of the present one."""

@@ -50,12 +50,11 @@ def run_session(
     robots: dict[str, Checkpoint] = {}
     load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
     with prepared(settings, load) as application, ExitStack() as stack:
-        policy = BlindPolicy(robots, plan.actions_per_plan)
+        policy: Any = BlindPolicy(robots, plan.actions_per_plan)
         agent = PolicyAgent(policy, real_time=True)
         stack.callback(agent.close)
         game = application.game
-        game.players[0].agent = agent
-        game.balance = StudySchedule(plan, participant, policy, agent)
+        game.play_by(StudySchedule(plan, participant, policy, agent), agent)
         with stopped_by_signals(game):
             application.run()
         return {"participant": participant, "plan": plan.plan_id, **application.summary()}

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..coplan.rollouts import Outcome
 

@@ -60,8 +60,7 @@ def carry_with_partners(
     # Neither the robot nor the order of episodes is in it: every robot meets the same partner on the same start.
     seeds = [_seed(partner_seed, config, repeat) for _, config, _, repeat in episodes]
     rollout = Rollout(task, scenarios, (agent, partner), seeds=seeds, settings=physics)
-    trace = Trace(rollout.worlds)
-    rollout.observers.append(trace)
+    trace = Trace(rollout)
     while len(rollout.running):
         rollout.step()
         on_step(len(episodes) - len(rollout.running))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..comparison.paired import BOOTSTRAP, episode_values, paired_differences
 from ..summary import summarise

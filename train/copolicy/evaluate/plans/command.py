@@ -11,7 +11,8 @@ from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.task import RECORD_HZ, get_task
+from copolicy.dataset.task import get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..study_flags import add_study_flags, policy_of, protocol_of, study_needs
 

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from copolicy.dataset.files.staging import replacement
-from copolicy.dataset.task import PLAYERS
+from copolicy.dataset.task_spec import PLAYERS
 from copolicy.tasks.table.map_config import WINDOW
 from copolicy.tasks.table.outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
 from copolicy.tasks.table.physics import GOAL_SIZE

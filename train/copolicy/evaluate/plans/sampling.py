@@ -10,7 +10,8 @@ from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import RECORD_HZ, World, get_task
+from copolicy.dataset.task import World, get_task
+from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.routes import route_class
 
 from ..coplan.rollouts import Outcome, measured, together
@@ -72,52 +73,42 @@ def sample_plans(
     Raises:
         RunError: the episode ended before `seconds`, or the policy cannot go on from there in several ways.
     """
-    fps = policy.fps if fps is None else fps
-    hold = clock.stride(fps)
-    agent = PolicyAgent(policy, get_task(), fps=fps, seed=seed)
-    rollout, trace = together(agent, [config], physics)
-    rollout.run(round(seconds * fps) * hold)
+    rate = fps or policy.fps
+    hold = clock.stride(rate)
+    agent = PolicyAgent(policy, get_task(), fps=rate, seed=seed)
+    rollout = together(agent, [config], physics)
+    trace = Trace(rollout)
+    rollout.run(round(seconds * rate) * hold)
     if rollout.outcomes[0].done:
         raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / RECORD_HZ:.1f} s")
     if seconds and policy.keeps_history:
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
-    here = rollout.worlds[0]
+    here, configs = rollout.worlds[0], [config] * samples
     agent = agent.branch(samples)
-    branch = _branched(here, (agent, agent.other_half()), [config] * samples, physics, trace)
+    branch = _branched(here, (agent, agent.other_half()), configs, physics, begin=False)
+    whole = Trace(branch, trace)
     policy.wanted, wanted = None, policy.wanted
     branch.step()
     policy.wanted = wanted
     plans = list(agent.predicted)
-    paths = _paths_of(here, plans, [config] * samples, physics, hold)
+    # The table's centre while each plan is executed and nothing else.
+    held = [clock.zero_order_hold(plan, rate) for plan in plans]
+    alone = _branched(here, (RecordedAgent(held), RecordedAgent(held)), configs, physics, begin=True)
+    paths = Trace(alone)
+    alone.run(len(held[0]))
     branch.run()
-    (whole,) = branch.observers
-    return Decision(
-        config,
-        (*here.recorded[:3],),
-        trace.states(0)[:, :2],
-        tuple(
-            PlanSample(plan, path, Outcome(0, config, k, *measured(branch, whole, agent, k)))
-            for k, (plan, path) in enumerate(zip(plans, paths, strict=True))
-        ),
-    )
+    x, y, theta, *_ = here.recorded
+    drawn = [
+        PlanSample(plan, paths.states(k)[:, :2], Outcome(0, config, k, *measured(branch, whole, agent, k)))
+        for k, plan in enumerate(plans)
+    ]
+    return Decision(config, (x, y, theta), trace.states(0)[:, :2], tuple(drawn))
 
 
-def _branched(here: World, agents: Any, configs: Sequence[Any], physics: Any, before: Trace | None) -> Rollout:
+def _branched(here: World, agents: Any, configs: Sequence[Any], physics: Any, begin: bool) -> Rollout:
     """A rollout that goes on from a world, in as many copies as there are maps."""
     worlds = [get_task().make_world(config, physics) for config in configs]
     for world in worlds:
         world.restore(here.recorded)
         world.step_count = here.step_count
-    trace = Trace(worlds, before)
-    return Rollout(get_task(), configs, agents, worlds=worlds, observers=[trace], begin=before is None)
-
-
-def _paths_of(
-    here: World, plans: Sequence[np.ndarray], configs: Sequence[Any], physics: Any, hold: int
-) -> list[np.ndarray]:
-    """The table's centre while each plan is executed and nothing else."""
-    actions = [np.repeat(plan, hold, axis=0) for plan in plans]
-    rollout = _branched(here, (RecordedAgent(actions), RecordedAgent(actions)), configs, physics, None)
-    rollout.run(len(actions[0]))
-    (trace,) = rollout.observers
-    return [trace.states(k)[:, :2] for k in range(len(plans))]
+    return Rollout(get_task(), configs, agents, worlds=worlds, begin=begin)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from copolicy.dataset.task import RECORD_HZ
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from .habits import Habits
 

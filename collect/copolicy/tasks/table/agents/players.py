@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.task import SimulatedPlayers
 
 from ..map_config import MapConfig
 from .habits import Habits
@@ -75,10 +76,5 @@ def _pilot(player: int, map_config: MapConfig, habits: Habits, seed: int) -> "Sc
     return ScriptedPilot(player, map_config, habits, seed)
 
 
-class TablePlayers:
-    """The task's part `agents`."""
-
-    pairs, partners, robots = PAIRS, PARTNERS, ROBOTS
-    make_pair = staticmethod(simulated_pair)
-    make_partner = staticmethod(simulated_partner)
-    make_robot = staticmethod(scripted_robot)
+PLAYERS = SimulatedPlayers(PAIRS, PARTNERS, ROBOTS, simulated_pair, simulated_partner, scripted_robot)
+"""The task's part `agents`."""

@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.task import PLAYERS, RECORD_HZ
+from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 
 from ..map_config import MapConfig
 from ..physics import Physics

@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from copolicy.dataset.recording.topics import Topic
-from copolicy.dataset.task import PLAYERS
+from copolicy.dataset.task_spec import PLAYERS
 
 from ..map_config import WINDOW, MapConfig
 from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen

@@ -10,7 +10,7 @@ from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 
 from copolicy.dataset.recording.topics import Record, Topic
-from copolicy.dataset.task import PLAYERS
+from copolicy.dataset.task_spec import PLAYERS
 
 from ..map_config import MAX_OBSTACLES, MapConfig
 from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE

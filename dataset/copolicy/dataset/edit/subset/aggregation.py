@@ -1,6 +1,5 @@
 """The statistics of some episodes together, by LeRobot's formulas, from those of each in meta/episodes."""
 
-import json
 from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +8,7 @@ import numpy as np
 
 from ...exceptions import FileFormatError
 from ...files.meta_files import EPISODES_FOLDER, STATS_FILE
+from ...files.staging import write_as_lerobot
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -50,7 +50,7 @@ def write_statistics(statistics: Statistics, folder: Path) -> None:
     nested = {
         feature: {kind: values.tolist() for kind, values in kinds.items()} for feature, kinds in statistics.items()
     }
-    (folder / STATS_FILE).write_text(json.dumps(nested, indent=4, ensure_ascii=False), encoding="utf-8")
+    write_as_lerobot(folder / STATS_FILE, nested)
 
 
 def _aggregated(stacked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,6 +1,5 @@
 """Writes some episodes of a data set as a data set of its own: frames, videos, metadata and statistics."""
 
-import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import pyarrow.parquet as pq
 
 from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
+from ...files.staging import write_as_lerobot
 from ...lerobot_folder.info import split_range
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
 from ...lerobot_folder.tables import read_parquet
@@ -67,7 +67,7 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     paths = {name: path for name, path in _PATHS.items() if source.info.get(name)}
     totals = {"total_episodes": len(numbers), "total_frames": int(lengths.sum()), "splits": dict(splits)}
     info = {**source.info, **paths, **totals}
-    (folder / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    write_as_lerobot(folder / INFO_FILE, info)
     (folder / CARD_FILE).write_text(
         minimal_card({source.rows[number]["license"] or "" for number in numbers}), encoding="utf-8"
     )

@@ -1,0 +1,82 @@
+"""What a policy was trained on, from the data set's own metadata or from the recipe of an exported policy."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from copolicy.dataset.scenarios import set_label
+
+from .facts import DatasetFacts
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """The data behind a policy; None or empty where it is not stated.
+
+    Attributes:
+        used: episodes that it was trained on.
+        episodes: of the data set.
+        sources: episodes by source (`human`, `simulated`, `upstream`); so for map sets, licences and pairs.
+    """
+
+    repo_id: str
+    revision: str | None
+    used: int | None
+    episodes: int | None = None
+    frames: int | None = None
+    fps: float | None = None
+    version: str | None = None
+    content_hash: str | None = None
+    sources: dict[str, int] = field(default_factory=dict)
+    map_sets: dict[str, int] = field(default_factory=dict)
+    licences: dict[str, int] = field(default_factory=dict)
+    pairs: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def at_hand(self) -> bool:
+        """More than its name is known."""
+        return bool(self.sources)
+
+    @classmethod
+    def from_data_set(cls, facts: DatasetFacts, settings: dict[str, Any]) -> "TrainingData":
+        """From the data set's folder, and what the training says about it."""
+        chosen = settings.get("episodes")
+        sets = Counter(set_label(episode) for episode in facts.episodes)
+        return cls(
+            repo_id=str(settings.get("repo_id") or ""),
+            revision=settings.get("revision"),
+            used=len(facts.episodes) if chosen is None else len(chosen),
+            episodes=len(facts.episodes),
+            frames=facts.info["total_frames"],
+            fps=facts.info["fps"],
+            sources=facts.counts("source"),
+            map_sets=dict(sorted(sets.items(), key=lambda item: (-item[1], item[0]))),
+            licences=facts.counts("license"),
+            pairs=facts.counts("pair_id"),
+        )
+
+    @classmethod
+    def from_settings(cls, settings: dict[str, Any]) -> "TrainingData":
+        """From what the training says alone; its data set is not at hand."""
+        chosen = settings.get("episodes")
+        return cls(
+            str(settings.get("repo_id") or ""), settings.get("revision"), None if chosen is None else len(chosen)
+        )
+
+    @classmethod
+    def from_recipe(cls, recipe: dict[str, Any]) -> "TrainingData":
+        """From the `dataset` of `recipe.json`."""
+        return cls(
+            repo_id=str(recipe.get("repo_id") or ""),
+            revision=recipe.get("revision"),
+            used=recipe.get("episodes_used"),
+            episodes=recipe.get("episodes"),
+            frames=recipe.get("frames"),
+            fps=recipe.get("fps"),
+            version=recipe.get("version"),
+            content_hash=recipe.get("content_hash"),
+            sources=recipe.get("source") or {},
+            map_sets=recipe.get("map_set") or {},
+            licences=recipe.get("license") or {},
+            pairs=recipe.get("pair_id") or {},
+        )
