@@ -41,7 +41,9 @@ def test_columns_follow_the_one_clock(fps, hold):
         action = held.mean(axis=0) if hold == "mean" else held[0]
         assert columns["observation.state"][frame] == pytest.approx(episode.states[start], rel=1e-6)
         assert columns["action"][frame] == pytest.approx(action, abs=1e-6)
-        x, y = episode.path[min(start + step, 50)]
+        path = episode.path
+        assert path is not None
+        x, y = path[min(start + step, 50)]
         world.reset((x, y, 0.0))
         assert columns["next.reward"][frame] == pytest.approx(world.reward(), abs=1e-6)
     assert (columns["observation.human_action"][0] == 0).all()

@@ -24,8 +24,8 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import STATE
 from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
 from copolicy.dataset.recording.log import read_episode
-from copolicy.dataset.task import get_task
 from copolicy.dataset.versions.content import read_content
+from copolicy.tasks.table import TableTask
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.train.cli import main as train
 
@@ -67,7 +67,7 @@ def drawn(raw: Path) -> list[np.ndarray]:
     """For each recording the pictures of its frames at 10 Hz, `(T, 80, 160, 3)`."""
     episodes = [read_episode(path) for path in sorted(raw.rglob("*.mcap"))]
     return [
-        np.stack(list(get_task().images(episode.map_config, episode.states[::3].astype(np.float32), SIZE)))
+        np.stack(list(TableTask().images(episode.map_config, episode.states[::3].astype(np.float32), SIZE)))
         for episode in episodes
     ]
 
@@ -124,7 +124,7 @@ def test_the_metadata_are_those_of_lerobots_own_videos(made):
 
 def test_statistics_are_lerobots_of_the_same_pictures(made, tmp_path):
     episode = read_episode(min((made / "raw").rglob("*.mcap")))
-    pictures = list(get_task().images(episode.map_config, episode.states[:300:30], (600, 300)))
+    pictures = list(TableTask().images(episode.map_config, episode.states[:300:30], (600, 300)))
     ours = scene_clip(pictures, 10, (600, 300)).statistics
     paths = [str(tmp_path / f"{place}.png") for place in range(len(pictures))]
     for path, picture in zip(paths, pictures, strict=True):
@@ -222,12 +222,12 @@ def test_a_picture_shows_no_forces(made):
     recording = read_episode(min((made / "raw" / "a").glob("*.mcap")))
     state = recording.states[:1]
     config = MAP_SETS["training"][0]
-    (one,) = get_task().images(config, state, SIZE)
-    (other,) = get_task().images(config, state, SIZE)
+    (one,) = TableTask().images(config, state, SIZE)
+    (other,) = TableTask().images(config, state, SIZE)
     assert one.shape == (80, 160, 3)
     assert one.dtype == np.uint8
     np.testing.assert_array_equal(one, other)
-    (tall,) = get_task().images(config, state, (160, 160))
+    (tall,) = TableTask().images(config, state, (160, 160))
     np.testing.assert_array_equal(tall[40:120], one)
     assert not tall[:40].any()
 

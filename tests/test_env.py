@@ -15,7 +15,7 @@ from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNameError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, GYM_ID, HUMAN_ACTION, SCENE_IMAGE, STATE
-from copolicy.dataset.task import get_task
+from copolicy.tasks.table import TableTask
 from copolicy.tasks.table.features import FEATURES, environment_state
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.maps import MAP_SETS
@@ -192,7 +192,7 @@ def test_observes_the_images_of_a_data_set(size):
         assert env.observation_space.contains(observation)
         states.append(env.world.observation)
         images.append(observation["pixels"]["scene"])
-    expected = list(get_task().images(env.maps[20], np.stack(states), size))
+    expected = list(TableTask().images(env.maps[20], np.stack(states), size))
     np.testing.assert_array_equal(images, expected)
     batch = preprocess_observation(observation)
     assert tuple(batch[SCENE_IMAGE].shape) == (1, 3, size[1], size[0])

@@ -14,7 +14,7 @@ from lerobot.policies.factory import make_pre_post_processors
 from lerobot.scripts import lerobot_eval
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, SCENE_IMAGE, STATE
-from copolicy.dataset.task import get_task
+from copolicy.tasks.table import TableTask
 from copolicy.tasks.table.features import FEATURES
 from copolicy.tasks.table.maps import MAP_SETS
 
@@ -61,6 +61,6 @@ def test_lerobot_evaluates_a_policy_that_sees_the_scene(checkpoint, tmp_path, mo
     assert result["overall"]["n_episodes"] == 1
     assert len(seen) == 3  # frames of three steps each
     state = seen[0][STATE].numpy().astype(float)
-    (image,) = get_task().images(MAP_SETS["training"][0], state, SIZE)
+    (image,) = TableTask().images(MAP_SETS["training"][0], state, SIZE)
     given = seen[0][SCENE_IMAGE][0].permute(1, 2, 0).numpy() * 255
     np.testing.assert_allclose(given, image, atol=0.01)

@@ -13,6 +13,7 @@ from training_table import flags, write_table
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
+from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.cli import main
 from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.features import ActionScale
@@ -92,22 +93,22 @@ def test_another_task_trains_on_its_scaled_numbers_alone(peg, tmp_path, capsys):
 
     # Trained on, and given away.
     assert main([f"--policy.path={trained(out)}", *flags(data, tmp_path / "on", steps=1)[:2], "--steps=1"]) == 0
+    assert Checkpoint(out).conditions.physics == peg.settings_type()
     assert main(["export", str(out), "--out", str(tmp_path / "model"), "--json"]) == 0
     assert json.loads((tmp_path / "model" / "config.json").read_text(encoding="utf-8"))["task"] == "peg"
 
 
 def test_what_a_task_lacks_is_refused_where_it_is_asked_for(peg, tmp_path, capsys):
     data = write_table(tmp_path / "data", (14, 5), task="peg")
-    for setting, expected in {
-        "observation_features=scan": "absolute (the task 'peg' offers no other features), found 'scan'",
-        "mirror=true": "false (the task 'peg' has no such symmetry), found True",
-        "symmetries=[turn]": "some of none (the task 'peg' has no others), found ['turn']",
-    }.items():
-        name, _, value = setting.partition("=")
-        values: dict[str, Any] = {"true": True, "[turn]": ["turn"]}
+    for name, value, expected in (
+        ("observation_features", "scan", "absolute (the task 'peg' offers no other features)"),
+        ("mirror", True, "false (the task 'peg' has no such symmetry)"),
+        ("symmetries", ["turn"], "some of none (the task 'peg' has no others)"),
+    ):
+        settings: dict[str, Any] = {name: value}
         with pytest.raises(InvalidValueError) as caught:
-            CopolicyConfig(task="peg", device="cpu", **{name: values.get(value, value)})
-        assert str(caught.value) == f"{name}: expected {expected}"
+            CopolicyConfig(task="peg", device="cpu", **settings)
+        assert str(caught.value) == f"{name}: expected {expected}, found {value!r}"
     out = tmp_path / "out"
     assert main([*flags(data, out), "--policy.observation_features=scan"]) == 2
     line = "observation_features: expected absolute (the task 'peg' offers no other features), found 'scan'"
@@ -148,7 +149,8 @@ def test_a_saved_configuration_without_a_task_is_of_the_table(tmp_path):
 def test_every_backend_plans_for_players_of_one_number_each(peg, backend, network):
     plans = []
     for settings in ({"planner": "plain"}, {"backend": backend}):
-        planner = lively_policy(task="peg", **network, **settings)
+        more: dict[str, Any] = {**network, **settings}
+        planner = lively_policy(task="peg", **more)
         plans.append(planner.plan(columns(3, 3, task="peg"), torch.Generator().manual_seed(0)))
     assert plans[0].shape == (3, 12, 2)
     torch.testing.assert_close(*plans, atol=1e-5, rtol=1e-5)

@@ -32,7 +32,8 @@ def metadata(wheel) -> Message:
 
 def test_every_package_is_marked_as_typed(wheel):
     marked = {name for name in wheel.namelist() if name.endswith("py.typed")}
-    assert marked == {*(f"copolicy/{room}/py.typed" for room in ROOMS), "lerobot_policy_copolicy/py.typed"}
+    packages = (*ROOMS, "tasks", "evaluate")
+    assert marked == {*(f"copolicy/{package}/py.typed" for package in packages), "lerobot_policy_copolicy/py.typed"}
 
 
 def test_nothing_lands_beside_the_packages(wheel):

@@ -263,7 +263,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         Returns:
             `(B, n_action_steps, m)` within the bounds of the task.
         """
-        if all(key in batch and batch[key].ndim == 2 for key in self.config.observation_keys):
+        if all(key in batch and self._is_frame(key, batch[key]) for key in self.config.observation_keys):
             batch = self._observe(batch)
         plan = self.plan(batch, **kwargs, actions=self.config.n_action_steps)
         return plan[:, self.config.n_obs_steps - 1 :]
@@ -292,6 +292,10 @@ class CopolicyPolicy(PreTrainedPolicy):
                 frames.append(frames[-1])
         return {key: torch.stack(tuple(frames), dim=1) for key, frames in self._history.items()}
 
+    def _is_frame(self, key: str, values: Tensor) -> bool:
+        """Whether a column is of single frames; one of one number a frame may lack its last axis."""
+        return values.ndim == 2 if self._sizes[key] > 1 else values.ndim == 1 or values.shape[1:] == (1,)
+
     def _tokens(self, actions: int | None) -> int:
         """How many tokens of a plan end with the wanted action."""
         most = self.config.horizon - self.config.n_obs_steps + 1
@@ -303,13 +307,16 @@ class CopolicyPolicy(PreTrainedPolicy):
         return {key: self._column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
 
     def _column(self, batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
-        """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames."""
+        """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames.
+
+        Columns of one number a frame come from LeRobot without their last axis.
+        """
         if key not in batch:
             raise InvalidValueError("batch", f"the column {key}", sorted(batch))
         values, size = batch[key], self._sizes[key]
         expected = (size,) if frames is None else (frames, size)
         if size == 1 and values.ndim == len(expected):
-            values = values.unsqueeze(-1)  # LeRobot stores a vector of one number as that number
+            values = values[..., None]
         if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
             raise ShapeError(key, ("B", *expected), tuple(values.shape))
         return values

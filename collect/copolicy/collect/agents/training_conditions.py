@@ -8,7 +8,7 @@ from typing import Any, TypedDict
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 
 ASSUMED_FPS = 10
 """Frames a second of a policy whose files do not say: our data sets have this rate unless asked for another."""
@@ -30,6 +30,7 @@ class _Settings(TypedDict, total=False):
 class _Config(TypedDict, total=False):
     """`config.json`, as far as it is read here."""
 
+    task: str | None
     fps: float | None
     physics: dict[str, Any] | None
     physics_mixture: dict[str, int] | None
@@ -88,11 +89,12 @@ def training_conditions(folder: Path) -> TrainingConditions:
         notes.append(f"{unknown} of the training episodes do not say their physics")
     # A rate such as 12.5 is kept: what runs the policy refuses it.
     rate = int(fps) if float(fps).is_integer() else fps
-    return TrainingConditions(rate, _physics(folder, physics or {}), tuple(notes))  # pyright: ignore[reportArgumentType]
+    task = get_task(config.get("task") or "table")
+    return TrainingConditions(rate, _physics(folder, physics or {}, task), tuple(notes))  # pyright: ignore[reportArgumentType]
 
 
-def _physics(folder: Path, settings: dict[str, Any]) -> Any:
-    settings_type = get_task().settings_type
+def _physics(folder: Path, settings: dict[str, Any], task: PairTask) -> Any:
+    settings_type = task.settings_type
     path, known = folder / "config.json", {field.name for field in fields(settings_type)} - {_FREE}
     if not settings.keys() <= known:
         raise FileFormatError(path, f"physics of {', '.join(sorted(known))}", str(settings))

@@ -35,12 +35,9 @@ def assemble(
     Raises:
         CopolicyError: files or devices that cannot be used, or a folder that another tool collects into.
     """
-<<<<<<< HEAD
     clock = clock or MonotonicClock()
-=======
     # The first world of a process takes long enough for a press of a button to be missed.
     get_task().make_world(settings.map_configs()[0], settings.physics)
->>>>>>> h2
     lock = _lock(settings)
     stack.callback(lock.close)
     recoveries = loading.run("recordings that broke off", lambda: recover(settings.out))

@@ -63,7 +63,8 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
     episode = recording.episode
     meta = episode.meta
     after = np.vstack((episode.states[1:], episode.final_state))
-    force = np.abs(get_task(episode.task).interaction(after, episode.actions))
+    measured = get_task(episode.task).interaction(after, episode.actions)
+    force = None if measured is None else np.abs(measured)
     row: dict[str, Any] = {
         "participant": meta.pair_id,
         "trial": "",
@@ -78,8 +79,8 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
         "reason": meta.termination_reason,
         "steps": len(episode.actions),
         "time_s": len(episode.actions) / RECORD_HZ,
-        "interaction_mean": float(force.mean()),
-        "interaction_p95": float(np.quantile(force, 0.95)),
+        "interaction_mean": None if force is None else float(force.mean()),
+        "interaction_p95": None if force is None else float(np.quantile(force, 0.95)),
         "planning_ms": _planning_ms(recording),
         "quality_flags": meta.quality_flags,
         "recording": path.name,
