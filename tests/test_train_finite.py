@@ -121,15 +121,17 @@ def test_lerobot_train_refuses_too(copied_table, tmp_path, monkeypatch, capsys):
     assert weights(tmp_path / "out", 1)
 
 
-def test_statistics_that_are_not_finite_are_refused(copied_table, tmp_path, capsys):
+@pytest.mark.parametrize(("column", "kind"), [("action", "std"), ("index", "max")])
+def test_statistics_that_are_not_finite_are_refused(copied_table, tmp_path, capsys, column, kind):
     path = copied_table / "meta" / "stats.json"
     stats = json.loads(path.read_text(encoding="utf-8"))
-    stats["action"]["std"][1] = None
+    stats[column][kind][-1] = None
     path.write_text(json.dumps(stats), encoding="utf-8")
     assert main(flags(copied_table, tmp_path / "out")) == 1
     line = capsys.readouterr().err.splitlines()[-1]
     assert (
-        f"{path}: expected finite numbers, found std of action: an empty value" in line or "std of action: nan" in line
+        f"{path}: expected finite numbers, found {kind} of {column}: an empty value" in line
+        or f"{kind} of {column}: nan" in line
     )
     assert not (tmp_path / "out").exists()
 

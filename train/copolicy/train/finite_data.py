@@ -77,16 +77,15 @@ def require_finite_frames(root: Path, episodes: Collection[int] | None, features
 
 
 def _unusable_statistic(stats: Mapping[str, Mapping[str, Any]] | None) -> str | None:
-    """The first statistic of a column that training reads which is empty, infinite or NaN, in words; None for none."""
+    """The first statistic that is no number, or of a column that training reads infinite or NaN, in words; None."""
     for column, kinds in (stats or {}).items():
-        if not column.startswith(_READ):
-            continue
         for kind, value in kinds.items():
             try:
                 numbers = np.asarray(value, np.float64)
+                empty = np.asarray(value).dtype == object
             except (TypeError, ValueError):
                 return f"{kind} of {column}: {value}"
-            if not np.isfinite(numbers).all():
+            if empty or (column.startswith(_READ) and not np.isfinite(numbers).all()):
                 return f"{kind} of {column}: {_shown(numbers)}"
     return None
 
