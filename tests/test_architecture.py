@@ -32,7 +32,6 @@ NOT_YET_MOVED = (
     "collect/copolicy/collect/demonstration/pictures.py",
     "collect/copolicy/collect/play/command.py",
     "collect/copolicy/collect/play/game.py",
-    "collect/copolicy/collect/play/phase.py",
     "collect/copolicy/collect/play/result.py",
     "collect/copolicy/collect/play/settings.py",
     "collect/copolicy/collect/play/trial.py",

@@ -39,7 +39,7 @@ def _demonstration(config, seed):
 class ReplayPolicy:
     """Predicts what was demonstrated on each map, and remembers what it was shown."""
 
-    name, n_obs_steps, n_action_steps, fps, keeps_history = "replay", 3, 8, 10, False
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history = "replay", "table", 3, 8, 10, False
 
     def __init__(self, demonstrations, maps):
         self.demonstrations = {tuple(environment_state(m)): d for m, d in zip(maps, demonstrations, strict=True)}

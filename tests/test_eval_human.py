@@ -197,7 +197,7 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
 
 def test_only_the_chosen_robot_plans():
     class One:
-        name, n_action_steps, fps, keeps_history = "one", 8, 10, False
+        name, task, n_action_steps, fps, keeps_history = "one", "table", 8, 10, False
 
         def __init__(self, value, frames):
             self.value, self.n_obs_steps = value, frames

@@ -89,7 +89,7 @@ def test_sixty_configurations_are_spread_over_a_set():
 class CountingPolicy:
     """Predicts forces that tell the chunk's number, and remembers what it was shown."""
 
-    name, n_obs_steps, fps, keeps_history = "counter", 3, 10, False
+    name, task, n_obs_steps, fps, keeps_history = "counter", "table", 3, 10, False
 
     def __init__(self, n_action_steps=1):
         self.n_action_steps = n_action_steps

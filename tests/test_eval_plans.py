@@ -57,7 +57,7 @@ def right() -> tuple[np.ndarray, np.ndarray]:
 class Replayed:
     """Plans what was demonstrated: asked for whole plans, each demonstration in turn; else the one that is near."""
 
-    name, n_obs_steps, n_action_steps, fps, keeps_history = "replay", 3, 8, 10, False
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history = "replay", "table", 3, 8, 10, False
 
     def __init__(self, *demonstrations: tuple[np.ndarray, np.ndarray]):
         self.wanted: int | None = 8
@@ -141,7 +141,7 @@ def test_the_route_of_an_unfinished_path_is_not_decided():
 class Swaying:
     """Forces that follow from the whole history, for as many tables as there are."""
 
-    name, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "swaying", 3, 8, 10, False, 8
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "swaying", "table", 3, 8, 10, False, 8
 
     def reset(self, seed: int) -> None:
         """Nothing here is random."""

@@ -35,6 +35,7 @@ class Counter:
     fps = 10
     n_action_steps = 3
     keeps_history = False
+    task = "table"
 
     def __init__(self):
         self.histories: list[dict[str, np.ndarray]] = []

@@ -3,6 +3,7 @@
 import json
 import logging
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ import torch
 from small_policies import MLP, TRANSFORMER, columns, lively_policy, policy
 from training_table import flags, write_table
 
+from copolicy.collect.agents import PolicyAgent
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
@@ -91,7 +93,9 @@ def test_another_task_trains_on_its_scaled_numbers_alone(peg, tmp_path, capsys):
     assert chunk.shape == (5, 8, 2)
     assert chunk.abs().max() <= 1
 
-    # Trained on, and given away.
+    loaded_again = Checkpoint(out)
+    assert loaded_again.task == "peg"
+    assert loaded_again.conditions.physics == peg.settings_type()
     assert main([f"--policy.path={trained(out)}", *flags(data, tmp_path / "on", steps=1)[:2], "--steps=1"]) == 0
     assert Checkpoint(out).conditions.physics == peg.settings_type()
     assert main(["export", str(out), "--out", str(tmp_path / "model"), "--json"]) == 0
@@ -185,3 +189,12 @@ def test_actions_are_planned_in_the_units_of_the_task(rope):
     assert single[STATE].shape == (2, 2)
     assert single[HUMAN_ACTION].shape == (2, 1)
     assert planner.select_action(single).shape == (2, 2)
+
+
+def test_a_policy_sits_down_to_its_own_task_alone(peg):
+    learned: Any = SimpleNamespace(name="policy:copolicy-1a2b3c4d", task="peg")
+    expected = "policy:copolicy-1a2b3c4d: expected a policy that has learned the task 'table', found 'peg'"
+    with pytest.raises(InvalidValueError) as caught:
+        PolicyAgent(learned)
+    assert str(caught.value) == expected
+    assert PolicyAgent(learned, peg).name == learned.name

@@ -19,7 +19,8 @@ from copolicy.collect.screen.dialogs import (
 )
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
 from copolicy.collect.sdl import pygame
-from copolicy.tasks.table.artist.table_view import TableView, between, letterbox
+from copolicy.dataset.outline import between
+from copolicy.tasks.table.artist.table_view import TableView, letterbox
 from copolicy.tasks.table.map_config import MapConfig
 
 MAP = MapConfig(start=(240.0, 300.0, 0.0), goal=(960.0, 180.0), obstacles=((600.0, 450.0),))

@@ -195,7 +195,7 @@ def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
 
 
 class _Fast:
-    name, n_obs_steps, fps, n_action_steps, keeps_history = "policy:fast", 2, 30, 3, False
+    name, task, n_obs_steps, fps, n_action_steps, keeps_history = "policy:fast", "table", 2, 30, 3, False
 
     def reset(self, seed):
         """No noise."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, features_of
+from copolicy.dataset.task import require_table
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
@@ -53,6 +54,7 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
             than meta/episodes says.
     """
     task = facts.folder.task
+    require_table(task, facts.root)
     features = features_of(task.spec)
     shapes = {name: features[name]["shape"] for name in (STATE, ENVIRONMENT_STATE, ACTION)}
     for index, columns in facts.folder.frames(shapes):

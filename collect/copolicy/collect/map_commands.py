@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.flag_numbers import seed, whole_number
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import new_file, require_new
@@ -19,16 +19,18 @@ _MOST_MAPS = 10_000
 
 def add_maps_command(commands: argparse._SubParsersAction) -> None:
     """Adds `maps` with its steps to the commands of `copolicy-collect`."""
-    maps = commands.add_parser(
+    steps = add_group(
+        commands,
         "maps",
-        help="files of one's own maps: check, show and make them; every --maps takes such a file",
-        description="Files of one's own maps, in YAML or JSON, for every --maps.",
-        epilog="example:\n  copolicy-collect maps make --count 20 --seed 1 --out lab.yaml\n"
-        "  copolicy-collect maps check lab.yaml\n  copolicy-collect maps show lab.yaml --out lab.png\n"
-        "  copolicy-collect simulate --maps lab.yaml --episodes 100 --out recordings/lab",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "files of one's own maps: check, show and make them; every --maps takes such a file",
+        "Files of one's own maps, in YAML or JSON, for every --maps.",
+        (
+            "copolicy-collect maps make --count 20 --seed 1 --out lab.yaml",
+            "copolicy-collect maps check lab.yaml",
+            "copolicy-collect maps show lab.yaml --out lab.png",
+            "copolicy-collect simulate --maps lab.yaml --episodes 100 --out recordings/lab",
+        ),
     )
-    steps = maps.add_subparsers(dest="step", required=True, metavar="STEP")
     command = add_command(
         steps, "check", _check, "say in one line each what is wrong with a file", "copolicy-collect maps check lab.yaml"
     )

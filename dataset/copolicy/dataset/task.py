@@ -11,16 +11,28 @@ Player 0 is the robot seat, player 1 the human seat. A joint action is both play
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
+from .exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
+from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
+from .task_parts import (
+    RUNNING,
+    Outcome,
+    Player,
+    PolicyFeatures,
+    Scenario,
+    SeatExchange,
+    Settings,
+    SimulatedPlayers,
+    World,
+)
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
 
 if TYPE_CHECKING:
@@ -32,6 +44,7 @@ __all__ = [
     "PLAYERS",
     "RECORD_HZ",
     "RUNNING",
+    "TABLE",
     "Outcome",
     "PairTask",
     "Player",
@@ -45,145 +58,14 @@ __all__ = [
     "World",
     "get_task",
     "installed_tasks",
+    "require_table",
 ]
+
+TABLE = "table"
+"""Name of the task of data, recordings and policies that name none."""
 
 ENTRY_POINTS = "copolicy.tasks"
 """The entry point group in which tasks are registered."""
-
-
-class Scenario(Protocol):
-    """Where an episode starts and what it is about; frozen, equal where it means the same."""
-
-    @property
-    def digest(self) -> str:
-        """Eight hexadecimal digits, equal for scenarios that mean the same."""
-        ...
-
-    def to_json(self) -> str:
-        """Canonical JSON, the text that is attached to a recording."""
-        ...
-
-
-class Settings(Protocol):
-    """Settings of a world: a frozen dataclass of numbers, with a default for each."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def step_limit(self) -> int:
-        """Steps after which an episode ends as a time-out."""
-        ...
-
-
-class Outcome(NamedTuple):
-    """How an episode stands after a step; `reason` is empty while it runs, else one of the task's reasons."""
-
-    done: bool
-    success: bool
-    reason: str
-
-
-RUNNING = Outcome(False, False, "")
-
-
-class World(Protocol):
-    """The simulated world of a task: deterministic, advanced one step of `1 / record_hz` s at a time.
-
-    Attributes:
-        step_count: steps since the last reset.
-    """
-
-    step_count: int
-
-    @property
-    def recorded(self) -> tuple[float, ...]:
-        """The state as recordings hold it (`TaskSpec.recorded`), exact: `reset` to it goes on bit for bit."""
-        ...
-
-    @property
-    def observation(self) -> np.ndarray:
-        """The state as data sets and agents see it (`TaskSpec.state`), `(n,)`."""
-        ...
-
-    def restore(self, recorded: Sequence[float]) -> None:
-        """Puts the world into a recorded state and sets the step count to zero."""
-        ...
-
-    def step(self, action: np.ndarray) -> Outcome:
-        """Advances under a joint action, each number clipped to its bounds; after an end, too."""
-        ...
-
-    def reward(self) -> float:
-        """Of the present state."""
-        ...
-
-
-class Player(Protocol):
-    """A simulated player of one episode."""
-
-    @property
-    def changes(self) -> int:
-        """How often it has changed its mind, as the task defines it."""
-        ...
-
-    def act(self, state: np.ndarray) -> np.ndarray:
-        """Its action `(m,)` in a state `(n,)`; called once a step."""
-        ...
-
-
-@dataclass(frozen=True)
-class SimulatedPlayers:
-    """The part `agents` of a task: players that need neither a person nor a policy.
-
-    Attributes:
-        pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
-        partners: profiles of kinds of partner for the human seat, which robots are judged with.
-        robots: profile and description of scripted robots, which policies are compared with.
-        make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
-        make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
-        make_robot: a player from scenario, name and seed.
-    """
-
-    pairs: Mapping[str, tuple[Any, Any]]
-    partners: Mapping[str, Any]
-    robots: Mapping[str, tuple[Any, str]]
-    make_pair: Callable[..., tuple[Player, Player]]
-    make_partner: Callable[[Any, str, int], Player]
-    make_robot: Callable[[Any, str, int], Player]
-
-
-class SeatExchange(Protocol):
-    """The part `exchange` of a task: the same episode with the robot's and the human's place exchanged.
-
-    Each method is its own inverse. A world in an exchanged state moves under an exchanged action as the first one
-    does, so that a policy that has learned the robot's seat can act at the human's.
-    """
-
-    def scenario(self, scenario: Any) -> Any:
-        """A scenario with the seats exchanged."""
-        ...
-
-    def states(self, states: np.ndarray) -> np.ndarray:
-        """States `(..., n)` with the seats exchanged."""
-        ...
-
-    def actions(self, actions: np.ndarray) -> np.ndarray:
-        """Joint actions `(..., 2 m)` with the seats exchanged."""
-        ...
-
-
-@dataclass(frozen=True)
-class PolicyFeatures:
-    """What a task offers to policies beside the generic input, which is its scaled columns; by name.
-
-    Attributes:
-        encoders: each is called with whether the human's past action is seen, and gives a torch module with a `size`
-            that makes `(..., size)` of observation columns `(..., n)` in physical units.
-        symmetries: each makes other training samples `{column: (B, T, n)}`, as true, of some; applied in this order.
-    """
-
-    encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
-    symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
 
 
 class PairTask(ABC):
@@ -193,15 +75,15 @@ class PairTask(ABC):
 
     Attributes:
         spec: what it is.
-        scenario_type: class of its scenarios, which is constructed from JSON by `scenario_of_json`.
         settings_type: class of its settings.
         exchange: how an episode looks from the other seat.
+        outline: what it looks like.
     """
 
     spec: ClassVar[TaskSpec]
-    scenario_type: ClassVar[type]
     settings_type: ClassVar[type]
     exchange: ClassVar[SeatExchange | None] = None
+    outline: ClassVar[Outline | None] = None
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -377,13 +259,27 @@ class PairTask(ABC):
         return f"left out: the task {self.spec.name!r} has no {part}"
 
 
+def require_table(task: PairTask, where: Path | str) -> None:
+    """Refuses data of another task, in commands that do not go through the contract yet.
+
+    Args:
+        where: the data, for the message.
+
+    Raises:
+        FileFormatError: they are of another task than the table.
+    """
+    if task.spec.name != TABLE:
+        raise FileFormatError(where, f"data of the task {TABLE!r}, the only one that this command knows so far",
+                              f"data of {task.spec.name!r}")  # fmt: skip
+
+
 def installed_tasks() -> list[str]:
     """Names of the tasks that are installed, sorted."""
     return sorted({entry.name for entry in entry_points(group=ENTRY_POINTS)})
 
 
 @functools.cache
-def get_task(name: str = "table") -> PairTask:
+def get_task(name: str = TABLE) -> PairTask:
     """The task of a name.
 
     Raises:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.outline import Point, Shape, square
 from copolicy.dataset.task import RUNNING, Outcome, PairTask
 from copolicy.dataset.task_spec import TaskSpec, Vector
 
@@ -90,8 +91,34 @@ class PegWorld:
         return -abs(self.position - self.line.mark)
 
 
+class PegOutline:
+    """A strip of floor with the peg on its line; see `Outline`."""
+
+    size = (LENGTH, 0.4)
+    unit = "m"
+    arrow = 0.15
+    body = (Shape("body", square((0.0, 0.0), 0.06)),)
+    hands: tuple[Point, Point] = ((-0.03, 0.0), (0.03, 0.0))
+
+    def fixed(self, scenario: Line) -> tuple[Shape, ...]:
+        """The mark."""
+        return (Shape("goal", square((scenario.mark + LENGTH / 2, 0.2), 2 * _CLOSE)),)
+
+    def poses(self, states: np.ndarray) -> np.ndarray:
+        """`(T, 3)` on the line, never turned."""
+        places = np.zeros((len(states), 3))
+        places[:, 0], places[:, 1] = states[:, 0] + LENGTH / 2, self.size[1] / 2
+        return places
+
+    def forces(self, actions: np.ndarray) -> np.ndarray:
+        """`(T, 4)` along the line."""
+        arrows = np.zeros((len(actions), 4))
+        arrows[:, [0, 2]] = actions
+        return arrows
+
+
 class PegTask(PairTask):
-    """Numbers alone: everything optional is lacking."""
+    """Numbers and an outline: everything else that is optional is lacking."""
 
     spec = TaskSpec(
         name="peg",
@@ -105,8 +132,8 @@ class PegTask(PairTask):
         successes=("mark",),
         record_hz=_HZ,
     )
-    scenario_type = Line
     settings_type = Friction
+    outline = PegOutline()
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[Line]]:

@@ -23,7 +23,7 @@ from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import TABLE, get_task
 
 _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
@@ -42,6 +42,7 @@ class Checkpoint:
 
     Attributes:
         name: type and the beginning of its weights' digest.
+        task: name of the task that it learned.
         folder: where `config.json` and the weights are.
         weights_sha256: digest of the weights.
         policy: LeRobot's policy.
@@ -81,6 +82,7 @@ class Checkpoint:
             ) from error
         self.weights_sha256 = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
         self._config: Any = self.policy.config
+        self.task: str = getattr(self._config, "task", None) or TABLE
         self.name = f"policy:{self._config.type}-{self.weights_sha256[:8]}"
         indices = self._config.observation_delta_indices
         self._indices = None if indices is None else [index - 1 for index in indices if index <= 0]
@@ -196,7 +198,7 @@ def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any
     if unknown := sorted(set(config.input_features) - set(_OBSERVATIONS)):
         expected = f"a policy that observes {', '.join(_OBSERVATIONS)} at most"
         raise FileFormatError(folder, expected, f"one that also needs {', '.join(unknown)}")
-    task = get_task(getattr(config, "task", None) or "table")
+    task = get_task(getattr(config, "task", None) or TABLE)
     size, feature = len(task.spec.joint_action), config.action_feature
     if feature is None or tuple(feature.shape) != (size,):
         found = "none" if feature is None else f"actions of {tuple(feature.shape)}"

@@ -3,8 +3,9 @@
 Names are loaded when they are asked for: flags need none of them.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from copolicy.dataset.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from .checkpoint_folder import load_policy
@@ -24,16 +25,13 @@ __all__ = [
     "load_policy",
 ]
 
-_MODULES = {
-    **dict.fromkeys(("HeldAgent", "RecordedAgent", "ReplayAgent"), "replay"),
-    **dict.fromkeys(("Policy", "PolicyAgent"), "policy"),
-    "PersonAgent": "people",
-    "ScriptedAgent": "scripted",
-    "load_policy": "checkpoint_folder",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        **dict.fromkeys(("HeldAgent", "RecordedAgent", "ReplayAgent"), "replay"),
+        **dict.fromkeys(("Policy", "PolicyAgent"), "policy"),
+        "PersonAgent": "people",
+        "ScriptedAgent": "scripted",
+        "load_policy": "checkpoint_folder",
+    },
+)

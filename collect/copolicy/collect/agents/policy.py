@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from copolicy.dataset.clock import frame_actions, stride
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import PairTask, get_task
@@ -21,6 +22,7 @@ class Policy(Protocol):
 
     Attributes:
         name: in recordings.
+        task: name of the task that it learned.
         n_obs_steps: frames of history that it wants.
         n_action_steps: actions of a chunk that are executed before the next chunk.
         fps: frames a second of the data that it learned from.
@@ -28,6 +30,7 @@ class Policy(Protocol):
     """
 
     name: str
+    task: str
     n_obs_steps: int
     n_action_steps: int
     fps: int
@@ -90,11 +93,17 @@ class PolicyAgent(Agent):
             fps: frames a second that an action is held at; the policy's own if None.
             seed: of what the policy draws at random; that of the first world if None.
             real_time: inference runs beside the loop.
+
+        Raises:
+            InvalidValueError: the policy has learned another task.
         """
         self.name = policy.name
         self.latencies: list[float] = []
         self._policy = policy
         self._task = task or get_task()
+        if policy.task != self._task.spec.name:
+            expected = f"a policy that has learned the task {self._task.spec.name!r}"
+            raise InvalidValueError(policy.name, expected, policy.task)
         self._fps, self._seed, self._clock = fps, seed, clock
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy") if real_time else None
         self._pending: Future[_Chunk] | None = None

@@ -2,7 +2,7 @@
 
 from enum import Enum, auto
 
-from copolicy.tasks.table.artist.table_view import between
+from copolicy.dataset.outline import between
 
 from ..inputs import Press
 from ..screen import WORLD, Canvas

@@ -10,11 +10,12 @@ from typing import Any
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import new_file, require_new
+from copolicy.dataset.outline import placed
 from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
-from copolicy.tasks.table.artist.table_view import SEAT_POINTS, board_outline
 from copolicy.tasks.table.map_config import WINDOW
-from copolicy.tasks.table.outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from copolicy.tasks.table.outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.tasks.table.scene_outline import TableOutline, board_outline
 
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
 from .track import Pose, Track
@@ -122,7 +123,7 @@ def _log_map(rr: Any, recording: Any, track: Track) -> None:
         obstacles = rr.Boxes2D(centers=list(config.obstacles), sizes=sizes, colors=[mix(OBSTACLE, _GRAY, 0.5)])
         recording.log("world/obstacles", obstacles, static=True)
     for player, colour in zip(PLAYERS, SEATS, strict=True):
-        points = [on_screen(pose, SEAT_POINTS[PLAYERS.index(player)]) for pose in track.poses]
+        points = [placed(pose, TableOutline.hands[PLAYERS.index(player)]) for pose in track.poses]
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[1.0])
         recording.log(f"world/trail/{player}", trail, static=True)
     recording.log("interaction_force", rr.SeriesLines(names=["positive: pulling apart"]), static=True)
@@ -136,7 +137,7 @@ def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
     strips = [_closed(pose, outline) for outline in outlines]
     recording.log("world/table", rr.LineStrips2D(strips, colors=[WOOD, *SEATS], radii=[2.0]))
     fx0, fy0, fx1, fy1 = track.forces_at(step)
-    origins = [on_screen(pose, point) for point in SEAT_POINTS]
+    origins = [placed(pose, point) for point in TableOutline.hands]
     vectors = [(_FORCE_LENGTH * fx0, _FORCE_LENGTH * fy0), (_FORCE_LENGTH * fx1, _FORCE_LENGTH * fy1)]
     recording.log("world/forces", rr.Arrows2D(origins=origins, vectors=vectors, colors=list(SEATS), radii=[2.5]))
     if step < track.steps:
@@ -147,4 +148,4 @@ def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
 
 
 def _closed(pose: Pose, outline: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    return [on_screen(pose, point) for point in (*outline, outline[0])]
+    return [placed(pose, point) for point in (*outline, outline[0])]

@@ -8,13 +8,12 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.outline import Pose, between
 from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.task import get_task, require_table
 from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.artist.table_view import between
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.interaction import interaction_force
-
-Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,12 @@ def read_track(path: Path | str) -> Track:
 
 
 def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> Track:
-    """The track of an episode in memory."""
+    """The track of an episode in memory.
+
+    Raises:
+        FileFormatError: it is of another task than the table.
+    """
+    require_table(get_task(episode.task), path)
     states = np.vstack((episode.states, episode.final_state))
     theta = theta_of(states)
     poses = tuple((x, y, angle) for (x, y), angle in zip(states[:, :2].tolist(), theta.tolist(), strict=True))

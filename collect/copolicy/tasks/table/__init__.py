@@ -3,8 +3,9 @@
 Names are loaded when they are asked for: flags need the maps, but neither pymunk nor what finds routes.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from copolicy.dataset.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from .map_config import MAX_OBSTACLES, WINDOW, MapConfig
@@ -27,16 +28,13 @@ __all__ = [
     "map_set",
 ]
 
-_MODULES = {
-    **dict.fromkeys(("MAX_OBSTACLES", "WINDOW", "MapConfig"), "map_config"),
-    **dict.fromkeys(("MAP_SETS", "ORIGINAL_MAPS", "identify", "map_set"), "maps"),
-    **dict.fromkeys(("GOAL_SIZE", "Physics"), "physics"),
-    "TableTask": "task",
-    "TableWorld": "world",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        **dict.fromkeys(("MAX_OBSTACLES", "WINDOW", "MapConfig"), "map_config"),
+        **dict.fromkeys(("MAP_SETS", "ORIGINAL_MAPS", "identify", "map_set"), "maps"),
+        **dict.fromkeys(("GOAL_SIZE", "Physics"), "physics"),
+        "TableTask": "task",
+        "TableWorld": "world",
+    },
+)

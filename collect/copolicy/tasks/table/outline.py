@@ -43,11 +43,3 @@ def drawn_centre(x: float, y: float, image_width: int) -> tuple[float, float]:
     """Where the middle of the picture is on screen: the position cut to whole pixels, and half a pixel that
     depends on the width of the turned image (pygame's rotation, found by comparing 6,000 turned masks)."""
     return int(x) + 0.5 * (image_width & 1), int(y) + 0.5
-
-
-def on_screen(pose: tuple[float, float, float], point: tuple[float, float]) -> tuple[float, float]:
-    """Position on screen of a point (u, v) of the table, px."""
-    x, y, theta = pose
-    u, v = point
-    cos, sin = math.cos(theta), math.sin(theta)
-    return x + u * cos + v * sin, y - u * sin + v * cos

@@ -18,6 +18,7 @@ from .maps import MAP_SETS, identify, turned
 from .physics import Physics
 from .reward import reward
 from .routes import route_class
+from .scene_outline import TableOutline
 from .seats import TableSeats
 from .spec import SPEC
 
@@ -33,9 +34,9 @@ class TableTask(PairTask):
     """Two players carry a table past obstacles to a goal (Ng, Liu and Kennedy, RA-L 2023)."""
 
     spec = SPEC
-    scenario_type = MapConfig
     settings_type = Physics
     exchange = TableSeats()
+    outline = TableOutline()
 
     @property
     def agents(self) -> SimulatedPlayers:

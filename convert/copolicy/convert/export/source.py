@@ -16,7 +16,7 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.physics_text import physics_counts, physics_of
-from copolicy.dataset.task import PairTask
+from copolicy.dataset.task import PairTask, require_table
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,6 +101,7 @@ class ExportSource:
         """
         folder = LeRobotFolder.open(root)
         task, info = folder.task, folder.info
+        require_table(task, root)
         folder.require_task(tuple(features_of(task.spec)))
         record_hz = task.spec.record_hz
         fps, hold = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))

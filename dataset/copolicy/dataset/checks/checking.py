@@ -9,6 +9,7 @@ from ..exceptions import FileFormatError
 from ..files.file_kinds import kind_of
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
+from ..task import require_table
 from . import balance, check_sums, contacts, inputs, leakage, loading, maps, mixtures, motion, schema, timing
 from .episode_table import EpisodeTable
 from .finding import SEVERITIES, Finding
@@ -45,18 +46,23 @@ def read_table(root: Path) -> EpisodeTable:
     """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
 
     Raises:
-        FileFormatError: neither.
+        FileFormatError: neither, or data of another task than the rules know.
         MissingExtraError: a LeRobot data set without pyarrow.
     """
     if (root / INFO_FILE).is_file():
         from .read_lerobot import read_lerobot
 
-        return read_lerobot(root)
+        return _of_the_table(read_lerobot(root))
     if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
         broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)] if root.is_dir() else []
         found = broken[0] if broken else kind_of(root)
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
-    return read_recordings(root)
+    return _of_the_table(read_recordings(root))
+
+
+def _of_the_table(table: EpisodeTable) -> EpisodeTable:
+    require_table(table.task, table.root)
+    return table
 
 
 def check_dataset(root: Path, against: Path | None = None) -> CheckResult:

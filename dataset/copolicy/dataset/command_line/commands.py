@@ -59,6 +59,20 @@ def add_command(
     return parser
 
 
+def add_group(
+    commands: argparse._SubParsersAction, name: str, help: str, description: str, examples: Sequence[str]
+) -> argparse._SubParsersAction:
+    """Adds a command of several steps, each to be added by `add_command` to what comes back."""
+    parser = commands.add_parser(
+        name,
+        help=help,
+        description=description,
+        epilog="\n  ".join(("example:", *examples)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser.add_subparsers(dest="step", required=True, metavar="STEP")
+
+
 def add_common_flags(parser: argparse.ArgumentParser) -> None:
     """The two flags that every command has."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout; logs go to stderr")

@@ -47,13 +47,22 @@ def new_folder(path: Path, suffix: str | None = None) -> Iterator[Path]:
     try:
         with about(path, partial):
             yield partial
-            sync_tree(partial)
-            require_new(path)
-            partial.rename(path)
-            sync_folder(path.parent)
+            take_name(partial, path)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
+
+
+def take_name(partial: Path, path: Path) -> None:
+    """Renames a finished folder once all of it is on the disk.
+
+    Raises:
+        OutputExistsError: there is something at `path`.
+    """
+    sync_tree(partial)
+    require_new(path)
+    partial.rename(path)
+    sync_folder(path.parent)
 
 
 @contextmanager

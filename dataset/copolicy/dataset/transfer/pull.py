@@ -7,7 +7,7 @@ from pathlib import Path
 from ..exceptions import FileFormatError, RunError
 from ..files.listing import visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER, RAW_MANIFEST_FILE
-from ..files.staging import about, require_new, sync_folder, sync_tree
+from ..files.staging import about, require_new, take_name
 from ..hub.repository import download, forget_progress, resolve
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
@@ -57,10 +57,7 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
             forget_progress(partial)
             (partial / ".gitattributes").unlink(missing_ok=True)
             record, files = _verify(partial, f"{repo_id}@{revision}")
-            require_new(root)
-            sync_tree(partial)
-            partial.rename(root)
-            sync_folder(root.parent)
+            take_name(partial, root)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             raise

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
@@ -22,16 +22,17 @@ from ..study_flags import add_protocol_flags, policy_settings, protocol_of
 
 def add_human_command(commands: argparse._SubParsersAction) -> None:
     """Adds `human` with its three steps to the commands of `copolicy-eval`."""
-    human = commands.add_parser(
+    steps = add_group(
+        commands,
         "human",
-        help="the human study: plan it, run a person's session, summarise the recordings",
-        description="A person at the human seat with one robot after the other, blind and counterbalanced.",
-        epilog="example:\n  copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --out study/plan.json\n"
-        "  copolicy-eval human run study/plan.json --participant P01 --out study/recordings\n"
-        "  copolicy-eval human summarise study/recordings --plan study/plan.json --out study/result.json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "the human study: plan it, run a person's session, summarise the recordings",
+        "A person at the human seat with one robot after the other, blind and counterbalanced.",
+        (
+            "copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --out study/plan.json",
+            "copolicy-eval human run study/plan.json --participant P01 --out study/recordings",
+            "copolicy-eval human summarise study/recordings --plan study/plan.json --out study/result.json",
+        ),
     )
-    steps = human.add_subparsers(dest="step", required=True, metavar="STEP")
     _add_plan(steps)
     _add_run(steps)
     _add_summarise(steps)

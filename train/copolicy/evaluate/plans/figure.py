@@ -11,9 +11,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from copolicy.dataset.files.staging import replacement
+from copolicy.dataset.outline import placed
 from copolicy.dataset.task_spec import PLAYERS
 from copolicy.tasks.table.map_config import WINDOW
-from copolicy.tasks.table.outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from copolicy.tasks.table.outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from copolicy.tasks.table.physics import GOAL_SIZE
 
 from .sampling import Decision
@@ -71,7 +72,7 @@ def _forces(axis: Axes, decision: Decision, colours: dict[str | None, str]) -> N
     _furniture(axis, decision)
     _table(axis, decision.pose)
     for seat, first in zip(_SEATS, (slice(0, 2), slice(2, 4)), strict=True):
-        x, y = on_screen(decision.pose, seat)
+        x, y = placed(decision.pose, seat)
         forces = np.array([sample.plan[0, first] for sample in decision.samples]) * _ARROW
         axis.quiver(
             np.full(len(forces), x), np.full(len(forces), y), *forces.T,
@@ -81,7 +82,7 @@ def _forces(axis: Axes, decision: Decision, colours: dict[str | None, str]) -> N
     for sample in decision.samples:
         axis.plot(*sample.planned_path.T, color=colours[sample.route], linewidth=1.5, alpha=0.8, zorder=4)
     for seat, name in zip(_SEATS, PLAYERS, strict=True):
-        x, y = on_screen(decision.pose, seat)
+        x, y = placed(decision.pose, seat)
         axis.annotate(name, (x, y), (0, -34), textcoords="offset points", ha="center", fontsize=9)
     x, y, _ = decision.pose
     axis.set(xlim=(x - _NEAR, x + _NEAR), ylim=(y + _NEAR, y - _NEAR), xticks=[], yticks=[], aspect="equal")
@@ -99,10 +100,10 @@ def _furniture(axis: Axes, decision: Decision) -> None:
 
 def _table(axis: Axes, pose: tuple[float, float, float]) -> None:
     left, top, right, bottom = BOARD
-    board = [on_screen(pose, point) for point in ((left, top), (right, top), (right, bottom), (left, bottom))]
+    board = [placed(pose, point) for point in ((left, top), (right, top), (right, bottom), (left, bottom))]
     axis.add_patch(Polygon(board, facecolor=_BOARD, edgecolor="#8A7F6A", zorder=1.5))
-    axis.add_patch(Polygon([on_screen(pose, point) for point in TRIANGLE], facecolor="#3B6FB6", zorder=1.5))
-    axis.add_patch(Circle(on_screen(pose, CIRCLE_CENTRE), CIRCLE_RADIUS, facecolor="#E8862E", zorder=1.5))
+    axis.add_patch(Polygon([placed(pose, point) for point in TRIANGLE], facecolor="#3B6FB6", zorder=1.5))
+    axis.add_patch(Circle(placed(pose, CIRCLE_CENTRE), CIRCLE_RADIUS, facecolor="#E8862E", zorder=1.5))
 
 
 def _meaning(word: str) -> str:

@@ -3,8 +3,9 @@
 Names are loaded when they are asked for: the habits, which flags list, need none of what finds routes.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from copolicy.dataset.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from .habits import Habits
@@ -24,15 +25,12 @@ __all__ = [
     "simulated_partner",
 ]
 
-_MODULES = {
-    "Habits": "habits",
-    "ScriptedPilot": "scripted",
-    **dict.fromkeys(("scripted_robot", "simulated_pair", "simulated_partner"), "players"),
-    **dict.fromkeys(("NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS"), "profiles"),
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "Habits": "habits",
+        "ScriptedPilot": "scripted",
+        **dict.fromkeys(("scripted_robot", "simulated_pair", "simulated_partner"), "players"),
+        **dict.fromkeys(("NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS"), "profiles"),
+    },
+)

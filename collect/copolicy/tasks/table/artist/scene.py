@@ -12,11 +12,12 @@ from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
+from copolicy.dataset.outline import placed
 from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task_spec import PLAYERS
 
 from ..map_config import WINDOW, MapConfig
-from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 
 FRAME_WORDS = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
@@ -131,7 +132,7 @@ def metres(point: tuple[float, float]) -> tuple[float, float]:
 
 def _of_table(pose: Pose, point: tuple[float, float]) -> tuple[float, float]:
     """Where a point (u, v) of the table is in the scene."""
-    x, y = metres(on_screen(pose, point))
+    x, y = metres(placed(pose, point))
     return coarse(x), coarse(y)
 
 

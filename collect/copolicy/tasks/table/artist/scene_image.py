@@ -4,9 +4,10 @@ import numpy as np
 
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.features import SCENE_SIZE
+from copolicy.dataset.outline import Pose
 
 from ..map_config import MapConfig
-from .table_view import Pose, TableView
+from .table_view import TableView
 
 
 class SceneImage:

@@ -18,18 +18,13 @@ from copolicy.collect.screen.palette import (
 )
 from copolicy.collect.screen.patch import Point, SmoothPatch
 from copolicy.collect.sdl import pygame
+from copolicy.dataset.outline import Pose, placed
 
 from ..map_config import WINDOW, MapConfig
-from ..outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE, on_screen
+from ..outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
+from ..scene_outline import TableOutline, board_outline
 
-Pose = tuple[float, float, float]
-
-SEAT_POINTS: tuple[Point, Point] = ((75.5, 6.0), CIRCLE_CENTRE)
-"""Where each player holds the table: middle of the triangle and of the circle, image coordinates in px."""
-
-_ARROW_LENGTH = 95.0  # px, of a full force
-_CORNER = [(math.cos(k * math.pi / 12), math.sin(k * math.pi / 12)) for k in range(7)]  # a quarter of a circle
 _DOTS = 50  # px between the dots on the floor
 _LIT = (255, 255, 255)
 
@@ -40,13 +35,6 @@ def letterbox(area: pygame.Rect, size: tuple[int, int] = WINDOW) -> pygame.Rect:
     rect = pygame.Rect(0, 0, max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
     rect.center = area.center
     return rect
-
-
-def between(start: Pose, end: Pose, share: float) -> Pose:
-    """The pose at a share in [0, 1] of the way, turned the shorter way round."""
-    turn = (end[2] - start[2] + math.pi) % (2 * math.pi) - math.pi
-    x, y = (a + share * (b - a) for a, b in zip(start[:2], end[:2], strict=True))
-    return x, y, start[2] + share * turn
 
 
 class TableView:
@@ -101,7 +89,7 @@ class TableView:
         return self._rect.left + point[0] * self._scale, self._rect.top + point[1] * self._scale
 
     def _of_table(self, pose: Pose, points: Sequence[Point]) -> list[Point]:
-        return [self.to_screen(on_screen(pose, point)) for point in points]
+        return [self.to_screen(placed(pose, point)) for point in points]
 
     def _draw_background(self, size: tuple[int, int]) -> pygame.Surface:
         scale = self._scale
@@ -125,7 +113,7 @@ class TableView:
             return
         width = max(2, round(3 * self._scale))
         for seat, colour in enumerate(SEATS):
-            points = [self.to_screen(on_screen(pose, SEAT_POINTS[seat])) for pose in trail]
+            points = [self.to_screen(placed(pose, TableOutline.hands[seat])) for pose in trail]
             pale = mix(colour, FLOOR, 0.55)
             pygame.draw.lines(surface, pale, False, points, width)
             pygame.draw.aalines(surface, pale, False, points)
@@ -161,9 +149,9 @@ class TableView:
         if strength < 0.03:
             return
         scale = self._scale
-        (tail,) = self._of_table(pose, [SEAT_POINTS[seat]])
+        (tail,) = self._of_table(pose, [TableOutline.hands[seat]])
         u, v = force[0] / strength, force[1] / strength
-        length = _ARROW_LENGTH * strength * scale
+        length = TableOutline.arrow * strength * scale
         head = min(20 * scale, 0.6 * length)
         neck = (tail[0] + u * (length - head), tail[1] + v * (length - head))
         tip = (tail[0] + u * length, tail[1] + v * length)
@@ -187,18 +175,6 @@ class TableView:
                 patch.line(paint, tail, neck, 7 * scale + 2 * grown)
                 patch.polygon(paint, barbs(grown))
             patch.circle(mix(colour, INK, 0.4), tail, 5 * scale)
-
-
-def board_outline() -> list[Point]:
-    """The board with its round corners, image coordinates in px."""
-    left, top, right, bottom = BOARD
-    r = BOARD_CORNER_RADIUS
-    corners = ((right - r, bottom - r), (left + r, bottom - r), (left + r, top + r), (right - r, top + r))
-    outline = []
-    for quarter, (u, v) in enumerate(corners):
-        cos, sin = math.cos(quarter * math.pi / 2), math.sin(quarter * math.pi / 2)
-        outline += [(u + r * (a * cos - b * sin), v + r * (a * sin + b * cos)) for a, b in _CORNER]
-    return outline
 
 
 def _shrunk(outline: Sequence[Point], by: float) -> list[Point]:

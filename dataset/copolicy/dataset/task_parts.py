@@ -1,0 +1,142 @@
+"""What a task is made of: scenarios, settings, the world, and the parts that it may offer beside them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+
+class Scenario(Protocol):
+    """Where an episode starts and what it is about; frozen, equal where it means the same."""
+
+    @property
+    def digest(self) -> str:
+        """Eight hexadecimal digits, equal for scenarios that mean the same."""
+        ...
+
+    def to_json(self) -> str:
+        """Canonical JSON, the text that is attached to a recording."""
+        ...
+
+
+class Settings(Protocol):
+    """Settings of a world: a frozen dataclass of numbers, with a default for each."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def step_limit(self) -> int:
+        """Steps after which an episode ends as a time-out."""
+        ...
+
+
+class Outcome(NamedTuple):
+    """How an episode stands after a step; `reason` is empty while it runs, else one of the task's reasons."""
+
+    done: bool
+    success: bool
+    reason: str
+
+
+RUNNING = Outcome(False, False, "")
+
+
+class World(Protocol):
+    """The simulated world of a task: deterministic, advanced one step of `1 / record_hz` s at a time.
+
+    Attributes:
+        step_count: steps since the last reset.
+    """
+
+    step_count: int
+
+    @property
+    def recorded(self) -> tuple[float, ...]:
+        """The state as recordings hold it (`TaskSpec.recorded`), exact: `reset` to it goes on bit for bit."""
+        ...
+
+    @property
+    def observation(self) -> np.ndarray:
+        """The state as data sets and agents see it (`TaskSpec.state`), `(n,)`."""
+        ...
+
+    def restore(self, recorded: Sequence[float]) -> None:
+        """Puts the world into a recorded state and sets the step count to zero."""
+        ...
+
+    def step(self, action: np.ndarray) -> Outcome:
+        """Advances under a joint action, each number clipped to its bounds; after an end, too."""
+        ...
+
+    def reward(self) -> float:
+        """Of the present state."""
+        ...
+
+
+class Player(Protocol):
+    """A simulated player of one episode."""
+
+    @property
+    def changes(self) -> int:
+        """How often it has changed its mind, as the task defines it."""
+        ...
+
+    def act(self, state: np.ndarray) -> np.ndarray:
+        """Its action `(m,)` in a state `(n,)`; called once a step."""
+        ...
+
+
+@dataclass(frozen=True)
+class SimulatedPlayers:
+    """The part `agents` of a task: players that need neither a person nor a policy.
+
+    Attributes:
+        pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
+        partners: profiles of kinds of partner for the human seat, which robots are judged with.
+        robots: profile and description of scripted robots, which policies are compared with.
+        make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
+        make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
+        make_robot: a player from scenario, name and seed.
+    """
+
+    pairs: Mapping[str, tuple[Any, Any]]
+    partners: Mapping[str, Any]
+    robots: Mapping[str, tuple[Any, str]]
+    make_pair: Callable[..., tuple[Player, Player]]
+    make_partner: Callable[[Any, str, int], Player]
+    make_robot: Callable[[Any, str, int], Player]
+
+
+class SeatExchange(Protocol):
+    """The part `exchange` of a task: the same episode with the robot's and the human's place exchanged.
+
+    Each method is its own inverse. A world in an exchanged state moves under an exchanged action as the first one
+    does, so that a policy that has learned the robot's seat can act at the human's.
+    """
+
+    def scenario(self, scenario: Any) -> Any:
+        """A scenario with the seats exchanged."""
+        ...
+
+    def states(self, states: np.ndarray) -> np.ndarray:
+        """States `(..., n)` with the seats exchanged."""
+        ...
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Joint actions `(..., 2 m)` with the seats exchanged."""
+        ...
+
+
+@dataclass(frozen=True)
+class PolicyFeatures:
+    """What a task offers to policies beside the generic input, which is its scaled columns; by name.
+
+    Attributes:
+        encoders: each is called with whether the human's past action is seen, and gives a torch module with a `size`
+            that makes `(..., size)` of observation columns `(..., n)` in physical units.
+        symmetries: each makes other training samples `{column: (B, T, n)}`, as true, of some; applied in this order.
+    """
+
+    encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
+    symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
