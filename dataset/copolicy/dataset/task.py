@@ -31,6 +31,7 @@ from .task_parts import (
     SeatExchange,
     Settings,
     SimulatedPlayers,
+    Studies,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -53,6 +54,7 @@ __all__ = [
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
+    "Studies",
     "TaskSpec",
     "Vector",
     "World",
@@ -78,12 +80,16 @@ class PairTask(ABC):
         settings_type: class of its settings.
         exchange: how an episode looks from the other seat.
         outline: what it looks like.
+        studies: what results of studies say of it.
+        orientations: how many start orientations `turned` gives a scenario; 1: there are none.
     """
 
     spec: ClassVar[TaskSpec]
     settings_type: ClassVar[type]
     exchange: ClassVar[SeatExchange | None] = None
     outline: ClassVar[Outline | None] = None
+    studies: ClassVar[Studies] = Studies()
+    orientations: ClassVar[int] = 1
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -156,6 +162,10 @@ class PairTask(ABC):
         """Episode columns with what the vector of a scenario does not say."""
         return {}
 
+    def unseen(self, columns: Mapping[str, Any]) -> str:
+        """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
+        return ""
+
     def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
         world = self.make_world(scenario, settings)
@@ -186,6 +196,10 @@ class PairTask(ABC):
     def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
         """`(T,)` what passes between the players in states `(T, n)` under actions `(T, m)`; None: not measured."""
         return None
+
+    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+        """The same in recorded states `(T, k)`."""
+        return self.interaction(self.states_of(recorded), actions)
 
     def layout(self, scenario: Any, with_goal: bool = False) -> Hashable:
         """What scenarios share that differ in their start alone, or without `with_goal` in start and goal; sortable."""

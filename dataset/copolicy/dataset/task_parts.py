@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -106,6 +107,26 @@ class SimulatedPlayers:
     make_pair: Callable[..., tuple[Player, Player]]
     make_partner: Callable[[Any, str, int], Player]
     make_robot: Callable[[Any, str, int], Player]
+
+
+class Studies:
+    """The part `studies` of a task: what results of studies say of it beside what they say of any task.
+
+    Attributes:
+        step_limit: steps after which an episode of a study ends; None: as the settings of the task have it.
+        definitions: what measures are in this task, in words by their names in results.
+    """
+
+    step_limit: int | None = None
+    definitions: Mapping[str, str] = MappingProxyType({})
+
+    def factors(self, scenario: Any) -> dict[str, Any]:
+        """Columns of an episode's row; results are split by `start_theta` (rad) and `obstacles` (a count), if any."""
+        return {}
+
+    def at_rest(self, recorded: np.ndarray) -> np.ndarray | None:
+        """`(T,)` whether what is moved stands, in recorded states `(T, k)`; None: not measured."""
+        return None
 
 
 class SeatExchange(Protocol):

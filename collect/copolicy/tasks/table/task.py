@@ -21,6 +21,7 @@ from .routes import route_class
 from .scene_outline import TableOutline
 from .seats import TableSeats
 from .spec import SPEC
+from .studies import TableStudies
 
 if TYPE_CHECKING:
     from .map_files import MapFiles
@@ -37,6 +38,8 @@ class TableTask(PairTask):
     settings_type = Physics
     exchange = TableSeats()
     outline = TableOutline()
+    studies = TableStudies()
+    orientations = 4
 
     @property
     def agents(self) -> SimulatedPlayers:
@@ -70,6 +73,11 @@ class TableTask(PairTask):
     def columns_of(self, scenario: MapConfig) -> dict[str, Any]:
         """The size of the obstacles, and that of each where they differ."""
         return {"obstacle_size": scenario.obstacle_size, "obstacle_sizes": sizes_text(scenario)}
+
+    def unseen(self, columns: Mapping[str, Any]) -> str:
+        """The sizes of obstacles that differ: the vector has their centres, and the scan takes all for 50 px."""
+        sizes = columns.get("obstacle_sizes")
+        return f"the size of each obstacle, where they differ ({sizes} px)" if sizes else ""
 
     def make_world(self, scenario: MapConfig, settings: Physics | None = None) -> "TableWorld":
         """A table at rest at the start of a map."""
@@ -111,6 +119,10 @@ class TableTask(PairTask):
     def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """See `interaction_force`."""
         return interaction_force(theta_of(states), actions)
+
+    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """By the recorded orientation itself, not by its cosine and sine."""
+        return interaction_force(recorded[:, 2], actions)
 
     def layout(self, scenario: MapConfig, with_goal: bool = False) -> tuple:
         """The obstacles, whatever their order, and the goal."""
