@@ -103,11 +103,13 @@ def _show(arguments: argparse.Namespace) -> dict[str, Any]:
         raise InvalidValueError("--out", "a name that ends with .png", str(arguments.out))
     require_new(arguments.out)
     task = get_task(arguments.task)
-    files, chosen = _files(task), task.scenario_set(arguments.maps)
+    chosen = task.scenario_set(arguments.maps)
     if arguments.orientations:
         chosen = task.turned(chosen)
+    from .map_sheet import write_map_sheet  # pygame
+
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    size = files.draw(chosen, arguments.out, arguments.width)
+    size = write_map_sheet(task, chosen, arguments.out, arguments.width)
     return {**chosen.describe(), "maps": len(chosen.scenarios), "out": str(arguments.out), "size": list(size)}
 
 

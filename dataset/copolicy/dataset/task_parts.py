@@ -29,7 +29,7 @@ class Settings(Protocol):
 
     @property
     def step_limit(self) -> int:
-        """Steps after which an episode ends as a time-out."""
+        """Steps after which an episode ends with the reason `timeout`."""
         ...
 
 

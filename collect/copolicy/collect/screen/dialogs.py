@@ -5,16 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from copolicy.dataset.task_spec import TIMEOUT, TaskSpec
+
 from .canvas import WORLD, Canvas
 from .palette import FLOOR, GREEN, INK, MUTED, PANEL, SKY, TEXT, VERMILION, YELLOW, Colour, mix
 
-OUTCOME_COLOURS: dict[str, Colour] = {
-    "goal": GREEN,
-    "collision_obstacle": VERMILION,
-    "collision_wall": VERMILION,
-    "timeout": YELLOW,
-}
-OUTCOME_TEXTS = {
+_OUTCOMES = {
     "goal": "Goal!",
     "collision_obstacle": "Obstacle hit",
     "collision_wall": "Wall hit",
@@ -26,6 +22,18 @@ _CONTROL = re.compile(r"\{(\w+)\}")
 _STRIP = (370, 664, 460, 92)  # below the world, between the players' panels
 STRIP_ROWS = 2
 """Rows of `draw_strip_menu`."""
+
+
+def outcome_text(reason: str) -> str:
+    """How an episode ended, in words."""
+    return _OUTCOMES.get(reason, reason.replace("_", " "))
+
+
+def outcome_colour(spec: TaskSpec, reason: str) -> Colour:
+    """The colour of an end: a success, a time-out, another end of the world, or one that the world did not make."""
+    if reason == TIMEOUT:
+        return YELLOW
+    return GREEN if reason in spec.successes else VERMILION if reason in spec.reasons else MUTED
 
 
 class _Labels(Protocol):
