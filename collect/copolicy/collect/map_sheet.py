@@ -27,6 +27,7 @@ def write_map_sheet(task: PairTask, chosen: ScenarioSet, path: Path, width: int)
         OutputExistsError: the file exists.
     """
     surface = draw_map_sheet(task, chosen, width)
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_png(surface, path)
     return surface.get_size()
 

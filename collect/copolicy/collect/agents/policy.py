@@ -62,7 +62,7 @@ class PolicyAgent(Agent):
         chunk B                     b0    b1       the world waits: predicted where A's n_action_steps are executed
         chunk B               (o2)  b1    b2       in real time: asked for one frame before; b0 is due meanwhile
 
-    A frame's action is held for 30 / fps steps, at the rate of the data that the policy learned from. All worlds get
+    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. All worlds get
     their chunks from one call of the policy.
 
     In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
@@ -116,8 +116,8 @@ class PolicyAgent(Agent):
         self._pending, self._chunk = None, None
         # Another policy may be behind the same name now.
         self._rate = self._fps or self._policy.fps
-        self._hold = stride(self._rate)
         self._seat, spec = seat, self._task.spec
+        self._hold = stride(self._rate, spec.record_hz)
         self._exchange = self._task.exchange if seat == 1 else None
         count, frames, size = len(starts), self._policy.n_obs_steps, len(spec.action)
         self._size = size
@@ -196,7 +196,8 @@ class PolicyAgent(Agent):
 
     def _observe(self, states: np.ndarray, worlds: np.ndarray) -> None:
         held = np.array(self._held)  # (hold, worlds, 2 m)
-        mean = frame_actions(held.reshape(len(held), -1), self._rate)[0].reshape(held.shape[1:])[worlds]
+        actions, hz = held.reshape(len(held), -1), self._task.spec.record_hz
+        mean = frame_actions(actions, self._rate, record_hz=hz)[0].reshape(held.shape[1:])[worlds]
         self._held = []
         if self._exchange is not None:
             states, mean = self._exchange.states(states), self._exchange.actions(mean)

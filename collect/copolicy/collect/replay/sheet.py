@@ -91,4 +91,6 @@ def _draw_head(canvas: Canvas, track: Track) -> None:
     canvas.text(track.path.name, (_GAP + 4, 10), 32, TEXT, max_width=700)
     canvas.text("  ·  ".join(text for text in about if text), (_GAP + 4, 38), 22, MUTED, max_width=800)
     reason = meta.termination_reason
-    canvas.text(outcome_text(reason), (1200 - _GAP - 4, 32), 38, outcome_colour(track.task.spec, reason), "midright", 320)
+    canvas.text(
+        outcome_text(reason), (1200 - _GAP - 4, 32), 38, outcome_colour(track.task.spec, reason), "midright", 320
+    )
