@@ -100,7 +100,8 @@ def _simulate(arguments: argparse.Namespace) -> dict:
     # Here and below, what a command needs is loaded by it alone: `play` opens its window before anything else.
     from .simulate.command import simulate
 
-    flags = {"--task": "task", "--seed": "seed", "--maps": "map_set", "--orientations": "orientations", "--start-noise": "start_noise",
+    flags = {"--task": "task", "--seed": "seed", "--maps": "map_set", "--orientations": "orientations",
+             "--start-noise": "start_noise",
              "--clearance": "clearance"}  # fmt: skip
     given = {flag: getattr(arguments, name) for flag, name in flags.items() if getattr(arguments, name) is not None}
     if arguments.recipe is None:

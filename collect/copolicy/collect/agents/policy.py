@@ -62,8 +62,8 @@ class PolicyAgent(Agent):
         chunk B                     b0    b1       the world waits: predicted where A's n_action_steps are executed
         chunk B               (o2)  b1    b2       in real time: asked for one frame before; b0 is due meanwhile
 
-    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. All worlds get
-    their chunks from one call of the policy.
+    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. All worlds
+    get their chunks from one call of the policy.
 
     In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
     is asked for at the start, while the world rests. A chunk is taken up at the first frame after it is ready, at the

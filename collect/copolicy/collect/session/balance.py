@@ -32,10 +32,9 @@ class Balance:
     """A seeded schedule that looks at what there is already.
 
     The next configuration is the one that was kept least often over all pairs; among equals the one that this
-    session tried least, then the map, and what else the task balances (`PairTask.balanced`: start and goal of the table),
-    that it met least, then chance. It depends on the seed,
-    the pair and the recordings in the folder alone: a session that goes on another day goes on where it was, a
-    discarded episode comes back after the others.
+    session tried least, then the map, then what else the task balances (`PairTask.balanced`: start and goal of the
+    table), then chance. It depends on the seed, the pair and the recordings in the folder alone: a session that goes
+    on another day goes on where it was, a discarded episode comes back after the others.
 
     Seats change once, in the middle of a session, and the session begins with the seats that were kept less.
     """
