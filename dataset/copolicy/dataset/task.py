@@ -28,6 +28,7 @@ from .task_parts import (
     Player,
     PolicyFeatures,
     Scenario,
+    SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
@@ -51,6 +52,7 @@ __all__ = [
     "Player",
     "PolicyFeatures",
     "Scenario",
+    "SceneView",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
@@ -82,6 +84,8 @@ class PairTask(ABC):
         outline: what it looks like.
         studies: what results of studies say of it.
         orientations: how many start orientations `turned` gives a scenario; 1: there are none.
+        invitation: title of a session's window; that of the task where empty.
+        instruction: what players read before they begin; the sentence of the task where empty.
     """
 
     spec: ClassVar[TaskSpec]
@@ -90,6 +94,8 @@ class PairTask(ABC):
     outline: ClassVar[Outline | None] = None
     studies: ClassVar[Studies] = Studies()
     orientations: ClassVar[int] = 1
+    invitation: ClassVar[str] = ""
+    instruction: ClassVar[str] = ""
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -212,6 +218,33 @@ class PairTask(ABC):
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
+
+    def view(self, scenario: Any) -> SceneView | None:
+        """What draws a scenario on the screen; None: `outline` is drawn as it is."""
+        return None
+
+    @property
+    def drift_limits(self) -> Mapping[str, float]:
+        """What `drift` measures, and up to where two motions are the same: here a hundred thousandth of the bounds."""
+        vector = self.spec.recorded
+        limits = 1e-5 * (np.array(vector.high) - np.array(vector.low))
+        return dict(zip(vector.names, limits.tolist(), strict=True))
+
+    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step."""
+        return np.abs(recorded - other)
+
+    def displaced(self, scenario: Any, scale: float, rng: np.random.Generator) -> Any:
+        """A scenario that begins beside its start, by up to `scale` times what the task sees fit.
+
+        Raises:
+            InvalidValueError: the task has none.
+        """
+        raise InvalidValueError("--start-noise", "no such flag", self.missing("displaced starts"))
+
+    def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
+        """What a session balances beside scenarios, such as their starts; each scenario has as many."""
+        return ()
 
     @property
     def features(self) -> PolicyFeatures:

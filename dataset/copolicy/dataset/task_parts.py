@@ -7,6 +7,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from .outline import Point, Pose
+
 
 class Scenario(Protocol):
     """Where an episode starts and what it is about; frozen, equal where it means the same."""
@@ -28,7 +30,7 @@ class Settings(Protocol):
 
     @property
     def step_limit(self) -> int:
-        """Steps after which an episode ends as a time-out."""
+        """Steps after which an episode ends with the reason `timeout`."""
         ...
 
 
@@ -99,6 +101,7 @@ class SimulatedPlayers:
         make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
         make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
         make_robot: a player from scenario, name and seed.
+        options: names of what `make_pair` takes beside these; `clearance` is behind the flag of that name.
     """
 
     pairs: Mapping[str, tuple[Any, Any]]
@@ -107,6 +110,34 @@ class SimulatedPlayers:
     make_pair: Callable[..., tuple[Player, Player]]
     make_partner: Callable[[Any, str, int], Player]
     make_robot: Callable[[Any, str, int], Player]
+    options: tuple[str, ...] = ()
+
+
+class SceneView(Protocol):
+    """What `PairTask.view` gives: draws one scenario and what moves in it on pygame surfaces of any size."""
+
+    def draw(
+        self,
+        surface: Any,
+        area: Any,
+        pose: Pose,
+        forces: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+        trail: Sequence[Pose] = (),
+    ) -> Any:
+        """Draws the scene into the middle of an area, in its own shape, and returns the rectangle that it fills.
+
+        Args:
+            surface: a `pygame.Surface`.
+            area: a `pygame.Rect`.
+            pose: of the body, see `Outline.poses`.
+            forces: of both players, see `Outline.forces`.
+            trail: earlier poses, oldest first.
+        """
+        ...
+
+    def to_screen(self, point: Point) -> Point:
+        """Where a point of the scene was drawn last, px of the surface."""
+        ...
 
 
 class Studies:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from .spec import SPEC
 from .studies import TableStudies
 
 if TYPE_CHECKING:
+    from .artist.table_view import TableView
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -40,6 +42,10 @@ class TableTask(PairTask):
     outline = TableOutline()
     studies = TableStudies()
     orientations = 4
+    invitation = "carry the table together"
+    instruction = "Carry the table to the green goal together. Nobody knows which way the other will go."
+    drift_limits: Mapping[str, float] = MappingProxyType({"px": 0.01, "rad": 1e-4})
+    """Sums of a double stay below 1e-9."""
 
     @property
     def agents(self) -> SimulatedPlayers:
@@ -142,6 +148,28 @@ class TableTask(PairTask):
         image = SceneImage(scenario, size)
         for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
             yield image.draw((x, y, theta))
+
+    def view(self, scenario: MapConfig) -> "TableView":
+        """The floor, the map and the table as people know them."""
+        from .artist.table_view import TableView  # pygame
+
+        return TableView(scenario)
+
+    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Of the position and of the orientation, the shorter way round."""
+        turn = recorded[:, 2] - other[:, 2]
+        rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)
+        return np.column_stack((np.linalg.norm(recorded[:, :2] - other[:, :2], axis=1), rad))
+
+    def displaced(self, scenario: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
+        """See `displaced_start`."""
+        from .start_pose import displaced_start  # pymunk
+
+        return displaced_start(scenario, scale, rng)
+
+    def balanced(self, scenario: MapConfig) -> tuple:
+        """Start and goal."""
+        return scenario.start, scenario.goal
 
     @property
     def recording(self) -> "TableMessages":
