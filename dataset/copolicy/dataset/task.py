@@ -34,6 +34,7 @@ from .task_parts import (
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
+from .task_words import TaskWords
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -54,6 +55,7 @@ __all__ = [
     "Settings",
     "SimulatedPlayers",
     "TaskSpec",
+    "TaskWords",
     "Vector",
     "World",
     "get_task",
@@ -194,6 +196,16 @@ class PairTask(ABC):
     def strategy(self, scenario: Any, states: np.ndarray) -> str:
         """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
         return ""
+
+    @property
+    def has_strategy(self) -> bool:
+        """Whether `strategy` labels episodes."""
+        return type(self).strategy is not PairTask.strategy
+
+    @property
+    def words(self) -> TaskWords:
+        """How cards and pages speak of it."""
+        return TaskWords.of(self.spec)
 
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""

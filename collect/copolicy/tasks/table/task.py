@@ -23,6 +23,8 @@ from .seats import TableSeats
 from .spec import SPEC
 
 if TYPE_CHECKING:
+    from copolicy.dataset.task_words import TaskWords
+
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -122,6 +124,13 @@ class TableTask(PairTask):
     def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
+
+    @property
+    def words(self) -> "TaskWords":
+        """Of the table and its maps."""
+        from .words import WORDS
+
+        return WORDS
 
     def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The table on its map, as `SceneImage` draws it."""
