@@ -88,9 +88,10 @@ def _trajectories(
     figure = Figure(dpi=110, layout="constrained")
     for (title, members), axes in zip(groups, panels(figure, outline, len(groups), 3, 0.4), strict=True):
         _panel(axes, title, members, outline, colours, labelled)
+    around = any(members[0].obstacles for _, members in groups)
     handles = [
         Rectangle((0, 0), 1, 1, fill=False, edgecolor=GOAL, label="goal"),
-        Rectangle((0, 0), 1, 1, color=_OBSTACLE, label="obstacle"),
+        *([Rectangle((0, 0), 1, 1, color=_OBSTACLE, label="obstacle")] if around else []),
         Line2D([], [], color=FAILURE, linestyle="", marker="x", label=failure),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
