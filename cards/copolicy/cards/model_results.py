@@ -88,8 +88,8 @@ def _partners(evaluation: dict[str, Any], words: TaskWords) -> str:
     about = (
         f"With simulated partners on {settings.get('configurations', settings.get('map_count'))} starts of the "
         f"{_maps(settings)} {words.scenarios}, {settings.get('actions_per_plan', 'a number not stated of')} action(s) "
-        f"a plan, {_sampler(evaluation['policy'])}, evaluation seed {settings.get('seed', 'not stated')}. The last columns are "
-        "the success with each kind of partner."
+        f"a plan, {_sampler(evaluation['policy'])}, evaluation seed {settings.get('seed', 'not stated')}. The last "
+        "columns are the success with each kind of partner."
     )
     return f"{about}\n\n{_without_blank(header, rows)}"
 

@@ -134,14 +134,6 @@ class ScenarioFiles(ABC):
         """
 
     @abstractmethod
-    def draw(self, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
-        """Draws every scenario of a set into one PNG, whose width and height in px it returns.
-
-        Raises:
-            OutputExistsError: the file exists.
-        """
-
-    @abstractmethod
     def make(self, name: str, count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
         """The content of a file with scenarios drawn at random, in which `problems` finds nothing.
 

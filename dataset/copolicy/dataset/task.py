@@ -28,9 +28,11 @@ from .task_parts import (
     Player,
     PolicyFeatures,
     Scenario,
+    SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
+    Studies,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -51,9 +53,11 @@ __all__ = [
     "Player",
     "PolicyFeatures",
     "Scenario",
+    "SceneView",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
+    "Studies",
     "TaskSpec",
     "TaskWords",
     "Vector",
@@ -80,12 +84,20 @@ class PairTask(ABC):
         settings_type: class of its settings.
         exchange: how an episode looks from the other seat.
         outline: what it looks like.
+        studies: what results of studies say of it.
+        orientations: how many start orientations `turned` gives a scenario; 1: there are none.
+        invitation: title of a session's window; that of the task where empty.
+        instruction: what players read before they begin; the sentence of the task where empty.
     """
 
     spec: ClassVar[TaskSpec]
     settings_type: ClassVar[type]
     exchange: ClassVar[SeatExchange | None] = None
     outline: ClassVar[Outline | None] = None
+    studies: ClassVar[Studies] = Studies()
+    orientations: ClassVar[int] = 1
+    invitation: ClassVar[str] = ""
+    instruction: ClassVar[str] = ""
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -158,6 +170,10 @@ class PairTask(ABC):
         """Episode columns with what the vector of a scenario does not say."""
         return {}
 
+    def unseen(self, columns: Mapping[str, Any]) -> str:
+        """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
+        return ""
+
     def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
         world = self.make_world(scenario, settings)
@@ -189,6 +205,10 @@ class PairTask(ABC):
         """`(T,)` what passes between the players in states `(T, n)` under actions `(T, m)`; None: not measured."""
         return None
 
+    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+        """The same in recorded states `(T, k)`."""
+        return self.interaction(self.states_of(recorded), actions)
+
     def layout(self, scenario: Any, with_goal: bool = False) -> Hashable:
         """What scenarios share that differ in their start alone, or without `with_goal` in start and goal; sortable."""
         return scenario.digest
@@ -210,6 +230,33 @@ class PairTask(ABC):
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
+
+    def view(self, scenario: Any) -> SceneView | None:
+        """What draws a scenario on the screen; None: `outline` is drawn as it is."""
+        return None
+
+    @property
+    def drift_limits(self) -> Mapping[str, float]:
+        """What `drift` measures, and up to where two motions are the same: here a hundred thousandth of the bounds."""
+        vector = self.spec.recorded
+        limits = 1e-5 * (np.array(vector.high) - np.array(vector.low))
+        return dict(zip(vector.names, limits.tolist(), strict=True))
+
+    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step."""
+        return np.abs(recorded - other)
+
+    def displaced(self, scenario: Any, scale: float, rng: np.random.Generator) -> Any:
+        """A scenario that begins beside its start, by up to `scale` times what the task sees fit.
+
+        Raises:
+            InvalidValueError: the task has none.
+        """
+        raise InvalidValueError("--start-noise", "no such flag", self.missing("displaced starts"))
+
+    def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
+        """What a session balances beside scenarios, such as their starts; each scenario has as many."""
+        return ()
 
     @property
     def features(self) -> PolicyFeatures:

@@ -34,7 +34,7 @@ FRAME_SCALES = {
     "x": 20, "y": 20, "theta": 10_000,
     "robot_fx": 32_000, "robot_fy": 32_000, "human_fx": 32_000, "human_fy": 32_000, "interaction": 20_000,
 }  # fmt: skip
-"""Integers in one unit of each column, in a scene of 1,200 px: a step is 0.05 px, 0.1 mrad, 1/32,000 of a full force."""
+"""Integers in one unit of each column, in a scene of 1,200 px: a step is 0.05 px, 0.1 mrad, 1/32,000 of a force."""
 
 FRAME_BYTES = 6_000_000
 """Frames take at most this much of the page; a larger data set shows every second, third, ... frame."""

@@ -6,7 +6,7 @@ from ..inputs import Command, Press
 from ..screen import SIZE, Canvas
 from ..screen.dialogs import Line, draw_dialog
 from ..screen.palette import GREEN, MUTED
-from ..ticker import DT_NS, Tick
+from ..ticker import Tick
 from .game import Game
 from .menu import Menu
 from .phase import Phase, To
@@ -39,7 +39,7 @@ class Finished(Phase):
         """Follows the choice."""
         game = self.game
         self._ticks += 1
-        alone = not any(player.person for player in game.players) and self._ticks * DT_NS > _ALONE_S * 1e9
+        alone = not any(player.person for player in game.players) and self._ticks * game.ticker.dt_ns > _ALONE_S * 1e9
         choice, self._choice = self._choice, ""
         if choice == "close" or alone or game.settings.headless:
             return To.END
@@ -53,10 +53,11 @@ class Finished(Phase):
         """Draws the summary."""
         canvas.box(0, 0, *SIZE)
         outcomes = Counter(outcome for outcome, verdict in self.game.results if verdict == "keep")
+        goals = sum(outcomes[reason] for reason in self.game.task.spec.successes)
         kept = self.game.folder.counts.kept_here.total()
         lines = [
             Line(f"episodes kept: {kept}", 38),
-            Line(f"goals today: {outcomes['goal']} of {outcomes.total()}", 30, MUTED),
+            Line(f"goals today: {goals} of {outcomes.total()}", 30, MUTED),
             Line("Thank you both.", 34),
         ]
         draw_dialog(canvas, "The session is complete", lines, self._menu.labels, self._menu.cursor, GREEN)

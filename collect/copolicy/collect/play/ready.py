@@ -6,7 +6,7 @@ from ..inputs import Command, Press
 from ..screen import Canvas
 from ..screen.dialogs import STRIP_ROWS, draw_countdown, draw_strip_menu
 from ..screen.palette import MUTED, YELLOW
-from ..ticker import DT_NS, Tick
+from ..ticker import Tick
 from .game import Game
 from .menu import Menu
 from .phase import Phase, To
@@ -45,7 +45,7 @@ class Ready(Phase):
         game = self.game
         self._ticks += 1
         choice, self._choice = self._choice, ""
-        if not any(player.person for player in game.players) and self._ticks * DT_NS > _LIMB_S * 1e9:
+        if not any(player.person for player in game.players) and self._ticks * game.ticker.dt_ns > _LIMB_S * 1e9:
             choice = "start"
         if game.settings.headless:
             choice = "start"

@@ -1,12 +1,11 @@
 """The end of an episode: how it went, and what is to become of its recording."""
 
-from copolicy.tasks.table.map_config import WINDOW
-
 from ..inputs import Command, Press
-from ..screen import Canvas
-from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS, Line, draw_dialog, draw_entry
+from ..screen import SIZE, Canvas
+from ..screen.dialogs import Line, draw_dialog, draw_entry, outcome_colour, outcome_text
+from ..screen.outline_view import outline_of
 from ..screen.palette import MUTED, YELLOW
-from ..ticker import DT_NS, Tick
+from ..ticker import Tick
 from .game import Game
 from .menu import BACK, Menu, TextEntry, note_menu, reason_menu
 from .phase import Phase, To
@@ -36,7 +35,7 @@ class Result(Phase):
             ]
             if game.folder.kept:
                 items.insert(4, ("undo the keep before", "undo"))
-        self._top = Menu(OUTCOME_TEXTS[trial.outcome.reason], items)
+        self._top = Menu(outcome_text(trial.outcome.reason), items)
         self._menus = [self._top]
 
     def handle(self, press: Press) -> None:
@@ -59,7 +58,7 @@ class Result(Phase):
         """Follows the players' choice; without people, or without a window, every episode is kept."""
         game = self.game
         self._ticks += 1
-        alone = not any(player.person for player in game.players) and self._ticks * DT_NS > _ALONE_S * 1e9
+        alone = not any(player.person for player in game.players) and self._ticks * game.ticker.dt_ns > _ALONE_S * 1e9
         if alone or game.settings.headless:
             self._choice = "keep"
         if self.entry and (self.entry.done or self.entry.left):
@@ -122,9 +121,9 @@ class Result(Phase):
         hint = ""
         if menu is self._top and not trial.practice:
             hint = self.game.roster.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
-        colour = OUTCOME_COLOURS[trial.outcome.reason]
-        # Beside the table, so that everybody sees what happened.
-        middle = _LEFT if trial.world.pose[0] > WINDOW[0] / 2 else WINDOW[0] - _LEFT
+        colour = outcome_colour(trial.task.spec, trial.outcome.reason)
+        # Beside the body, so that everybody sees what happened.
+        middle = _LEFT if trial.pose[0] > outline_of(trial.task).size[0] / 2 else SIZE[0] - _LEFT
         draw_dialog(canvas, menu.title, lines, menu.labels, menu.cursor, colour, 560, hint, middle)
 
     def _note(self, text: str) -> None:

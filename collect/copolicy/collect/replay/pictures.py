@@ -37,7 +37,7 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: float, spee
     surface = pygame.Surface(size, depth=32)
     view = ReplayView(track)
     shown = Shown(hint=False)
-    playback = Playback(track.steps, speed=speed)
+    playback = Playback(track.steps, speed=speed, hz=track.hz)
     for position in sampled(track, frames_per_second, speed):
         playback.position = position
         view.draw(surface, playback, shown)

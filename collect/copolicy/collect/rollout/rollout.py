@@ -24,6 +24,7 @@ class Rollout:
     In every step both agents see the same states, and their actions are clipped to the task's bounds.
 
     Attributes:
+        task: of the worlds.
         worlds: all of them.
         outcomes: how each stands.
         ends: steps after which each ended.
@@ -54,6 +55,7 @@ class Rollout:
             begin: tell the agents that episodes begin; False where they know what was before.
             beyond_end: worlds go on after their end, of which the first counts.
         """
+        self.task = task
         self.worlds = list(worlds) or [task.make_world(scenario, settings) for scenario in scenarios]
         self.agents = agents
         self.outcomes: list[Outcome] = [RUNNING] * len(self.worlds)
