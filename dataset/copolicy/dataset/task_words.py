@@ -1,6 +1,7 @@
 """How cards, pages and figures speak of a task."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from .task_spec import TaskSpec, Vector
 
@@ -27,11 +28,12 @@ class TaskWords:
         acts: what a policy does with a partner, and where.
         action: what the numbers of an action are.
         running: what a study still plans for.
-        success, failure: of episodes; the latter begins with "ended".
+        success, failure, did_not: of episodes; the second begins with "ended".
         scene: what a film shows.
         stand_in: who plays simulated episodes, a sentence.
         label, label_class: what a strategy label is called, and what it is a kind of.
         labels: how labels are read, on a card and on the page.
+        meanings: of labels, in figures; by the label.
         interaction: what the interaction measure is called.
         interaction_unit: of the measure.
         interaction_senses: what it means where it is positive, negative and zero.
@@ -62,11 +64,13 @@ class TaskWords:
     running: str = "episodes that still run"
     success: str = "succeeded"
     failure: str = "ended without success"
+    did_not: str = "did not succeed"
     scene: str = "The scene and both players' forces"
     stand_in: str = "Two scripted players stand in for people."
     label: str = "strategy label"
     label_class: str = "strategy label"
     labels: tuple[str, str] = ("", "")
+    meanings: Mapping[str, str] = field(default_factory=dict)
     interaction: str = "interaction measure"
     interaction_unit: str = "as the task defines it"
     interaction_senses: tuple[str, str, str] = ("positive", "negative", "zero")

@@ -27,6 +27,7 @@ WORDS = TaskWords(
     running="tables that are still being carried",
     success="reached the goal",
     failure="ended short of the goal",
+    did_not="did not reach the goal",
     scene="The table, both players' forces and the map",
     stand_in="Two scripted pilots, one at each end of the table, stand in for people.",
     label="route",
@@ -35,6 +36,8 @@ WORDS = TaskWords(
         "one letter an obstacle (L: the table passed below it on screen, R: above it)",
         "one letter an obstacle, L where the table passed below it on screen when carried to the right, R above it",
     ),
+    # The maps of all sets are carried through to the right.
+    meanings={"L": "below", "LL": "below all", "LLL": "below all", "R": "above", "RR": "above all", "RRR": "above all"},
     interaction="interaction force",
     interaction_unit="units of a player's full force",
     interaction_senses=("pulling apart", "pressing together", "in agreement"),
