@@ -48,13 +48,8 @@ NOT_YET_MOVED = (
     "dataset/copolicy/dataset/statistics/route_entropy.py",
     "dataset/copolicy/dataset/statistics/visitation.py",
     "train/copolicy/evaluate/coplan/figure.py",
-    "train/copolicy/evaluate/coplan/rollouts.py",
-    "train/copolicy/evaluate/human_study/plan.py",
     "train/copolicy/evaluate/plans/figure.py",
     "train/copolicy/evaluate/plans/sampling.py",
-    "train/copolicy/evaluate/study_flags.py",
-    "train/lerobot_policy_copolicy/env/configuration_table_carrying.py",
-    "train/lerobot_policy_copolicy/env/table_carrying.py",
 )
 """Modules that know the table and should ask `get_task` instead; the list may only become shorter."""
 

@@ -174,6 +174,11 @@ class PairTask(ABC):
         """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
         return ""
 
+    def unseen_in(self, episodes: Sequence[Mapping[str, Any]]) -> str:
+        """How many of some episodes, by these columns, have something that no policy sees; empty: none."""
+        found = [text for columns in episodes if (text := self.unseen(columns))]
+        return f"{len(found)} of {len(episodes)} have what no policy sees: {found[0]}" if found else ""
+
     def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
         world = self.make_world(scenario, settings)

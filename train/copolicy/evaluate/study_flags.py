@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
+from copolicy.collect.angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, FIGURES, POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
@@ -19,9 +20,8 @@ from copolicy.dataset.task import TABLE, PairTask, get_task
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
-ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 LIMIT = "angular_acceleration_limit"
-"""The setting of a world behind `--angular-limit`; a task without it has no such flag."""
+"""The setting of a world behind `--angular-limit`."""
 
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
 
@@ -114,26 +114,22 @@ def protocol_of(arguments: argparse.Namespace, policies: Iterable[tuple[str, Tra
         for note in conditions.notes:
             logging.info("%s: %s", name, note)
     task = _one_task({name: conditions.task for name, conditions in named})
-    usual, limit_flag = usual_settings(task, arguments.step_limit), None
-    if arguments.angular_limit is not None:
-        if not hasattr(usual, LIMIT):
-            raise InvalidValueError("--angular-limit", "no such flag", task.missing("bound on an angular acceleration"))
-        limit_flag = ANGULAR_LIMITS[arguments.angular_limit]
+    usual, limit_flag = usual_settings(task, arguments.step_limit), arguments.angular_limit
     worlds = {name: replace(conditions.physics, step_limit=usual.step_limit) for name, conditions in named}
     if limit_flag is None and len(set(worlds.values())) > 1:
         found = {name: task.settings_summary(world) for name, world in worlds.items()}
-        if hasattr(usual, LIMIT):
+        if angular_limit_of(usual) is not None:
             expected = "a choice, since the policies learned under different physics"
             raise InvalidValueError("--angular-limit", expected, found)
         raise InvalidValueError("policies", "ones that learned under the same settings of the world", found)
     physics = next(iter(worlds.values()), usual)
     contradictions: list[str] = []
     if limit_flag is not None:
-        physics = replace(physics, **{LIMIT: limit_flag})
+        physics = limited(task, physics, limit_flag)
         contradictions += [
-            f"--angular-limit {arguments.angular_limit}: {name} learned with {getattr(world, LIMIT):.4g} rad/s^2"
-            for name, world in worlds.items()
-            if not math.isclose(getattr(world, LIMIT), limit_flag)
+            f"--angular-limit {limit_flag}: {name} learned with {limit:.4g} rad/s^2"
+            for name, limit in ((name, getattr(world, LIMIT)) for name, world in worlds.items())
+            if not math.isclose(limit, ANGULAR_LIMITS[limit_flag])
         ]
     fps_flag = getattr(arguments, "fps", None)
     if fps_flag is not None:
@@ -196,12 +192,10 @@ def task_entry(task: PairTask) -> dict[str, str]:
 
 def unseen_entry(task: PairTask, scenarios: Sequence[Any]) -> dict[str, str]:
     """What policies do not see of some scenarios, as a result states it; says so."""
-    found = [text for scenario in scenarios if (text := task.unseen(task.columns_of(scenario)))]
-    if not found:
-        return {}
-    text = f"{len(found)} of {len(scenarios)} maps have what no policy sees: {found[0]}"
-    logging.warning("warning: %s", text)
-    return {"unseen": text}
+    text = task.unseen_in([task.columns_of(scenario) for scenario in scenarios])
+    if text:
+        logging.warning("warning: of the maps, %s", text)
+    return {"unseen": text} if text else {}
 
 
 def policy_of(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint":

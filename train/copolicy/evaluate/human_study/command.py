@@ -177,7 +177,7 @@ def _run(arguments: argparse.Namespace) -> dict:
     checked_licence(arguments.license)
     plan = StudyPlan.read(arguments.plan)
     plan.of(arguments.participant)
-    human = PilotSpec.parse(arguments.human)
+    human = PilotSpec.parse(arguments.human, plan.task_name)
     # Deferred: a wrong call should not wait for torch and pygame.
     from .session import run_session
 
