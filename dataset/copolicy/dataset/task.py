@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
+from .features import PAIR_GYM_ID
 from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
@@ -227,6 +228,12 @@ class PairTask(ABC):
         """Whether `strategy` labels episodes."""
         return type(self).strategy is not PairTask.strategy
 
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """Id of its gymnasium environment and the arguments beside its rate, under settings that are not the usual."""
+        steps = {name: value for name, value in settings.items() if name == "step_limit"}
+        others = {name: value for name, value in settings.items() if name not in steps}
+        return PAIR_GYM_ID, {"task": self.spec.name, **steps, **({"settings": others} if others else {})}
+
     @property
     def words(self) -> TaskWords:
         """How cards and pages speak of it."""
@@ -340,6 +347,12 @@ def require_table(task: PairTask, where: Path | str) -> None:
 def installed_tasks() -> list[str]:
     """Names of the tasks that are installed, sorted."""
     return sorted({entry.name for entry in entry_points(group=ENTRY_POINTS)})
+
+
+def distribution_of(task: PairTask) -> str | None:
+    """Name of the installed package that registers a task."""
+    package = next(iter(entry_points(group=ENTRY_POINTS, name=task.spec.name))).dist
+    return None if package is None else package.name
 
 
 @functools.cache

@@ -15,6 +15,7 @@ class TaskWords:
         episodes_of: what an episode shows.
         tag: for the Hub.
         numbers: units and axes of state, scenario and action, in sentences.
+        cast: who and what takes part.
         act, act_s: the verb of a player, and its third person.
         place: where everything happens.
         episode: what an episode is.
@@ -47,6 +48,7 @@ class TaskWords:
     episodes_of: str
     tag: str
     numbers: str
+    cast: str = "Two players"
     act: str = "act"
     act_s: str = "acts"
     place: str = "simulation"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
 
@@ -142,6 +143,11 @@ class TableTask(PairTask):
     def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
+
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """An environment of its own."""
+        names = ("step_limit", "angular_acceleration_limit")
+        return GYM_ID, {name: settings[name] for name in names if name in settings}
 
     @property
     def words(self) -> "TaskWords":

@@ -10,6 +10,7 @@ WORDS = TaskWords(
         "Positions are px in a window of 1200 x 600, y down; angles rad, counter-clockwise on screen; forces in "
         "units of a player's full force."
     ),
+    cast="Two players, one table",
     act="carry",
     act_s="carries",
     place="a simulated plane",
