@@ -68,6 +68,7 @@ def render(
     sections = (
         _overview(facts, title),
         *(f"![{caption}]({path})\n\n*{caption}*" for path, caption in figures),
+        *([] if facts.task.outline else [f"Figures of paths: {facts.task.missing('outline')}."]),
         _loading(facts, repo_id),
         *_excluded(facts, repo_id),
         _episodes(facts),
