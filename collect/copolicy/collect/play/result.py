@@ -35,7 +35,8 @@ class Result(Phase):
             ]
             if game.folder.kept:
                 items.insert(4, ("undo the keep before", "undo"))
-        self._top = Menu(outcome_text(trial.outcome.reason), items)
+        title = outcome_text(trial.outcome.reason)
+        self._top = Menu(title[:1].upper() + title[1:], items)
         self._menus = [self._top]
 
     def handle(self, press: Press) -> None:
