@@ -159,10 +159,9 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["check", "check recordings", "stats", "verify", "gif", "sheet"],
+    ["check", "check recordings", "stats"],
 )
 def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
-    from copolicy.collect.cli import main as collect
     from copolicy.dataset.cli import main as dataset
 
     recordings, root, out = tmp_path / "recordings", tmp_path / "set", tmp_path / "out"
@@ -176,9 +175,6 @@ def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, com
         "check": (dataset, "check", root),
         "check recordings": (dataset, "check", recordings),
         "stats": (dataset, "stats", root),
-        "verify": (collect, "replay", recording, "--verify"),
-        "gif": (collect, "replay", recording, "--gif", out.with_suffix(".gif")),
-        "sheet": (collect, "replay", recording, "--png", out.with_suffix(".png")),
     }[command]
     assert program([str(argument) for argument in arguments]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
