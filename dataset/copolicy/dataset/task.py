@@ -24,13 +24,16 @@ from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
     RUNNING,
+    Limit,
     Outcome,
     Player,
     PolicyFeatures,
+    Rule,
     Scenario,
     SeatExchange,
     Settings,
     SimulatedPlayers,
+    TaskRules,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -45,14 +48,17 @@ __all__ = [
     "RECORD_HZ",
     "RUNNING",
     "TABLE",
+    "Limit",
     "Outcome",
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "Rule",
     "Scenario",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
+    "TaskRules",
     "TaskSpec",
     "Vector",
     "World",
@@ -198,6 +204,11 @@ class PairTask(ABC):
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
+
+    @property
+    def rules(self) -> TaskRules:
+        """Rules of `check` and their limits beside the generic ones."""
+        return TaskRules()
 
     @property
     def features(self) -> PolicyFeatures:
