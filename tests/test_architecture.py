@@ -25,8 +25,6 @@ ROOTS = tuple(folder.split("/", 1)[1].replace("/", ".") for folder in ARROWS)
 TABLE = "copolicy.tasks.table"
 
 NOT_YET_MOVED = (
-    "dataset/copolicy/dataset/checks/contacts.py",
-    "dataset/copolicy/dataset/checks/maps.py",
     "dataset/copolicy/dataset/statistics/route_entropy.py",
     "dataset/copolicy/dataset/statistics/visitation.py",
 )

@@ -120,8 +120,7 @@ def test_a_model_card_speaks_of_the_task_of_its_policy(peg, tmp_path, capsys):
     (tmp_path / "eval.json").write_text(json.dumps(result), encoding="utf-8")
     assert main(["model", str(folder), "--eval", str(tmp_path / "eval.json")]) == 0
     card = (folder / "README.md").read_text(encoding="utf-8")
-    # The flag, and the command in which it stands.
-    assert OF_THE_TABLE.findall(card.replace("--maps", "").replace("copolicy-maps", "")) == []
+    assert OF_THE_TABLE.findall(re.sub(r"```.*?```", "", card, flags=re.DOTALL)) == []  # but for flags of commands
     assert "acts together with a partner, in simulation: it plans the next actions of both players" in card
     assert "Left out: the task 'peg' has no interaction measure." in card
     assert "pushing a peg, coplan (simulation)" in card
@@ -132,6 +131,8 @@ def test_paths_are_those_of_the_outline(peg, peg_set):
     payload = build_payload(DatasetFacts.read(peg_set), "peg")
     assert payload["scales"]["x"] == pytest.approx(12_000)
     assert payload["outline"]["size"] == (2.0, 0.4)
-    assert np.allclose(
-        payload["scenes"][0]["shapes"][0]["corners"][0], [peg.scenario_sets["right"][0].mark + 0.98, 0.18]
-    )
+    marks = {peg.identify(line)[0]: line.mark for line in peg.scenario_sets["right"]}
+    for row in payload["episodes"]:
+        (goal,) = payload["scenes"][row["scene"]]["shapes"]
+        assert goal["role"] == "goal"
+        assert np.allclose(goal["corners"][0], (marks[row["map_id"]] + 0.98, 0.18))

@@ -111,5 +111,5 @@ def test_rates_are_held_against_the_rate_of_the_recordings(recordings, tmp_path,
     for flags in ((), ("--shard-episodes", "2")):
         call = ["mcap", str(recordings), "--root", str(tmp_path / "odd"), "--repo-id", "lab/peg", "--fps", "15", *flags]
         assert main(call) == 2
-        assert "expected a divisor of 20, found 15" in capsys.readouterr().err
+        assert "fps: expected a divisor of 20 [1, 2, 4, 5, 10, 20], found 15" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recordings"]

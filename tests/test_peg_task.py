@@ -159,7 +159,7 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["check", "check recordings", "stats"],
+    ["stats"],
 )
 def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
     from copolicy.dataset.cli import main as dataset

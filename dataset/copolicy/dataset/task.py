@@ -25,15 +25,18 @@ from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
     RUNNING,
+    Limit,
     Outcome,
     Player,
     PolicyFeatures,
+    Rule,
     Scenario,
     SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
     Studies,
+    TaskRules,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -49,16 +52,19 @@ __all__ = [
     "RECORD_HZ",
     "RUNNING",
     "TABLE",
+    "Limit",
     "Outcome",
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "Rule",
     "Scenario",
     "SceneView",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
     "Studies",
+    "TaskRules",
     "TaskSpec",
     "TaskWords",
     "Vector",
@@ -269,6 +275,11 @@ class PairTask(ABC):
     def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
         """What a session balances beside scenarios, such as their starts; each scenario has as many."""
         return ()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Rules of `check` and their limits beside the generic ones."""
+        return TaskRules()
 
     @property
     def features(self) -> PolicyFeatures:

@@ -10,7 +10,7 @@ import numpy as np
 
 from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -192,6 +192,13 @@ class TableTask(PairTask):
         from .recording import TableMessages  # protobuf
 
         return TableMessages()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Map, motion and contacts."""
+        from .rules import RULES
+
+        return RULES
 
     @property
     def features(self) -> PolicyFeatures:

@@ -4,7 +4,7 @@ import shutil
 from dataclasses import asdict
 from importlib.metadata import version
 
-from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
+from copolicy.dataset.checks.checking import check_table, of_recordings
 from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.files.staging import new_folder, replace_json, replace_text
@@ -85,7 +85,7 @@ def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[E
     if not episodes:
         return {"applied": [], "findings": []}
     labels = [str(place) for place in range(len(prepared))]
-    result = check_table(recordings_table(plan.root, labels, episodes), RECORDING_RULES)
+    result = check_table(recordings_table(plan.root, labels, episodes), of_recordings)
     findings = list(result.findings)
     for label, episode in zip(labels, episodes, strict=True):
         findings += not_verified(label, episode)
