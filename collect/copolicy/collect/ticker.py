@@ -87,8 +87,8 @@ class Ticker:
 class LoopStatistics:
     """How well the loop kept its time over an episode, its pauses left out."""
 
-    def __init__(self, dt_ns: int = DT_NS):
-        self._dt_ns = dt_ns
+    def __init__(self, hz: int = RECORD_HZ):
+        self._dt_ns = 10**9 // hz
         self._periods: list[int] = []
         self._last: Tick | None = None
         self.ticks = 0

@@ -20,22 +20,27 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
+from .features import PAIR_GYM_ID
 from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
     RUNNING,
+    Limit,
     Outcome,
     Player,
     PolicyFeatures,
+    Rule,
     Scenario,
     SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
     Studies,
+    TaskRules,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
+from .task_words import TaskWords
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -47,17 +52,21 @@ __all__ = [
     "RECORD_HZ",
     "RUNNING",
     "TABLE",
+    "Limit",
     "Outcome",
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "Rule",
     "Scenario",
     "SceneView",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
     "Studies",
+    "TaskRules",
     "TaskSpec",
+    "TaskWords",
     "Vector",
     "World",
     "get_task",
@@ -220,6 +229,22 @@ class PairTask(ABC):
         """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
         return ""
 
+    @property
+    def has_strategy(self) -> bool:
+        """Whether `strategy` labels episodes."""
+        return type(self).strategy is not PairTask.strategy
+
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """Id of its gymnasium environment and the arguments beside its rate, under settings that are not the usual."""
+        steps = {name: value for name, value in settings.items() if name == "step_limit"}
+        others = {name: value for name, value in settings.items() if name not in steps}
+        return PAIR_GYM_ID, {"task": self.spec.name, **steps, **({"settings": others} if others else {})}
+
+    @property
+    def words(self) -> TaskWords:
+        """How cards and pages speak of it."""
+        return TaskWords.of(self.spec)
+
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
@@ -250,6 +275,11 @@ class PairTask(ABC):
     def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
         """What a session balances beside scenarios, such as their starts; each scenario has as many."""
         return ()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Rules of `check` and their limits beside the generic ones."""
+        return TaskRules()
 
     @property
     def features(self) -> PolicyFeatures:
@@ -328,6 +358,12 @@ def require_table(task: PairTask, where: Path | str) -> None:
 def installed_tasks() -> list[str]:
     """Names of the tasks that are installed, sorted."""
     return sorted({entry.name for entry in entry_points(group=ENTRY_POINTS)})
+
+
+def distribution_of(task: PairTask) -> str | None:
+    """Name of the installed package that registers a task."""
+    package = next(iter(entry_points(group=ENTRY_POINTS, name=task.spec.name))).dist
+    return None if package is None else package.name
 
 
 @functools.cache

@@ -1,6 +1,6 @@
 """What a task is made of: scenarios, settings, the world, and the parts that it may offer beside them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -192,3 +192,48 @@ class PolicyFeatures:
 
     encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
     symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A number and why it is that one; `{hz}` in its unit stands for the task's steps a second."""
+
+    value: float
+    unit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule.
+
+    Attributes:
+        what: what it looks after; where `find` is None, the part that a task lacks without a rule of this name.
+        find: yields the findings of an `EpisodeTable`; None in the place of a rule that only a task can bring.
+        frames: columns of the frames that it reads.
+        columns: episode columns that it reads.
+        kinds: the kinds of data that it says something about.
+        whole: it compares episodes with each other, or says something of the files as they lie; a part of the episodes
+            is not enough to apply it.
+    """
+
+    name: str
+    what: str
+    find: Callable[[Any], Iterable[Any]] | None = None
+    frames: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ("lerobot", "recordings")
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class TaskRules:
+    """The part `rules` of a task.
+
+    Attributes:
+        rules: of its own; one with the name of a generic rule stands in its place, the others come last.
+        limits: of its own rules, and those of generic rules that it sets otherwise; None where it does without.
+    """
+
+    rules: tuple[Rule, ...] = ()
+    limits: Mapping[str, Limit | None] = field(default_factory=dict)

@@ -15,15 +15,13 @@ from copolicy.dataset.features import (
     ACTION,
     ENVIRONMENT_STATE,
     OBSERVATION_KEYS,
+    PAIR_GYM_ID,
     SCENE_IMAGE,
     SCENE_SIDES,
     SCENE_SIZE,
     features_of,
 )
 from copolicy.dataset.task import PairTask, get_task, installed_tasks
-
-PAIR_GYM_ID = "copolicy/PairTask-v0"
-"""Name of the environment of any task, `gymnasium.make(PAIR_GYM_ID, task="peg")`."""
 
 FEATURES_MAP = {**OBSERVATION_KEYS, SCENE_IMAGE: SCENE_IMAGE, ACTION: ACTION}
 """Keys of the environment, and the columns of a data set that they stand for.

@@ -68,9 +68,10 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..agents import load_policy
     from ..agents.scripted import pair_name
     from ..replay.film import save_gif
+    from ..replay.pictures import picture_count
     from ..screen.outline_view import outline_of
     from .episode import demonstrate
-    from .pictures import SIZE, picture_count, pictures
+    from .pictures import SIZE, pictures
 
     outline_of(task)
     partner = pair_name(task, arguments.partner)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from copolicy.dataset.task import SceneView
 
+from ..replay.pictures import LAST_S
 from ..replay.track import Track, sampled
 from ..screen.canvas import Canvas
 from ..screen.dialogs import outcome_colour, outcome_text
@@ -16,13 +17,7 @@ SIZE = (1200, 690)
 
 _WORLD = (0, 0, 1200, 600)
 _CAPTION_Y = 646
-_LAST_S = 1.0  # for which the last picture stays
 _TRAIL_STRIDE = 3  # steps
-
-
-def picture_count(track: Track, frames_per_second: int, speed: float) -> int:
-    """How many pictures `pictures` gives."""
-    return len(sampled(track, frames_per_second, speed)) + round(_LAST_S * frames_per_second)
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
@@ -38,7 +33,7 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed:
     surface = pygame.Surface(size, depth=32)
     view = scene_view(track.task, track.episode.scenario)
     positions = sampled(track, frames_per_second, speed)
-    for position in [*positions, *[positions[-1]] * round(_LAST_S * frames_per_second)]:
+    for position in [*positions, *[positions[-1]] * round(LAST_S * frames_per_second)]:
         _draw(surface, view, track, position, speed)
         yield surface
 

@@ -7,8 +7,7 @@ from ..screen import Canvas
 from ..screen.dialogs import draw_help, draw_toast
 from ..sdl import pygame
 from ..ticker import Tick
-from .failure import Failure
-from .finished import Finished
+from .finished import Failure, Finished
 from .game import Game
 from .lobby import Lobby
 from .paused import Paused

@@ -16,6 +16,11 @@ from copolicy.dataset.task import PairTask, get_task
 from ..angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
 from .settings import PilotSpec, PlaySettings
 
+_AS_GIVEN = (
+    "task", "pair", "out", "orientations", "episodes", "practice", "seed", "license", "headless", "fullscreen", "mute",
+    "new_session",
+)  # fmt: skip
+
 
 def add_play_command(commands: argparse._SubParsersAction) -> None:
     """Adds `play` to the commands of `copolicy-collect`."""
@@ -96,26 +101,15 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
         first, second = (PilotSpec.parse(text, arguments.task) for text in arguments.pilots)
         pilots = (first, second)
     return PlaySettings(
-        pair=arguments.pair,
-        out=arguments.out,
+        **{name: getattr(arguments, name) for name in _AS_GIVEN},
         pilots=pilots,
         maps=set_name(task, arguments.maps, "training"),
-        orientations=arguments.orientations,
-        episodes=arguments.episodes,
-        practice=arguments.practice,
-        seed=arguments.seed,
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
-        license=arguments.license,
         angular_limit=_angular_limit(pilots or (), arguments.angular_limit, task),
-        headless=arguments.headless,
-        fullscreen=arguments.fullscreen,
         window=_size(arguments.window),
-        mute=arguments.mute,
         config_folder=arguments.config_dir,
-        new_session=arguments.new_session,
         countdown_s=arguments.countdown,
-        task=arguments.task,
     )
 
 

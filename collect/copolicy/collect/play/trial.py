@@ -76,7 +76,7 @@ class Trial:
         self.interaction: float | None = None
         self.score = 0.0
         self.trail: list[Pose] = [self.pose]
-        self.loop = LoopStatistics(10**9 // task.spec.record_hz)
+        self.loop = LoopStatistics(task.spec.record_hz)
         self.notes: list[str] = []
         self.paused = 0
         self.step_ns = clock()

@@ -12,7 +12,7 @@ from ..sdl import pygame
 from .palette import FLOOR, FLOOR_DOT, GREEN, INK, OBSTACLE, SEATS, SHADOW, WOOD, WOOD_EDGE, Colour, mix
 from .patch import Point, SmoothPatch
 
-_FULL = (1200, 600)  # px of an area in which lines have the widths that stand here
+_FULL = (1200, 600)  # px of a world in which lines have the widths that stand here
 _DOTS = 50  # px between the dots on the floor
 _LIT = (255, 255, 255)
 _FILLS: dict[str, Colour] = {"body": WOOD, "robot": SEATS[0], "human": SEATS[1]}
@@ -72,8 +72,10 @@ class OutlineView:
         """Draws the world into the middle of `area`; the trail is drawn as the ways of both hands."""
         rect = letterbox(area, self._outline.size)
         if self._background is None or rect.size != self._rect.size:
-            self._scale = rect.width / self._outline.size[0]
-            self._px = min(area.width / _FULL[0], area.height / _FULL[1])
+            width, height = self._outline.size
+            self._scale = rect.width / width
+            wide = width / height >= _FULL[0] / _FULL[1]
+            self._px = rect.width / _FULL[0] if wide else rect.height / _FULL[1]
             self._background = self._draw_background(rect.size)
         self._rect = rect
         clip = surface.get_clip()

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -25,6 +26,8 @@ from .spec import SPEC
 from .studies import TableStudies
 
 if TYPE_CHECKING:
+    from copolicy.dataset.task_words import TaskWords
+
     from .artist.table_view import TableView
     from .map_files import MapFiles
     from .recording import TableMessages
@@ -141,6 +144,18 @@ class TableTask(PairTask):
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
 
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """An environment of its own."""
+        names = ("step_limit", "angular_acceleration_limit")
+        return GYM_ID, {name: settings[name] for name in names if name in settings}
+
+    @property
+    def words(self) -> "TaskWords":
+        """Of the table and its maps."""
+        from .words import WORDS
+
+        return WORDS
+
     def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The table on its map, as `SceneImage` draws it."""
         from .artist.scene_image import SceneImage  # pygame
@@ -177,6 +192,13 @@ class TableTask(PairTask):
         from .recording import TableMessages  # protobuf
 
         return TableMessages()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Map, motion and contacts."""
+        from .rules import RULES
+
+        return RULES
 
     @property
     def features(self) -> PolicyFeatures:

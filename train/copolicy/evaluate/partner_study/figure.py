@@ -8,10 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from copolicy.dataset.files.staging import replacement
+from copolicy.dataset.outline_figure import SERIES
 
-# Okabe and Ito's palette: told apart with every kind of colour vision. Markers differ as well.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_MARKERS = "osD^vPX"
+_MARKERS = "osD^vPX"  # beside the colours
 
 _Point = tuple[float, float, float]
 """Value, length of the bar below and above."""
@@ -29,7 +28,7 @@ def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, 
     for place, (name, summary) in enumerate(summaries.items()):
         offset = (place - (len(summaries) - 1) / 2) * width
         where = [k + offset for k in range(len(kinds))]
-        style = {"color": _COLOURS[place % len(_COLOURS)], "marker": _MARKERS[place % len(_MARKERS)]}
+        style = {"color": SERIES[place % len(SERIES)], "marker": _MARKERS[place % len(_MARKERS)]}
         for axis, point in zip(axes, panels.values(), strict=True):
             values, below, above = zip(*(point(summary["by_partner"][kind]) for kind in kinds), strict=True)
             axis.errorbar(where, values, yerr=(below, above), linestyle="", capsize=2, label=name, **style)
