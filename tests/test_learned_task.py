@@ -11,11 +11,11 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, features
 from copolicy.dataset.task import get_task
 
 
-def config(folder: Path, task: str | None, **more) -> Path:
+def config(folder: Path, columns_of: str | None, **more) -> Path:
     """The configuration of an ACT with the features of a task."""
-    columns = features_of(get_task(task).spec) if task else {}
-    features = {name: {"shape": list(columns[name]["shape"])} for name in (STATE, ENVIRONMENT_STATE) if task}
-    outputs = {ACTION: {"shape": list(columns[ACTION]["shape"])}} if task else {}
+    columns = features_of(get_task(columns_of).spec) if columns_of else {}
+    features = {name: {"shape": list(columns[name]["shape"])} for name in (STATE, ENVIRONMENT_STATE) if columns}
+    outputs = {ACTION: {"shape": list(columns[ACTION]["shape"])}} if columns else {}
     image = {"observation.images.scene": {"shape": [3, 64, 96]}}
     content = {"type": "act", "input_features": {**features, **image}, "output_features": outputs, **more}
     (folder / "config.json").write_text(json.dumps(content), encoding="utf-8")

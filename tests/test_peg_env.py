@@ -93,5 +93,5 @@ def test_lerobots_configuration_names_the_task(peg):
 
 
 def test_no_task_is_named():
-    with pytest.raises(InvalidValueError, match="--env.task: expected a task, of table, found 'none'"):
+    with pytest.raises(InvalidValueError, match=r"^--env\.task: expected a task, of table, found 'none'"):
         PairTaskEnvConfig()
