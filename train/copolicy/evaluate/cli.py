@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
-from copolicy.dataset.command_line.flag_numbers import whole_number
+from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.files.staging import require_new
 
@@ -33,12 +33,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
     add_maps_flag(coplan, _MAPS, given=False)
     coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
-    coplan.add_argument(
-        "--repeats", type=whole_number("--repeats", 1, 10_000), default=1, help="episodes a map (default: 1)"
-    )
-    coplan.add_argument(
-        "--limit", type=whole_number("--limit"), help="only the first N maps, for a quick look; stated in the result"
-    )
+    add_whole_number(coplan, "--repeats", "episodes a map (default: 1)", 1, 1, 10_000)
+    add_whole_number(coplan, "--limit", "only the first N maps, for a quick look; stated in the result")
     coplan.add_argument("--out", required=True, type=Path, help="where eval.json goes; the picture stands beside it")
     add_study_flags(coplan, actions_per_plan=8)
     add_partner_command(commands)

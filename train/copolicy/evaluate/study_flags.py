@@ -13,7 +13,7 @@ from copolicy.collect.agents.training_conditions import TrainingConditions, trai
 from copolicy.collect.angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, FIGURES, POLICIES
-from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
+from copolicy.dataset.command_line.flag_numbers import add_whole_number, number, seed
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import TABLE, PairTask, get_task
 
@@ -28,37 +28,27 @@ _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "ba
 
 def add_study_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
     """Everything that a simulated study has beside its maps and its output."""
-    command.add_argument(
-        "--fps", type=whole_number("--fps"), help="frames a second that plans are for (default: as the policy learned)"
-    )
+    add_whole_number(command, "--fps", "frames a second that plans are for (default: as the policy learned)")
     command.add_argument("--device", default="cpu", help="default: cpu")
     add_protocol_flags(command, actions_per_plan)
 
 
 def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
     """How a robot plans, the world's settings, seed and `--overwrite`."""
-    for flag, meaning, kind, default in (
-        ("actions-per-plan", f"executed before replanning (default: {actions_per_plan})", (), actions_per_plan),
-        ("step-limit", "steps until a time-out (default: the task's; of the table 2000, of 1/30 s)", (), None),
-        ("num-inference-steps", "denoising steps (default: the checkpoint's)", (1, 1000), None),
-    ):
-        read = whole_number(f"--{flag}", *kind)
-        command.add_argument(f"--{flag}", type=read, default=default, help=meaning)
-    for flag, meaning, choices in (
-        (
-            "angular-limit",
-            "bound on the angular acceleration, rad/s^2 (default: as the policy learned)",
-            ANGULAR_LIMITS,
-        ),
-        ("sampler", "denoising (default: the checkpoint's)", ("ddpm", "ddim", "dpmsolver++")),
-        ("backend", "what runs the network (default: the checkpoint's)", ("auto", "torch", "onnx", "numba")),
-    ):
-        command.add_argument(f"--{flag}", choices=choices, help=meaning)
-    command.add_argument(
-        "--initial-noise-scale",
-        type=number("--initial-noise-scale", 0, 10),
-        help="scale of the first noise (default: the checkpoint's)",
+    meaning = f"executed before replanning (default: {actions_per_plan})"
+    add_whole_number(command, "--actions-per-plan", meaning, actions_per_plan)
+    add_whole_number(
+        command, "--step-limit", "steps until a time-out (default: the task's; of the table 2000, of 1/30 s)"
     )
+    limit = "bound on the angular acceleration, rad/s^2 (default: what the policy learned with)"
+    command.add_argument("--angular-limit", choices=ANGULAR_LIMITS, help=limit)
+    samplers, backends = ("ddpm", "ddim", "dpmsolver++"), ("auto", "torch", "onnx", "numba")
+    command.add_argument("--sampler", choices=samplers, help="denoising (default: the checkpoint's)")
+    command.add_argument("--backend", choices=backends, help="what runs the network (default: the checkpoint's)")
+    steps = "denoising steps (default: the checkpoint's)"
+    add_whole_number(command, "--num-inference-steps", steps, None, 1, 1000)
+    scale, noise = number("--initial-noise-scale", 0, 10), "scale of the first noise (default: the checkpoint's)"
+    command.add_argument("--initial-noise-scale", type=scale, help=noise)
     command.add_argument("--seed", type=seed(), default=0, help="seed of what is drawn at random (default: 0)")
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 

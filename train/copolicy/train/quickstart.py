@@ -12,7 +12,7 @@ from time import perf_counter
 
 from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
 from copolicy.dataset.command_line.extras import FIGURES, HUB, TRAINING
-from copolicy.dataset.command_line.flag_numbers import seed, whole_number, workers
+from copolicy.dataset.command_line.flag_numbers import add_whole_number, seed, workers
 from copolicy.dataset.files.staging import replace_json
 
 from .quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
@@ -30,13 +30,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
-    parser.add_argument(
-        "--episodes", type=whole_number("--episodes"), default=376, help="simulated episodes (default: 376)"
-    )
-    parser.add_argument(
-        "--steps", type=whole_number("--steps"), default=6000, help="training steps of 512 samples (default: 6000)"
-    )
-    parser.add_argument("--limit", type=whole_number("--limit"), help="evaluate on the first N maps of each set only")
+    add_whole_number(parser, "--episodes", "simulated episodes (default: 376)", 376)
+    add_whole_number(parser, "--steps", "training steps of 512 samples (default: 6000)", 6000)
+    add_whole_number(parser, "--limit", "evaluate on the first N maps of each set only")
     parser.add_argument("--seed", type=seed(), default=0, help="default: 0")
     parser.add_argument("--workers", type=workers(), default=os.cpu_count() or 1, help="default: one a core")
     parser.add_argument(

@@ -72,7 +72,12 @@ class PairTaskEnvConfig(EnvConfig):
         if self.partner:
             pair_name(task, self.partner)
         self.physics  # noqa: B018 (checks the settings)
-        shape = require_image_size(task, self.pixels, self.observation_width, self.observation_height)
+        shortest, longest = SCENE_SIDES
+        for name in ("observation_width", "observation_height"):
+            if (side := getattr(self, name)) % 2 or not shortest <= side <= longest:
+                raise InvalidValueError(name, f"an even number of px from {shortest} to {longest}", side)
+        if self.pixels and type(task).images is PairTask.images:
+            raise InvalidValueError("pixels", f"false ({task.missing('images')})", self.pixels)
         columns = features_of(task.spec)
         self.features = {
             key: PolicyFeature(kinds.get(column, FeatureType.STATE), columns[column]["shape"])
@@ -80,6 +85,7 @@ class PairTaskEnvConfig(EnvConfig):
             if column != SCENE_IMAGE
         }
         if self.pixels:
+            shape = self.observation_height, self.observation_width, 3
             self.features[SCENE_IMAGE] = PolicyFeature(FeatureType.VISUAL, shape)
 
     @property
@@ -97,7 +103,9 @@ class PairTaskEnvConfig(EnvConfig):
     @property
     def scenarios(self) -> tuple[Any, ...]:
         """Where episodes start."""
-        return scenarios_of(self.pair_task, self.map_set, self.orientations)
+        task = self.pair_task
+        chosen = task.scenario_set(self.map_set or next(iter(task.scenario_sets)))
+        return (task.turned(chosen) if self.orientations else chosen).scenarios
 
     @property
     def package_name(self) -> str:
@@ -139,33 +147,6 @@ def settings_of(task: PairTask, step_limit: int | None, settings: Mapping[str, f
     if step_limit is not None and step_limit < 1:
         raise InvalidValueError("step_limit", "at least 1", step_limit)
     return replace(usual, **given)
-
-
-def scenarios_of(task: PairTask, name: str, orientations: bool) -> tuple[Any, ...]:
-    """The scenarios of a set or a file, or of the task's first set where none is named; in all their orientations.
-
-    Raises:
-        UnknownNameError: no such set.
-        FileFormatError: a file that cannot be used.
-        InvalidValueError: the task has no files or no orientations.
-    """
-    chosen = task.scenario_set(name or next(iter(task.scenario_sets)))
-    return (task.turned(chosen) if orientations else chosen).scenarios
-
-
-def require_image_size(task: PairTask, pixels: bool, width: int, height: int) -> tuple[int, int, int]:
-    """The shape of an image of the scene, `(height, width, 3)`.
-
-    Raises:
-        InvalidValueError: a side that no data set can have, or an image is asked for and the task has none.
-    """
-    shortest, longest = SCENE_SIDES
-    for name, side in (("observation_width", width), ("observation_height", height)):
-        if side % 2 or not shortest <= side <= longest:
-            raise InvalidValueError(name, f"an even number of px from {shortest} to {longest}", side)
-    if pixels and type(task).images is PairTask.images:
-        raise InvalidValueError("pixels", f"false ({task.missing('images')})", pixels)
-    return height, width, 3
 
 
 def register(gym_id: str, entry_point: str) -> None:

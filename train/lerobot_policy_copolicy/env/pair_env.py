@@ -1,22 +1,19 @@
 """The gymnasium environment of any task for two players."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from copolicy.collect.agents import HeldAgent, ScriptedAgent
-from copolicy.collect.agents.scripted import pair_name
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE, bounds_of
-from copolicy.dataset.task import PairTask, get_task
+from copolicy.dataset.features import OBSERVATION_KEYS, bounds_of
 
-from .configuration import require_image_size, scenarios_of, settings_of
+from .configuration import PairTaskEnvConfig
 
 _WIDTH = 600  # px of the picture of `render`
 
@@ -47,60 +44,36 @@ class PairEnv(gymnasium.Env):
 
     Args:
         task: its name.
-        fps: actions a second, a divisor of the task's rate.
-        map_set: name of a set of scenarios, a file, or one of its splits as `FILE#split`; the first set if empty.
-        orientations: start each scenario in all its orientations.
-        step_limit: steps of the world after which an episode is truncated; the task's own if None.
-        partner: simulated pair whose human plays the human half; empty for none.
-        pixels: observe the image of the scene too, as `copolicy-convert mcap --video` draws it.
-        observation_width: of the image, px.
-        observation_height: of the image, px.
-        settings: of the world, by name, where they are not the usual ones.
         render_mode: "rgb_array" or None.
-
-    Raises:
-        UnknownNameError: no such task, set of scenarios or pair.
-        InvalidValueError: a rate, setting or size that cannot be, or something that the task does not offer.
+        settings: see `PairTaskEnvConfig`, which also tells what is refused.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (as gymnasium declares it)
+    config_type: ClassVar[type[PairTaskEnvConfig]] = PairTaskEnvConfig
 
-    def __init__(
-        self,
-        task: str,
-        fps: int = 10,
-        map_set: str = "",
-        orientations: bool = False,
-        step_limit: int | None = None,
-        partner: str = "",
-        pixels: bool = False,
-        observation_width: int = SCENE_SIZE[0],
-        observation_height: int = SCENE_SIZE[1],
-        settings: Mapping[str, float] | None = None,
-        render_mode: str | None = "rgb_array",
-    ):
-        self.metadata = {**type(self).metadata, "render_fps": fps}
+    def __init__(self, task: str | None = None, render_mode: str | None = "rgb_array", **settings: Any):
+        config = self.config_type(**settings, **({} if task is None else {"task": task}))
+        self.metadata = {**type(self).metadata, "render_fps": config.fps}
         self.render_mode = render_mode
-        self.pair_task: PairTask = get_task(task)
+        self.pair_task = config.pair_task
         spec = self.pair_task.spec
         self.task, self.task_description = spec.name, spec.sentence
-        self.maps = scenarios_of(self.pair_task, map_set, orientations)
-        self.physics = settings_of(self.pair_task, step_limit, settings or {})
-        self.partner = partner and pair_name(self.pair_task, partner)
+        self.maps, self.physics, self.partner = config.scenarios, config.physics, config.partner
         self._spec: EnvSpec | None = None
-        self._stride = stride(fps, spec.record_hz)
+        self._stride = stride(config.fps, spec.record_hz)
         self._next_map = 0
-        self._max_episode_steps = frames(self.physics.step_limit, fps, spec.record_hz)  # LeRobot asks by this name
+        # By this name LeRobot asks for it.
+        self._max_episode_steps = frames(self.physics.step_limit, config.fps, spec.record_hz)
         self._size = len(spec.action)
-        self._bounds = spec.joint_action.bounds[:, : self._size if partner else None]
+        self._bounds = spec.joint_action.bounds[:, : self._size if self.partner else None]
         low, high = self._bounds.astype(np.float32)
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         bounds = bounds_of(spec)
         spaces: dict[str, gymnasium.Space] = {key: _box(bounds[column]) for key, column in OBSERVATION_KEYS.items()}
-        shape = require_image_size(self.pair_task, pixels, observation_width, observation_height)
-        self._image_size = (observation_width, observation_height) if pixels else None
-        if pixels:
-            spaces["pixels"] = gymnasium.spaces.Dict({"scene": gymnasium.spaces.Box(0, 255, shape, np.uint8)})
+        self._image_size = (config.observation_width, config.observation_height) if config.pixels else None
+        if self._image_size:
+            image = gymnasium.spaces.Box(0, 255, (*self._image_size[::-1], 3), np.uint8)
+            spaces["pixels"] = gymnasium.spaces.Dict({"scene": image})
         self.observation_space = gymnasium.spaces.Dict(spaces)
 
     @property

@@ -1,10 +1,6 @@
 """The gymnasium environment of the table-carrying task."""
 
-import math
-
-from copolicy.dataset.features import SCENE_SIZE
-from copolicy.dataset.task import TABLE
-
+from .configuration_table_carrying import TableCarryingEnvConfig
 from .pair_env import PairEnv
 
 
@@ -29,26 +25,11 @@ class TableCarryingEnv(PairEnv):
     The table touches the goal square; an obstacle or a wall ends the episode without success.
 
     Args:
-        angular_acceleration_limit: rad/s^2.
-        others: see `PairEnv`.
+        settings: see `TableCarryingEnvConfig`.
     """
 
-    def __init__(
-        self,
-        fps: int = 10,
-        map_set: str = "training",
-        orientations: bool = False,
-        step_limit: int = 1000,
-        angular_acceleration_limit: float = math.pi / 2,
-        partner: str = "",
-        pixels: bool = False,
-        observation_width: int = SCENE_SIZE[0],
-        observation_height: int = SCENE_SIZE[1],
-        render_mode: str | None = "rgb_array",
-    ):
-        settings = {"angular_acceleration_limit": angular_acceleration_limit}
-        super().__init__(
-            TABLE, fps, map_set, orientations, step_limit, partner, pixels, observation_width, observation_height,
-            settings, render_mode,
-        )  # fmt: skip
+    config_type = TableCarryingEnvConfig
+
+    def __init__(self, **settings):
+        super().__init__(**settings)
         self.task = "table_carrying"

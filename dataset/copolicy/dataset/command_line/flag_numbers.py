@@ -4,6 +4,7 @@ Each function makes the `type` of a flag, which raises InvalidValueError for ano
 passes it on, and `commandline.run` makes it one line.
 """
 
+import argparse
 import math
 from collections.abc import Callable
 
@@ -31,6 +32,18 @@ def whole_number(flag: str, least: int | None = 1, most: int = MOST) -> Callable
         return value
 
     return parse
+
+
+def add_whole_number(
+    command: argparse.ArgumentParser,
+    flag: str,
+    meaning: str,
+    default: int | None = None,
+    least: int | None = 1,
+    most: int = MOST,
+) -> None:
+    """Adds a flag of a `whole_number`."""
+    command.add_argument(flag, type=whole_number(flag, least, most), default=default, help=meaning)
 
 
 def number(flag: str, least: float = 0.0, most: float = math.inf, above: bool = False) -> Callable[[str], float]:

@@ -7,7 +7,7 @@ from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
-from copolicy.dataset.command_line.flag_numbers import number, whole_number
+from copolicy.dataset.command_line.flag_numbers import add_whole_number, number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
@@ -54,22 +54,22 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
         "copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --participants 5 --out study/plan.json",
     )
     command.add_argument("policies", nargs="+", metavar="NAME=CKPT", help="robots to compare, at least two")
-    command.add_argument(
-        "--participants",
-        type=whole_number("--participants", 1, 10_000),
-        default=5,
-        help="how many people (default: 5, the paper's)",
-    )
+    add_whole_number(command, "--participants", "how many people (default: 5, the paper's)", 5, 1, 10_000)
     add_maps_flag(command, MAPS, given=False)
-    command.add_argument(
+    add_whole_number(
+        command,
         "--configurations",
-        type=whole_number("--configurations", None),
-        help="starts shared out among people, as in `partner` (default: 60, or all of a smaller set)",
+        "starts shared out among people, as in `partner` (default: 60, or all of a smaller set)",
+        None,
+        None,
     )
-    command.add_argument(
+    add_whole_number(
+        command,
         "--episodes-per-robot",
-        type=whole_number("--episodes-per-robot", 1, 10_000),
-        help="starts of each person, the same with every robot (default: 12, or as many as there are)",
+        "starts of each person, the same with every robot (default: 12, or as many as there are)",
+        None,
+        1,
+        10_000,
     )
     command.add_argument("--out", required=True, type=Path, help="where the plan goes; it holds the key: keep it shut")
     add_protocol_flags(command, actions_per_plan=1)
@@ -90,12 +90,7 @@ def _add_run(steps: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--human", default="joystick", help="joystick, keyboard, or scripted[:PAIR] to try the procedure without people"
     )
-    command.add_argument(
-        "--practice",
-        type=whole_number("--practice", 0, 1000),
-        default=2,
-        help="episodes to get used to it, not counted (default: 2)",
-    )
+    add_whole_number(command, "--practice", "episodes to get used to it, not counted (default: 2)", 2, 0, 1000)
     command.add_argument("--consent", default="", metavar="ID", help="record id of the person's consent, no name")
     command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
     command.add_argument(

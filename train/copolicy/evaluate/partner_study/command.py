@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from copolicy.collect.agents.scripted import simulated_players
 from copolicy.dataset.command_line.commands import add_command, progress_bar
-from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, whole_number
+from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import require_new
@@ -47,28 +47,20 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
     add_maps_flag(command, MAPS, given=False)
-    command.add_argument(
+    add_whole_number(
+        command,
         "--configurations",
-        type=whole_number("--configurations", None),
-        help="starts: a quarter as many maps, spread over the set, each in four orientations; of a task without "
+        "starts: a quarter as many maps, spread over the set, each in four orientations; of a task without "
         f"orientations as many maps (default: {USUAL}, or all of a smaller set)",
+        None,
+        None,
     )
     kinds = ", ".join(simulated_players(get_task()).partners)
     command.add_argument(
         "--partners", nargs="+", metavar="KIND", help=f"kinds that the task has, the table {kinds} (default: all)"
     )
-    command.add_argument(
-        "--repeats",
-        type=whole_number("--repeats", 1, 10_000),
-        default=1,
-        help="partners of each kind on each start (default: 1)",
-    )
-    command.add_argument(
-        "--partner-seed",
-        type=whole_number("--partner-seed", None, LARGEST_SEED),
-        default=0,
-        help="seed of the partners (default: 0)",
-    )
+    add_whole_number(command, "--repeats", "partners of each kind on each start (default: 1)", 1, 1, 10_000)
+    add_whole_number(command, "--partner-seed", "seed of the partners (default: 0)", 0, None, LARGEST_SEED)
     command.add_argument("--out", required=True, type=Path, help="where the result goes; the picture stands beside it")
     add_study_flags(command, actions_per_plan=1)
 
