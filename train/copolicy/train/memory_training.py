@@ -68,12 +68,9 @@ def _replaced(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
 @contextmanager
 def _hidden_files_passed_over() -> Iterator[None]:
     # LeRobot takes every file in a folder of tables for one, also what macOS leaves beside them.
-    original = io_utils.load_nested_dataset
-    io_utils.load_nested_dataset = dataset_reader.load_nested_dataset = on_visible_files(original)
-    try:
+    ours = {"load_nested_dataset": on_visible_files(io_utils.load_nested_dataset)}
+    with _replaced(io_utils, ours), _replaced(dataset_reader, ours):
         yield
-    finally:
-        io_utils.load_nested_dataset = dataset_reader.load_nested_dataset = original
 
 
 def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:

@@ -120,8 +120,8 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _learned_at(policy: dict[str, Any]) -> dict[str, Any]:
-    """Rate and physics that the policy's settings record, which hold also where the data are not at hand."""
-    return {name: policy[name] for name in ("fps", "physics", "physics_mixture") if policy.get(name)}
+    """What the policy's settings record of the data, which holds also where these are not at hand."""
+    return {name: policy[name] for name in ("fps", "physics", "physics_mixture", "unseen") if policy.get(name)}
 
 
 def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[str, int]:

@@ -52,7 +52,9 @@ class PairEnv(gymnasium.Env):
     config_type: ClassVar[type[PairTaskEnvConfig]] = PairTaskEnvConfig
 
     def __init__(self, task: str | None = None, render_mode: str | None = "rgb_array", **settings: Any):
-        config = self.config_type(**settings, **({} if task is None else {"task": task}))
+        if task is not None:
+            settings["task"] = task
+        config = self.config_type(**settings)
         self.metadata = {**type(self).metadata, "render_fps": config.fps}
         self.render_mode = render_mode
         self.pair_task = config.pair_task

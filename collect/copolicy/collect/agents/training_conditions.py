@@ -158,8 +158,9 @@ def _data_set_beside(folder: Path) -> _DataSet:
         path = folder / name
         settings = read_json(path, _Settings, "the settings of a training") if path.is_file() else {}
         data_set = settings.get("dataset") or {}
-        root = data_set.get("root") or (_lerobot_home() / data_set["repo_id"] if data_set.get("repo_id") else None)
-        if root and (info := Path(root) / INFO_FILE).is_file():
+        root, repo_id = data_set.get("root"), data_set.get("repo_id")
+        place = Path(root) if root else _lerobot_home() / repo_id if repo_id else None
+        if place and (info := place / INFO_FILE).is_file():
             known |= read_json(info, _DataSet, "LeRobot's data set information")
         if fps := data_set.get("fps"):
             known["fps"] = fps
