@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from copolicy.dataset.checks.checking import RULES
+from copolicy.dataset.checks.checking import rules_of
 from copolicy.dataset.checks.episode_table import EpisodeTable
 from copolicy.dataset.checks.finding import Finding
+from copolicy.dataset.task import get_task
 
-BY_NAME = {rule.name: rule for rule in RULES}
+BY_NAME = {rule.name: rule for rule in rules_of(get_task())}
 
 
 def find(table: EpisodeTable, rule: str) -> list[Finding]:

@@ -25,36 +25,8 @@ ROOTS = tuple(folder.split("/", 1)[1].replace("/", ".") for folder in ARROWS)
 TABLE = "copolicy.tasks.table"
 
 NOT_YET_MOVED = (
-    "cards/copolicy/cards/figures.py",
-    "cards/copolicy/cards/frames.py",
-    "cards/copolicy/cards/report/payload.py",
-    "collect/copolicy/collect/demonstration/command.py",
-    "collect/copolicy/collect/demonstration/pictures.py",
-    "collect/copolicy/collect/play/command.py",
-    "collect/copolicy/collect/play/game.py",
-    "collect/copolicy/collect/play/result.py",
-    "collect/copolicy/collect/play/settings.py",
-    "collect/copolicy/collect/play/trial.py",
-    "collect/copolicy/collect/replay/rerun_log.py",
-    "collect/copolicy/collect/replay/sheet.py",
-    "collect/copolicy/collect/replay/track.py",
-    "collect/copolicy/collect/replay/verify.py",
-    "collect/copolicy/collect/replay/view.py",
-    "collect/copolicy/collect/simulate/command.py",
-    "convert/copolicy/convert/export/minari.py",
-    "convert/copolicy/convert/export/replay_buffer.py",
-    "dataset/copolicy/dataset/checks/contacts.py",
-    "dataset/copolicy/dataset/checks/maps.py",
     "dataset/copolicy/dataset/statistics/route_entropy.py",
     "dataset/copolicy/dataset/statistics/visitation.py",
-    "train/copolicy/evaluate/coplan/figure.py",
-    "train/copolicy/evaluate/coplan/rollouts.py",
-    "train/copolicy/evaluate/human_study/plan.py",
-    "train/copolicy/evaluate/plans/figure.py",
-    "train/copolicy/evaluate/plans/sampling.py",
-    "train/copolicy/evaluate/study_flags.py",
-    "train/lerobot_policy_copolicy/env/configuration_table_carrying.py",
-    "train/lerobot_policy_copolicy/env/table_carrying.py",
 )
 """Modules that know the table and should ask `get_task` instead; the list may only become shorter."""
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.dataset.checks.geometry import INNER, OUTER, final_poses, separation
-from copolicy.dataset.checks.limits import limit
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.tasks.table.rules import LIMITS
+from copolicy.tasks.table.rules.geometry import INNER, OUTER, final_poses, separation
 from copolicy.tasks.table.world import TableWorld
 
 GOAL = (600.0, 300.0)
@@ -40,7 +40,7 @@ def test_the_world_agrees_with_both_rectangles():
     centres = np.broadcast_to(GOAL, positions.shape)
     outer = separation(positions, thetas, OUTER, centres, GOAL_SIZE / 2)
     inner = separation(positions, thetas, INNER, centres, GOAL_SIZE / 2)
-    margin = limit("contact_margin")
+    margin = LIMITS["contact_margin"].value
     assert 500 < touch.sum() < 3500
     assert outer[touch].max() <= margin
     assert inner[~touch].min() >= -margin

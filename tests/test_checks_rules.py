@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from changed_tables import find, of, with_entry, with_frames
 
-from copolicy.dataset.checks.checking import RULES, check_table
-from copolicy.dataset.checks.limits import LIMITS
+from copolicy.dataset.checks.checking import check_table, rules_of
+from copolicy.dataset.checks.limits import limits_of
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
+from copolicy.dataset.task import get_task
+
+RULES = rules_of(get_task())
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
@@ -23,7 +26,7 @@ def test_sound_data_have_no_error_and_no_warning(sound, recorded, rule):
 
 
 def test_every_limit_has_a_unit_and_a_reason():
-    for name, limit in LIMITS.items():
+    for name, limit in limits_of(get_task()).items():
         assert limit.unit, name
         assert len(limit.reason) > 20, name
     assert len({rule.name for rule in RULES}) == len(RULES)

@@ -7,9 +7,9 @@ import pytest
 from changed_tables import all_frames, find, of, with_column, with_entry, with_frames
 
 from copolicy.dataset.checks.episode_table import EpisodeTable
-from copolicy.dataset.checks.maps import named_map
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.tasks.table.maps import MAP_SETS, identify, map_set
+from copolicy.tasks.table.rules.maps import named_map
 
 
 def test_maps_by_name():

@@ -10,12 +10,13 @@ import sys
 import pytest
 from checked_data import contents, make_data_set, make_recordings, set_columns
 
-from copolicy.dataset.checks.checking import RULES, check_dataset
-from copolicy.dataset.checks.limits import LIMITS, RULES_VERSION
+from copolicy.dataset.checks.checking import check_dataset, rules_of
+from copolicy.dataset.checks.limits import RULES_VERSION, limits_of
 from copolicy.dataset.checks.stored_check import check_document, content_hash, validity
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.files.meta_files import CHECK_FILE
+from copolicy.dataset.task import get_task
 from copolicy.dataset.transfer.publish import verify_release
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.digests import digest
@@ -47,7 +48,7 @@ def test_findings_are_kept_with_rules_limits_date_and_content(root, capsys):
     assert {name: printed[name] for name in document} == document
     assert printed["saved"] == str(root / CHECK_FILE)
     assert (document["schema"], document["rules_version"]) == ("copolicy-check-1", RULES_VERSION)
-    assert document["limits"]["jump"] == {"value": 52.0, "unit": "px/s", "reason": LIMITS["jump"].reason}
+    assert document["limits"]["jump"] == {"value": 52.0, "unit": "px/s", "reason": limits_of(get_task())["jump"].reason}
     moment = datetime.datetime.fromisoformat(document["date"])
     assert abs(datetime.datetime.now(datetime.UTC) - moment) < datetime.timedelta(minutes=10)
     assert str(root) not in (root / CHECK_FILE).read_text(encoding="utf-8")
@@ -158,6 +159,6 @@ def test_checking_again_is_no_change_to_a_release(root, capsys):
 
 def test_the_version_of_the_rules_follows_them():
     """A new rule, limit or severity asks for a new RULES_VERSION, and for its digest here."""
-    rules = [[rule.name, rule.what] for rule in RULES]
-    limits = {name: [float(limit.value), limit.unit] for name, limit in LIMITS.items()}
+    rules = [[rule.name, rule.what] for rule in rules_of(get_task())]
+    limits = {name: [float(limit.value), limit.unit] for name, limit in limits_of(get_task()).items()}
     assert (RULES_VERSION, digest({"rules": rules, "limits": limits})[:16]) == ("1.3.0", "bdfc0b01c2e99f17")

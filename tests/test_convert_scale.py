@@ -14,7 +14,8 @@ from sharded_calls import EPISODES, call, content, damage, record_rest
 from video_difference import video_difference
 
 from copolicy.convert.cli import main
-from copolicy.dataset.checks.checking import DATA_SET_RULES, RECORDING_RULES, RULES, check_dataset
+from copolicy.dataset.checks.checking import check_dataset, of_data_sets, of_recordings, rules_of
+from copolicy.dataset.task import get_task
 
 
 @pytest.mark.parametrize("size", [1, 4, 6, 100])
@@ -44,7 +45,8 @@ def test_what_lerobot_loads_is_the_same(unsharded, tmp_path):
 
 
 def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_path, capsys):
-    assert set(RECORDING_RULES) | set(DATA_SET_RULES) == set(RULES)
+    rules = rules_of(get_task())
+    assert {*filter(of_recordings, rules), *filter(of_data_sets, rules)} == set(rules)
     recordings = Path(shutil.copytree(unsharded / "recordings", tmp_path / "recordings"))
     shutil.copy(recordings / "episode_000000.mcap", recordings / "episode_000009.mcap")
     assert main(call(recordings, tmp_path / "twice", "--shard-episodes", "3")) == 1
@@ -60,7 +62,7 @@ def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_pa
     record_rest(recordings / "episode_000004b.mcap")
     assert main(call(recordings, tmp_path / "set", "--shard-episodes", "3", "--shards", str(tmp_path / "shards"))) == 0
     kept = json.loads((tmp_path / "shards/findings.json").read_text(encoding="utf-8"))
-    names = {rule.name for rule in RECORDING_RULES}
+    names = {rule.name for rule in rules if of_recordings(rule)}
     applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text(encoding="utf-8"))["applied"]
     assert set(applied) == names
     # The recordings' own rules find in shards what they find in all at once, episodes named by their index.

@@ -20,9 +20,10 @@ from copolicy.evaluate.partner_study.outcome import PartnerOutcome
 from copolicy.evaluate.partner_study.robots import policy_robot, scripted_robots
 from copolicy.evaluate.partner_study.study import carry_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
-from copolicy.tasks.table.agents import Habits, ScriptedPilot
+from copolicy.tasks.table.agents import Habits
 from copolicy.tasks.table.agents.players import simulated_partner
 from copolicy.tasks.table.agents.profiles import PARTNERS
+from copolicy.tasks.table.agents.scripted import ScriptedPilot
 from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics

@@ -159,11 +159,9 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["check", "check recordings", "stats", "card", "report", "zarr", "robomimic", "minari", "verify", "gif", "sheet"],
+    ["stats"],
 )
 def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
-    from copolicy.cards.cli import main as cards
-    from copolicy.collect.cli import main as collect
     from copolicy.dataset.cli import main as dataset
 
     recordings, root, out = tmp_path / "recordings", tmp_path / "set", tmp_path / "out"
@@ -177,14 +175,6 @@ def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, com
         "check": (dataset, "check", root),
         "check recordings": (dataset, "check", recordings),
         "stats": (dataset, "stats", root),
-        "card": (cards, "dataset", root, "--repo-id", "lab/peg", "--overwrite"),
-        "report": (cards, "report", root, "--out", out.with_suffix(".html")),
-        "zarr": (main, "export", root, "--format", "zarr", "--out", out.with_suffix(".zarr")),
-        "robomimic": (main, "export", root, "--format", "robomimic", "--out", out.with_suffix(".hdf5")),
-        "minari": (main, "export", root, "--format", "minari", "--out", tmp_path / "lab" / "peg-v0"),
-        "verify": (collect, "replay", recording, "--verify"),
-        "gif": (collect, "replay", recording, "--gif", out.with_suffix(".gif")),
-        "sheet": (collect, "replay", recording, "--png", out.with_suffix(".png")),
     }[command]
     assert program([str(argument) for argument in arguments]) == 2
     line = capsys.readouterr().err.splitlines()[-1]

@@ -18,9 +18,10 @@ from copolicy.collect.screen.dialogs import (
     draw_toast,
 )
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
+from copolicy.collect.screen.outline_view import letterbox
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.outline import between
-from copolicy.tasks.table.artist.table_view import TableView, letterbox
+from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 
 MAP = MapConfig(start=(240.0, 300.0, 0.0), goal=(960.0, 180.0), obstacles=((600.0, 450.0),))
@@ -43,7 +44,7 @@ def test_everything_stands_where_it_is_at_any_size(size):
     surface, view = _surface(size), TableView(MAP)
     area = surface.get_rect()
     rect = view.draw(surface, area, (300.0, 200.0, 0.0))
-    assert rect == letterbox(area)
+    assert rect == letterbox(area, (1200, 600))
     assert rect.width / rect.height == pytest.approx(2.0, abs=0.01)
     assert rect.center == area.center
     for point, colour in (

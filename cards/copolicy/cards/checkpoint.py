@@ -17,6 +17,7 @@ from copolicy.dataset.policies.documents import (
     TrainingDocument,
 )
 from copolicy.dataset.policies.training_run import find_policy_folder
+from copolicy.dataset.task import TABLE, PairTask, get_task
 
 from .facts import DatasetFacts
 from .training_data import TrainingData
@@ -37,6 +38,7 @@ class Checkpoint:
         data: what it was trained on.
         weights_sha256: hash of the weights.
         recipe: `recipe.json` of an exported policy, else empty.
+        task: that its configuration names, else that of its data, else the table.
     """
 
     folder: Path
@@ -45,6 +47,7 @@ class Checkpoint:
     data: TrainingData
     weights_sha256: str
     recipe: dict[str, Any]
+    task: PairTask
 
     @classmethod
     def read(cls, path: Path, dataset_root: Path | None = None) -> "Checkpoint":
@@ -56,6 +59,7 @@ class Checkpoint:
 
         Raises:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
+            UnknownNameError: its task is not installed.
         """
         folder = _folder(path)
         config = read_optional_json(folder / "config.json", dict, "a policy's configuration") or {}
@@ -66,15 +70,19 @@ class Checkpoint:
         recipe = read_optional_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
         root = dataset_root or _training_root(settings)
+        task = config.get("task")
         if root is not None:
-            data = TrainingData.from_data_set(DatasetFacts.read(root), settings or recipe.get("dataset") or {})
+            facts = DatasetFacts.read(root)
+            task = task or facts.task.spec.name
+            data = TrainingData.from_data_set(facts, settings or recipe.get("dataset") or {})
         elif recipe.get("dataset"):
             data = TrainingData.from_recipe(recipe["dataset"])
         else:
             data = replace(TrainingData.from_settings(settings), fps=config.get("fps"))
         with (folder / WEIGHTS).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        return cls(folder, config, training or recipe.get("training") or {}, data, digest, recipe)
+        training = training or recipe.get("training") or {}
+        return cls(folder, config, training, data, digest, recipe, get_task(task or TABLE))
 
     @property
     def commands(self) -> list[str]:

@@ -15,7 +15,7 @@ from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.files.listing import visible_files
 
 from .artefacts import newest_release
-from .dataset_card import PAPER, licence
+from .dataset_card import licence
 from .facts import DatasetFacts
 
 REPOSITORY = "repository"
@@ -79,7 +79,7 @@ def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = 
 
 def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> dict[str, Any]:
     """The same as a JSON-able dict."""
-    release = newest_release(facts.root) or {}
+    release, words = newest_release(facts.root) or {}, facts.words
     url = f"https://huggingface.co/datasets/{repo_id}"
     metadata: dict[str, Any] = {
         "@context": _CONTEXT,
@@ -87,11 +87,11 @@ def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | Non
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": pretty_name or repo_id.split("/")[1],
         "description": (
-            f"{len(facts.episodes)} episodes of two players carrying a table; source: "
+            f"{len(facts.episodes)} episodes of {words.episodes_of}; source: "
             f"{', '.join(facts.values('source'))}."
         ),
         "url": url,
-        "citeAs": PAPER,
+        **({"citeAs": words.paper} if words.paper else {}),
         "keywords": ["robotics", "LeRobot", "human-robot collaboration", *facts.values("source")],
         "distribution": [_repository(url), *_file_set(facts.root, "frames", "data"),
                          *_file_set(facts.root, "episodes", "meta/episodes")],
@@ -169,7 +169,7 @@ def _episodes(facts: DatasetFacts) -> dict[str, Any]:
         "@type": "cr:RecordSet",
         "@id": "episodes",
         "name": "episodes",
-        "description": "One record an episode: who carried what with whom on which map, and how it ended.",
+        "description": facts.words.record,
         "key": {"@id": "episodes/episode_index"},
         "field": [_field("episodes", name, kind, name.replace("_", " ")) for name, kind in columns.items()],
     }

@@ -6,50 +6,48 @@ from huggingface_hub import DatasetCardData
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.exclusions import FLAG
-from copolicy.dataset.lerobot_folder.info import task_of
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
 from copolicy.dataset.publication.repo_id import checked_repo_id
 from copolicy.dataset.scenarios import set_label
+from copolicy.dataset.task_words import TaskWords
 
 from .artefacts import newest_release
 from .datasheet import datasheet
 from .facts import DatasetFacts
 from .findings import findings
-from .markdown import share, table
+from .markdown import left_out, share, table
 from .multimodality import multimodality
 
-SOURCES = {
-    "human": "People played these episodes, two at a time, with one controller each.",
-    "simulated": (
-        "**No person took part.** Two scripted pilots, one at each end of the table, stand in for people. "
-        "No figure made with these episodes is a result about people."
-    ),
-    "upstream": (
-        "Imported from files of the original program of Ng, Liu and Kennedy (RA-L 2023). "
-        "Those files do not say who or what held the sticks."
-    ),
-}
-PAPER = """@article{ng2023diffusion,
-  title   = {Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks},
-  author  = {Ng, Eley and Liu, Ziang and Kennedy, Monroe},
-  journal = {IEEE Robotics and Automation Letters},
-  year    = {2023},
-  eprint  = {2305.12171},
-  archivePrefix = {arXiv}
-}"""
-CITATION = f"""## Citation
-
-The task, its dynamics and its maps are those of the paper:
-
-```bibtex
-{PAPER}
-```"""
+_UPSTREAM = (
+    "Imported from files of the original program of Ng, Liu and Kennedy (RA-L 2023){} do not say who or what held the "
+    "sticks."
+)
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
 _LISTED = 400  # episodes; a longer list is for a command to print
+
+
+def source_text(source: str, words: TaskWords, page: bool = False) -> str:
+    """Who played, on a card or on the page."""
+    if source == "human":
+        return "People played these episodes, two at a time, with one controller each."
+    if source == "upstream":
+        return _UPSTREAM.format(", which" if page else ". Those files")
+    if source != "simulated":
+        return f"Source: {source}."
+    if page:
+        before, about = "Simulated pairs: no person took part.", "on this page that includes them"
+    else:
+        before, about = "**No person took part.**", "made with these episodes"
+    return f"{before} {words.stand_in} No figure {about} is a result about people."
+
+
+def citation(words: TaskWords) -> list[str]:
+    """The section on the paper behind a task, where there is one."""
+    return [f"## Citation\n\n{words.citation}\n\n```bibtex\n{words.paper}\n```"] if words.paper else []
 
 
 def render(
@@ -70,6 +68,7 @@ def render(
     sections = (
         _overview(facts, title),
         *(f"![{caption}]({path})\n\n*{caption}*" for path, caption in figures),
+        *([] if facts.task.outline else [f"Figures of paths: {facts.task.missing('outline')}."]),
         _loading(facts, repo_id),
         *_excluded(facts, repo_id),
         _episodes(facts),
@@ -77,7 +76,7 @@ def render(
         findings(facts),
         _features(facts),
         *datasheet(facts),
-        CITATION,
+        *citation(facts.words),
     )
     return f"---\n{hub_metadata(facts, title).to_yaml()}\n---\n\n" + "\n\n".join(sections) + "\n"
 
@@ -88,7 +87,7 @@ def hub_metadata(facts: DatasetFacts, title: str) -> DatasetCardData:
     return DatasetCardData(
         license=licence(facts),
         task_categories=["robotics"],
-        tags=["LeRobot", "copolicy", "human-robot-collaboration", "table-carrying", *sources],
+        tags=["LeRobot", "copolicy", "human-robot-collaboration", facts.words.tag, *sources],
         size_categories=[next((name for limit, name in _SIZES if facts.info["total_frames"] < limit), "1M<n<10M")],
         pretty_name=title,
         configs=[{"config_name": name, "data_files": files} for name, files in CONFIGS],
@@ -107,14 +106,13 @@ def licence(facts: DatasetFacts) -> str:
 
 
 def _overview(facts: DatasetFacts, title: str) -> str:
-    info = facts.info
-    sources = [SOURCES.get(source, f"Source: {source}.") for source in facts.values("source")]
+    info, words = facts.info, facts.words
     return "\n\n".join(
         (
             f"# {title}",
-            "Two players carry a table past obstacles to a goal: states and the joint action of both, "
-            "for learning policies that carry *with* a person.",
-            *sources,
+            f"{words.about}: states and the joint action of both, for learning policies that {words.act} *with* a "
+            "person.",
+            *(source_text(source, words) for source in facts.values("source")),
             table(
                 ("", ""),
                 (
@@ -122,7 +120,7 @@ def _overview(facts: DatasetFacts, title: str) -> str:
                     ("frames", f"{info['total_frames']:,}"),
                     ("rate of the frames", f"{info['fps']:g} Hz"),
                     ("recorded time", f"{facts.seconds / 60:.1f} min"),
-                    ("reached the goal", share(facts.successes, len(facts.episodes))),
+                    (words.success, share(facts.successes, len(facts.episodes))),
                     ("physics", _physics(facts)),
                     ("format", f"LeRobot {info['codebase_version']}"),
                 ),
@@ -133,7 +131,7 @@ def _overview(facts: DatasetFacts, title: str) -> str:
 
 def _physics(facts: DatasetFacts) -> str:
     try:
-        counts = physics_counts((episode["physics"] for episode in facts.episodes), task_of(facts.info))
+        counts = physics_counts((episode["physics"] for episode in facts.episodes), facts.task)
     except InvalidValueError as error:
         raise FileFormatError(facts.root, "episodes whose settings of the dynamics can be read", str(error)) from None
     total = len(facts.episodes)
@@ -156,15 +154,20 @@ def _episodes(facts: DatasetFacts) -> str:
         if name
     ]
     reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
-    routes = [(route or "none", count) for route, count in facts.counts("route_class").items()]
+    words, kept = facts.words, "Failures and time-outs are kept and marked."
+    if facts.task.has_strategy:
+        kept += f" {words.label.capitalize()}s{words.labels[0] and f', {words.labels[0]}'}:"
+        routes = [(label or "none", count) for label, count in facts.counts("route_class").items()]
+        labels = [table((words.label, "episodes"), routes)]
+    else:
+        labels = [left_out(facts.task, "strategy labels")]
     return "\n\n".join(
         (
             "## Episodes",
-            table(("map set", "maps", "episodes", "reached the goal"), maps),
+            table((f"{words.scenario} set", words.scenarios, "episodes", words.success), maps),
             table(("ended by", "episodes"), reasons),
-            "Failures and time-outs are kept and marked. Routes, one letter an obstacle (L: the table passed below "
-            "it on screen, R: above it):",
-            table(("route", "episodes"), routes),
+            kept,
+            *labels,
         )
     )
 
@@ -178,8 +181,7 @@ def _features(facts: DatasetFacts) -> str:
         (
             "## Features",
             table(("key", "type", "shape", "names"), rows),
-            "Positions are px in a window of 1200 x 600, y down; angles rad, counter-clockwise on screen; forces in "
-            "units of a player's full force. An action is stored with the state it was taken in; "
+            f"{facts.words.numbers} An action is stored with the state it was taken in; "
             "`observation.human_action` is the human's action of the frame before.",
         )
     )

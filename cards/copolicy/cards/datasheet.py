@@ -19,7 +19,7 @@ from .markdown import listing, share
 def datasheet(facts: DatasetFacts) -> Iterator[str]:
     """The sections, in the order of the paper."""
     for heading, lines in (
-        ("Motivation", _motivation()),
+        ("Motivation", _motivation(facts)),
         ("Composition", _composition(facts)),
         ("Collection: who played, and how it was recorded", _collection(facts)),
         ("Preprocessing", _preprocessing(facts)),
@@ -31,10 +31,9 @@ def datasheet(facts: DatasetFacts) -> Iterator[str]:
         yield f"## {heading}\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
-def _motivation() -> list[str]:
+def _motivation(facts: DatasetFacts) -> list[str]:
     return [
-        "Purpose: learning and judging policies that carry an object *with* a partner, where there are several good "
-        "ways and both have to settle on one.",
+        f"Purpose: learning and judging policies that {facts.words.purpose}.",
         "Who made it and who paid for it: not stated in the metadata.",
     ]
 
@@ -43,9 +42,9 @@ def _composition(facts: DatasetFacts) -> list[str]:
     discarded = sum(bool(episode["discarded"]) for episode in facts.episodes)
     lengths = sorted(episode["length"] for episode in facts.episodes)
     return [
-        f"An instance is an episode: one carry from start to end, {lengths[0]} to {lengths[-1]} frames "
+        f"An instance is an episode: {facts.words.episode}, {lengths[0]} to {lengths[-1]} frames "
         f"(median {lengths[len(lengths) // 2]}).",
-        "Each has states, the joint action of both players, the map, and who did it with whom.",
+        f"Each has states, the joint action of both players, the {facts.words.scenario}, and who did it with whom.",
         f"Splits: {', '.join(f'{name} {span}' for name, span in facts.info.get('splits', {}).items()) or 'none'}",
         f"Marked as discarded (kept, left out of training): {share(discarded, len(facts.episodes))}",
         f"Quality flags, exclusions with their reasons among them: {_flags(facts)}",
@@ -76,7 +75,8 @@ def _collection(facts: DatasetFacts) -> list[str]:
     lines.append(f"Late ticks: {sum(episode['late_ticks'] for episode in facts.episodes)}")
     drift = _known(facts, "replay_drift_px")
     if drift:
-        lines.append(f"Recorded against re-simulated position: at most {max(drift):.3g} px apart")
+        unit = facts.task.outline.unit if facts.task.outline else "of its unit"
+        lines.append(f"Recorded against re-simulated position: at most {max(drift):.3g} {unit} apart")
     return lines
 
 
@@ -117,10 +117,7 @@ def _uses(facts: DatasetFacts) -> list[str]:
         lines.append("Not for: claims about people, as far as simulated episodes are involved.")
     if "upstream" in sources:
         lines.append("With care: the imported files do not say who or what held the sticks.")
-    lines.append(
-        "The table moves in a plane under known dynamics; nothing here says how a policy behaves on a real robot."
-    )
-    return lines
+    return [*lines, f"{facts.words.limits}; nothing here says how a policy behaves on a real robot."]
 
 
 def _distribution(facts: DatasetFacts) -> list[str]:

@@ -10,6 +10,8 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import features_of
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
+from copolicy.dataset.task import PairTask
+from copolicy.dataset.task_words import TaskWords
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,16 @@ class DatasetFacts:
         return self.folder.root
 
     @property
+    def task(self) -> PairTask:
+        """The task of the episodes."""
+        return self.folder.task
+
+    @property
+    def words(self) -> TaskWords:
+        """How that task is spoken of."""
+        return self.task.words
+
+    @property
     def info(self) -> dict[str, Any]:
         """`meta/info.json`."""
         return self.folder.info
@@ -67,5 +79,5 @@ class DatasetFacts:
 
     @property
     def successes(self) -> int:
-        """Episodes that reached the goal."""
+        """Episodes that succeeded."""
         return sum(bool(episode["success"]) for episode in self.episodes)

@@ -1,33 +1,42 @@
-"""Pictures of a data set for its card: trajectories, shares of the routes, and routes beside those of people."""
+"""Pictures of a data set for its card: trajectories, shares of the strategies, and routes beside those of people."""
 
-import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from copolicy.dataset.files.staging import replacement
-from copolicy.tasks.table.map_config import WINDOW
-from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.dataset.outline import Outline
+from copolicy.dataset.outline_figure import (
+    BLUE,
+    FAILURE,
+    GOAL,
+    NO_LABEL,
+    draw_fixed,
+    label_colours,
+    panels,
+    show_whole,
+)
 
 from .facts import DatasetFacts
-from .frames import EpisodeFrames, read_frames
+from .frames import DrawnEpisode, read_frames
 from .human_figure import human_figure
 
 FOLDER = Path("figures")
 
-# Okabe and Ito's palette, told apart with every kind of colour vision; routes of one map never share a colour.
-_ROUTES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#A89B00", "#8C8C8C")
-_NO_ROUTE, _GOAL, _OBSTACLE, _FAILURE = "#666666", "#009E73", "#3A3E48", "#D55E00"
+_OBSTACLE = "#3A3E48"
 _MOST_PANELS = 12
+
+Group = tuple[str, list[DrawnEpisode]]
+"""Where the obstacles are, and the episodes among them."""
 
 
 def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
-    """Draws the pictures into the data set's folder.
+    """Draws the pictures into the data set's folder: none of a task without an outline.
 
     Returns:
         For each its path in that folder, and a caption.
@@ -35,14 +44,20 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
     Raises:
         FileFormatError: the frames or the stored statistics cannot be read.
     """
-    sources = " and ".join(facts.values("source"))
-    total, groups = _by_obstacles(facts)
-    most = f", the {len(groups)} most frequent of {total} sets of obstacles" if len(groups) < total else ""
-    what = f"{len(facts.episodes)} episodes, source: {sources}{most}"
-    pictures = [
-        ("trajectories.png", f"Paths of the table's centre by route class ({what}).", _trajectories(groups)),
-        ("routes.png", f"Routes by set of obstacles ({what}).", _route_shares(groups)),
-    ]
+    pictures: list[tuple[str, str, Figure]] = []
+    task, words = facts.task, facts.words
+    if task.outline is not None:
+        sources = " and ".join(facts.values("source"))
+        total, groups = _by_obstacles(facts, task.outline)
+        most = f", the {len(groups)} most frequent of {total} sets of obstacles" if len(groups) < total else ""
+        what = f"{len(facts.episodes)} episodes, source: {sources}{most}"
+        colours = label_colours(facts.counts("route_class"))
+        by = f" by {words.label_class}" if task.has_strategy else ""
+        paths = _trajectories(groups, task.outline, colours, words.failure, task.has_strategy)
+        pictures.append(("trajectories.png", f"Paths of {words.body}{by} ({what}).", paths))
+        if task.has_strategy:
+            caption = f"{words.label.capitalize()}s by set of obstacles ({what})."
+            pictures.append(("routes.png", caption, _label_shares(groups, colours)))
     people = human_figure(facts)
     if people is not None:
         pictures.append(("human_routes.png", people[1], people[0]))
@@ -54,86 +69,74 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
     return saved
 
 
-def _by_obstacles(facts: DatasetFacts) -> tuple[int, list[tuple[str, list[tuple[dict, EpisodeFrames]]]]]:
+def _by_obstacles(facts: DatasetFacts, outline: Outline) -> tuple[int, list[Group]]:
     """How many sets of obstacles there are; title and members of the most frequent, fewest obstacles first."""
-    groups: dict[tuple, list[tuple[dict, EpisodeFrames]]] = defaultdict(list)
-    for episode, frames in zip(facts.episodes, read_frames(facts), strict=True):
-        groups[frames.map_config.obstacle_size, frames.map_config.layout].append((episode, frames))
+    groups: dict[tuple, list[DrawnEpisode]] = defaultdict(list)
+    for row, frames in zip(facts.episodes, read_frames(facts), strict=True):
+        episode = DrawnEpisode(row, outline.poses(frames.states)[:, :2], outline.fixed(frames.scenario))
+        groups[episode.obstacles].append(episode)
     largest = sorted(groups, key=lambda key: -len(groups[key]))[:_MOST_PANELS]
     return len(groups), [
-        (" ".join(f"({x:.0f}, {y:.0f})" for (x, y), _ in key[1]) or "no obstacle", groups[key])
-        for key in sorted(largest, key=lambda key: (len(key[1]), key))
+        (groups[key][0].obstacle_places(outline) or "no obstacle", groups[key])
+        for key in sorted(largest, key=lambda key: (len(key), max((size for _, size in key), default=0), key))
     ]
 
 
-def _trajectories(groups: Sequence[tuple[str, list[tuple[dict, EpisodeFrames]]]]) -> Figure:
-    columns = min(3, len(groups))
-    rows = math.ceil(len(groups) / columns)
-    figure = Figure(figsize=(4.2 * columns, 2.45 * rows + 0.4), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes: Iterator = iter(figure.subplots(rows, columns, squeeze=False).flat)
-    for (title, members), axis in zip(groups, axes, strict=False):
-        _panel(axis, title, members)
-    for axis in axes:
-        axis.set_visible(False)
+def _trajectories(
+    groups: Sequence[Group], outline: Outline, colours: Mapping[str, str], failure: str, labelled: bool
+) -> Figure:
+    figure = Figure(dpi=110, layout="constrained")
+    for (title, members), axes in zip(groups, panels(figure, outline, len(groups), 3, 0.4), strict=True):
+        _panel(axes, title, members, outline, colours, labelled)
+    around = any(members[0].obstacles for _, members in groups)
     handles = [
-        Rectangle((0, 0), 1, 1, fill=False, edgecolor=_GOAL, label="goal"),
-        Rectangle((0, 0), 1, 1, color=_OBSTACLE, label="obstacle"),
-        Line2D([], [], color=_FAILURE, linestyle="", marker="x", label="ended short of the goal"),
+        Rectangle((0, 0), 1, 1, fill=False, edgecolor=GOAL, label="goal"),
+        *([Rectangle((0, 0), 1, 1, color=_OBSTACLE, label="obstacle")] if around else []),
+        Line2D([], [], color=FAILURE, linestyle="", marker="x", label=failure),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     return figure
 
 
-def _panel(axis, title: str, members: Sequence[tuple[dict, EpisodeFrames]]) -> None:
-    config = members[0][1].map_config
-    for x, y in {frames.map_config.goal for _, frames in members}:
-        corner = (x - GOAL_SIZE / 2, y - GOAL_SIZE / 2)
-        axis.add_patch(Rectangle(corner, GOAL_SIZE, GOAL_SIZE, fill=False, edgecolor=_GOAL))
-    for (x, y), size in config.squares:
-        axis.add_patch(Rectangle((x - size / 2, y - size / 2), size, size, color=_OBSTACLE))
-    for episode, frames in members:
-        x, y = frames.states[:, 0], frames.states[:, 1]
-        axis.plot(x, y, color=route_colour(episode["route_class"]), linewidth=0.9, alpha=0.6)
-        if not episode["success"]:
-            axis.plot(x[-1], y[-1], "x", color=_FAILURE, markersize=5)
-    routes = Counter(episode["route_class"] for episode, _ in members)
-    handles = [
-        Line2D([], [], color=route_colour(route), label=f"{route or 'none'} {count}")
-        for route, count in routes.most_common()
-    ]
-    axis.legend(handles=handles, loc="lower left", ncols=4, fontsize=7, frameon=False, handlelength=1)
-    axis.set(xlim=(0, WINDOW[0]), ylim=(WINDOW[1], 0), xticks=[], yticks=[], aspect="equal")
-    axis.set_title(f"obstacles {title}: {len(members)} episodes", fontsize=8)
+def _panel(
+    axes: Axes, title: str, members: Sequence[DrawnEpisode], outline: Outline, colours: Mapping[str, str], labels: bool
+) -> None:
+    draw_fixed(axes, (shape for episode in members for shape in episode.fixed), _OBSTACLE)
+    for episode in members:
+        x, y = episode.path.T
+        axes.plot(x, y, color=colours[episode.row["route_class"]] if labels else BLUE, linewidth=0.9, alpha=0.6)
+        if not episode.row["success"]:
+            axes.plot(x[-1], y[-1], "x", color=FAILURE, markersize=5)
+    if labels:
+        handles = [
+            Line2D([], [], color=colours[label], label=f"{label or 'none'} {count}")
+            for label, count in _labels(members).most_common()
+        ]
+        axes.legend(handles=handles, loc="lower left", ncols=4, fontsize=7, frameon=False, handlelength=1)
+    show_whole(axes, outline)
+    where = f"obstacles {title}" if members[0].obstacles else title
+    axes.set_title(f"{where}: {len(members)} episodes", fontsize=8)
 
 
-def _route_shares(groups: Sequence[tuple[str, list[tuple[dict, EpisodeFrames]]]]) -> Figure:
+def _labels(members: Sequence[DrawnEpisode]) -> Counter[str]:
+    return Counter(episode.row["route_class"] for episode in members)
+
+
+def _label_shares(groups: Sequence[Group], colours: Mapping[str, str]) -> Figure:
     figure = Figure(figsize=(8, 0.5 * len(groups) + 0.9), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    axis = figure.subplots()
+    axes = figure.subplots()
     for row, (_, members) in enumerate(groups):
         left = 0.0
-        routes = Counter(episode["route_class"] for episode, _ in members)
-        for route, count in sorted(routes.items()):
-            part = count / len(members)
-            axis.barh(row, part, left=left, color=route_colour(route), edgecolor="white")
+        for label, count in sorted(_labels(members).items()):
+            part, paint = count / len(members), colours[label]
+            axes.barh(row, part, left=left, color=paint, edgecolor="white")
             if part > 0.06:
-                text = f"{route or 'none'} {count}"
-                axis.text(left + part / 2, row, text, ha="center", va="center", fontsize=8, color=_on(route))
+                ink = "white" if paint in (BLUE, NO_LABEL) else "black"  # what can be read on it
+                axes.text(
+                    left + part / 2, row, f"{label or 'none'} {count}", ha="center", va="center", fontsize=8, color=ink
+                )
             left += part
-    axis.set_yticks(range(len(groups)), [f"{title}\n{len(members)} episodes" for title, members in groups], fontsize=7)
-    axis.set(xlim=(0, 1), xlabel="share of episodes", ylim=(len(groups) - 0.4, -0.6))
-    axis.spines[["top", "right", "left"]].set_visible(False)
+    axes.set_yticks(range(len(groups)), [f"{title}\n{len(members)} episodes" for title, members in groups], fontsize=7)
+    axes.set(xlim=(0, 1), xlabel="share of episodes", ylim=(len(groups) - 0.4, -0.6))
+    axes.spines[["top", "right", "left"]].set_visible(False)
     return figure
-
-
-def _on(route: str) -> str:
-    """Colour of letters that can be read on a route's colour."""
-    return "white" if route_colour(route) in ("#0072B2", _NO_ROUTE) else "black"
-
-
-def route_colour(route: str) -> str:
-    """Colour of a side word, the same as in the report."""
-    if not route or set(route) - {"L", "R"}:
-        return _NO_ROUTE
-    return _ROUTES[int(route.replace("L", "0").replace("R", "1"), 2) % len(_ROUTES)]

@@ -1,16 +1,17 @@
 """The frames of a data set, episode by episode: what figures and the report are drawn from."""
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, features_of
-from copolicy.dataset.task import require_table
-from copolicy.tasks.table.features import theta_of
-from copolicy.tasks.table.interaction import interaction_force
-from copolicy.tasks.table.map_config import MapConfig
+from copolicy.dataset.outline import Outline, Shape
+from copolicy.dataset.outline_figure import decimals, obstacles_of
+from copolicy.dataset.task import PairTask
 
 from .facts import DatasetFacts
 
@@ -21,29 +22,49 @@ class EpisodeFrames:
 
     Attributes:
         index: `episode_index`.
-        states: `(T, 7)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s).
-        actions: `(T, 4)` robot xy, human xy in [-1, 1].
+        states: `(T, n)`, as the task's spec names them.
+        actions: `(T, m)`, robot first.
     """
 
     index: int
     states: np.ndarray
     actions: np.ndarray
-    map_config: MapConfig
+    scenario: Any
+    task: PairTask
 
     @property
-    def theta(self) -> np.ndarray:
-        """`(T,)` orientation in [0, 2 pi), rad."""
-        return theta_of(self.states)
+    def interaction(self) -> np.ndarray | None:
+        """`(T,)` the task's interaction measure, None where it has none.
 
-    @property
-    def interaction(self) -> np.ndarray:
-        """`(T,)` interaction force, units of a player's full force.
-
-        It is defined with the orientation after the step, which is that of the next frame; the last frame has none
-        and uses its own.
+        It is defined with the state after the step, which is that of the next frame; the last frame has none and uses
+        its own.
         """
-        theta = self.theta
-        return interaction_force(np.append(theta[1:], theta[-1:]), self.actions)
+        return self.task.interaction(np.vstack((self.states[1:], self.states[-1:])), self.actions)
+
+
+@dataclass(frozen=True)
+class DrawnEpisode:
+    """An episode as its task's outline draws it.
+
+    Attributes:
+        row: its columns of meta/episodes.
+        path: `(T, 2)` where the body is, in the unit of the outline.
+        fixed: what stands still.
+    """
+
+    row: dict[str, Any]
+    path: np.ndarray
+    fixed: tuple[Shape, ...]
+
+    @functools.cached_property
+    def obstacles(self) -> tuple:
+        """See `obstacles_of`."""
+        return obstacles_of(self.fixed)
+
+    def obstacle_places(self, outline: Outline) -> str:
+        """`(400, 200) (800, 350)`."""
+        digits = decimals(outline)
+        return " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in self.obstacles)
 
 
 def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
@@ -53,14 +74,12 @@ def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
         FileFormatError: a data file is missing, damaged, without the columns of this task, or holds other episodes
             than meta/episodes says.
     """
-    task = facts.folder.task
-    require_table(task, facts.root)
-    features = features_of(task.spec)
+    features = features_of(facts.task.spec)
     shapes = {name: features[name]["shape"] for name in (STATE, ENVIRONMENT_STATE, ACTION)}
     for index, columns in facts.folder.frames(shapes):
         states, environment, actions = (columns[name].astype(float) for name in shapes)
         try:
-            config = task.scenario_of_vector(environment[0], facts.episodes[index])
+            scenario = facts.task.scenario_of_vector(environment[0], facts.episodes[index])
         except CopolicyError as error:
             raise FileFormatError(facts.root / "data", f"a map in episode {index}", str(error)) from None
-        yield EpisodeFrames(index, states, actions, config)
+        yield EpisodeFrames(index, states, actions, scenario, facts.task)

@@ -3,16 +3,17 @@
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+
+from copolicy.dataset.outline_figure import BLUE, ORANGE
 
 from .artefacts import stored_statistics
 from .facts import DatasetFacts
 from .routes import HumanDistance, RouteStatistics, route_statistics
 
-_OURS, _PEOPLE, _CHANCE = "#0072B2", "#E69F00", "#BBBBBB"
+_OURS, _PEOPLE, _CHANCE = BLUE, ORANGE, "#BBBBBB"
 _HEIGHT = 0.38  # of a bar; two of them to a route
 
 
@@ -49,7 +50,6 @@ def _draw(routes: RouteStatistics) -> Figure:
     most = max(len(one.routes) for one in routes.distances)
     count = len(routes.distances)
     figure = Figure(figsize=(3.1 * count + 3.4, 0.42 * most + 1.5), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
     *panels, last = figure.subplots(1, count + 1, squeeze=False, width_ratios=[*[1] * count, 1.15])[0]
     for axis, distance in zip(panels, routes.distances, strict=True):
         _shares(axis, distance)

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from copolicy.dataset.task import PairTask
+
 
 def table(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """A table; what a cell holds cannot end it."""
@@ -19,6 +21,11 @@ def listing(counts: dict[str, int], most: int = 12) -> str:
     """Values with how often each occurs; `not stated` for the empty one."""
     text = ", ".join(f"{value or 'not stated'} ({count})" for value, count in list(counts.items())[:most])
     return text + (f", and {len(counts) - most} more" if len(counts) > most else "")
+
+
+def left_out(task: PairTask, part: str) -> str:
+    """The sentence of a card or page that lacks what needs a part of the task."""
+    return f"L{task.missing(part)[1:]}."
 
 
 def number(value: object) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 from huggingface_hub import ModelCardData
 
 from .checkpoint import Checkpoint
-from .dataset_card import CITATION, SOURCES
+from .dataset_card import citation, source_text
 from .markdown import listing, share, table
 from .model_index import eval_results
 from .model_results import results
@@ -33,13 +33,13 @@ def render_model_card(
     """
     sections = (
         _overview(checkpoint, name),
-        results(evaluations),
+        results(evaluations, checkpoint.task),
         _data(checkpoint),
         _configuration(checkpoint, evaluations),
         *_again(checkpoint),
         _usage(checkpoint, name, evaluations),
         _limits(checkpoint, evaluations),
-        CITATION,
+        *citation(checkpoint.task.words),
     )
     metadata = hub_metadata(checkpoint, evaluations, name, licence)
     return f"---\n{metadata.to_yaml()}\n---\n\n" + "\n\n".join(sections) + "\n"
@@ -60,7 +60,7 @@ def hub_metadata(
         ],
         datasets=[repo_id] if _on_hub(repo_id) else None,
         model_name=name.rpartition("/")[2],
-        eval_results=eval_results(evaluations) or None,
+        eval_results=eval_results(evaluations, checkpoint.task) or None,
     )  # fmt: skip
 
 
@@ -69,14 +69,15 @@ def _on_hub(repo_id: str) -> bool:
 
 
 def _overview(checkpoint: Checkpoint, name: str) -> str:
+    words = checkpoint.task.words
     parts = [
         f"# {name.rpartition('/')[2]}",
-        f"A policy of type `{checkpoint.config['type']}` that carries a table together with a partner, in a simulated "
-        "plane seen from above: it plans the next actions of both players, and the robot executes its half.",
+        f"A policy of type `{checkpoint.config['type']}` that {words.acts}: it plans the next actions of both players, "
+        "and the robot executes its half.",
         *_interface(checkpoint),
     ]
     if checkpoint.data.at_hand:
-        parts += [f"Training data: {SOURCES.get(source, source)}" for source in sorted(checkpoint.data.sources)]
+        parts += [f"Training data: {source_text(source, words)}" for source in sorted(checkpoint.data.sources)]
     else:
         parts.append(
             "**Source of the training data: not stated.** The data set was not at hand when this card was written."
@@ -89,11 +90,11 @@ def _interface(checkpoint: Checkpoint) -> list[str]:
     config, rate = checkpoint.config, f" at {checkpoint.data.fps:g} Hz" if checkpoint.data.fps else ""
     if not {"n_obs_steps", "horizon", "n_action_steps"} <= config.keys():
         return []
-    human = ", the human's past actions" if config.get("past_human_action") else ""
+    words, human = checkpoint.task.words, ", the human's past actions" if config.get("past_human_action") else ""
     return [
-        f"In: the last {config['n_obs_steps']} frames{rate} of the table's pose and velocity, the map (start, goal, "
-        f"up to three obstacles){human}. Out: {config['horizon']} actions of both players, forces in [-1, 1]; up to "
-        f"{config['n_action_steps']} are executed before the next plan."
+        f"In: the last {config['n_obs_steps']} frames{rate} of {words.state_sees}, {words.scenario_sees}{human}. Out: "
+        f"{config['horizon']} actions of both players, {words.action}; up to {config['n_action_steps']} are executed "
+        "before the next plan."
     ]
 
 
@@ -111,7 +112,7 @@ def _data(checkpoint: Checkpoint) -> str:
             f"- Episodes used: {share(data.used or 0, data.episodes or 0)}",
             f"- Frames: {data.frames:,} at {data.fps:g} Hz",
             f"- Pairs: {listing(data.pairs)}" if data.pairs else "- Pairs: not stated",
-            f"- Map sets: {listing(data.map_sets)}",
+            f"- {checkpoint.task.words.scenario.capitalize()} sets: {listing(data.map_sets)}",
             f"- Licences: {listing(data.licences)}",
         ]
     return "## Training data\n\n" + "\n".join(lines)
@@ -164,15 +165,16 @@ def _usage(checkpoint: Checkpoint, name: str, evaluations: Sequence[dict[str, An
 
 
 def _limits(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> str:
-    lines = ["- Everything above was measured in a simulated plane; nothing here says how a real robot would carry."]
+    words = checkpoint.task.words
+    lines = [f"- Everything above was measured in {words.place}; nothing here says how a real robot would {words.act}."]
     if "simulated" in checkpoint.data.sources:
-        lines.append("- Trained on simulated pairs: how it carries with a person has not been measured.")
+        lines.append(f"- Trained on simulated pairs: how it {words.act_s} with a person has not been measured.")
     if any(evaluation["study"] == "partner" for evaluation in evaluations):
         lines.append(
             "- The partners of the study above are simulated too, by the same kind of pilot as the training data."
         )
     incomplete = [e["settings"]["maps"] for e in evaluations if not e["settings"].get("complete_set", True)]
-    lines += [f"- Only a part of the maps of {maps} was tried." for maps in incomplete]
+    lines += [f"- Only a part of the {words.scenarios} of {maps} was tried." for maps in incomplete]
     contradictions = [line for e in evaluations for line in e["settings"].get("told_otherwise", ())]
     lines += [
         f"- Evaluated under other conditions than it was trained under: {line}."

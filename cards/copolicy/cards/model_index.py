@@ -11,6 +11,8 @@ from typing import Any
 
 from huggingface_hub import EvalResult
 
+from copolicy.dataset.task import PairTask, get_task
+
 _SETTINGS = (
     "map_count", "configurations", "orientations", "repeats", "actions_per_plan", "fps", "step_limit",
     "angular_acceleration_limit", "seed", "partner_seed",
@@ -18,13 +20,16 @@ _SETTINGS = (
 _POLICY = ("sampler", "num_inference_steps", "initial_noise_scale")
 
 
-def eval_results(evaluations: Sequence[Mapping[str, Any]]) -> list[EvalResult]:
+def eval_results(evaluations: Sequence[Mapping[str, Any]], task: PairTask | None = None) -> list[EvalResult]:
     """One result an evaluation, this policy's alone: those of the robots beside it in a study are not the model's.
 
     `dataset_config` is the study, and whatever else tells results apart that would have the same config and split.
+
+    Args:
+        task: the table by default.
     """
     groups: dict[tuple, list[int]] = defaultdict(list)
-    results = [_result(evaluation) for evaluation in evaluations]
+    results = [_result(evaluation, task or get_task()) for evaluation in evaluations]
     for index, result in enumerate(results):
         groups[result.unique_identifier].append(index)
     for members in groups.values():
@@ -33,7 +38,7 @@ def eval_results(evaluations: Sequence[Mapping[str, Any]]) -> list[EvalResult]:
     return results
 
 
-def _result(evaluation: Mapping[str, Any]) -> EvalResult:
+def _result(evaluation: Mapping[str, Any], task: PairTask) -> EvalResult:
     settings, success = evaluation["settings"], evaluation["summary"]["success"]
     whole = settings.get("complete_set", True)
     count = settings.get("configurations", settings.get("map_count"))
@@ -41,14 +46,14 @@ def _result(evaluation: Mapping[str, Any]) -> EvalResult:
     arguments |= {key: evaluation["policy"][key] for key in _POLICY if evaluation["policy"].get(key) is not None}
     if settings.get("partners"):
         arguments["partners"] = sorted(settings["partners"])
-    maps = settings.get("map_set") or {}
+    maps, scenarios = settings.get("map_set") or {}, task.words.scenarios
     return EvalResult(
         task_type="robotics",
-        task_name=f"table carrying, {evaluation['study']} (simulation)",
-        dataset_type=f"copolicy-maps-{settings['maps'].replace('#', '-')}",
-        dataset_name=f"{settings['maps']} maps{'' if whole else ', a part of them'}",
+        task_name=f"{task.spec.title}, {evaluation['study']} (simulation)",
+        dataset_type=f"copolicy-{scenarios}-{settings['maps'].replace('#', '-')}",
+        dataset_name=f"{settings['maps']} {scenarios}{'' if whole else ', a part of them'}",
         dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
-        dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else 'maps'}",
+        dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else scenarios}",
         dataset_revision=f"{maps['version']}-{maps['digest']}" if maps.get("from") == "file" else None,
         dataset_args=arguments,
         metric_type="success_rate",

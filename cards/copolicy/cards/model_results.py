@@ -1,26 +1,37 @@
 """The results in a model card: one table a study, each with its label."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import compress
 from typing import Any
 
-from .markdown import number, table
+from copolicy.dataset.task import PairTask
+from copolicy.dataset.task_words import TaskWords
+
+from .markdown import left_out, number, table
 
 
-def results(evaluations: Sequence[dict[str, Any]]) -> str:
+def results(evaluations: Sequence[dict[str, Any]], task: PairTask) -> str:
     """The section, from results of `copolicy-eval` of one policy."""
     if not evaluations:
         return "## Results\n\nNot evaluated: no `eval.json` was given."
     studies = {study: [one for one in evaluations if one["study"] == study] for study in _studies(evaluations)}
-    parts = ["## Results"]
+    parts, words = ["## Results"], task.words
+    measured = any(_force(evaluation["summary"]) is not None for evaluation in evaluations)
+    if not measured:
+        words = replace(words, interaction="")
     for study, some in studies.items():
         labels = sorted({evaluation["label"] for evaluation in some})
         parts += [f"**{label[0].upper()}{label[1:]}.**" for label in labels]
-        parts += [_partners(one) for one in some] if study == "partner" else [_plain(some)]
+        parts += [_partners(one, words) for one in some] if study == "partner" else [_plain(some, words)]
+    measure = f"{words.interaction.capitalize()}: mean size, in {words.interaction_unit}. " if measured else ""
     parts.append(
         "s.e.: binomial standard error over episodes of this one training; it says nothing about other training "
-        "seeds. Interval: Wilson. Times to completion count successes only. Interaction force: mean size, in "
-        "units of a player's full force. A call plans for all tables that are still being carried at once."
+        "seeds. Interval: Wilson. Times to completion count successes only. "
+        f"{measure}A call plans for all {words.running} at once."
     )
+    if not measured:
+        parts.append(left_out(task, "interaction measure"))
     return "\n\n".join(parts)
 
 
@@ -28,12 +39,12 @@ def _studies(evaluations: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(str(evaluation["study"]) for evaluation in evaluations))
 
 
-def _plain(evaluations: Sequence[dict[str, Any]]) -> str:
+def _plain(evaluations: Sequence[dict[str, Any]], words: TaskWords) -> str:
     header = (
-        "study", "maps", "sampler", "success, % ± s.e.", "95 % interval, %", "episodes", "evaluation seed",
-        "time to completion, s", "interaction force", "planning, ms a call (median)",
+        "study", words.scenarios, "sampler", "success, % ± s.e.", "95 % interval, %", "episodes", "evaluation seed",
+        "time to completion, s", words.interaction, "planning, ms a call (median)",
     )  # fmt: skip
-    return table(header, [_plain_row(evaluation) for evaluation in evaluations])
+    return _without_blank(header, [_plain_row(evaluation) for evaluation in evaluations])
 
 
 def _plain_row(evaluation: dict[str, Any]) -> tuple[object, ...]:
@@ -46,19 +57,19 @@ def _plain_row(evaluation: dict[str, Any]) -> tuple[object, ...]:
         *_success(summary["success"]),
         settings.get("seed", "not stated"),
         number((summary.get("time_to_completion_s") or {}).get("mean")),
-        number((summary.get("interaction_force") or {}).get("mean")),
+        number(_force(summary)),
         f"{planning} on {settings.get('device', 'a device not stated')}",
     )
 
 
-def _partners(evaluation: dict[str, Any]) -> str:
+def _partners(evaluation: dict[str, Any], words: TaskWords) -> str:
     """One study with partners: this robot and those beside it, on the same starts with the same partners."""
     settings = evaluation["settings"]
     robots = [(evaluation.get("name", "this policy"), evaluation["summary"])]
     robots += [(one["name"], one["summary"]) for one in evaluation.get("baselines") or ()]
     kinds = list(evaluation["summary"].get("by_partner") or ())
     header = (
-        "robot", "success, % ± s.e.", "95 % interval, %", "episodes", "time to completion, s", "interaction force",
+        "robot", "success, % ± s.e.", "95 % interval, %", "episodes", "time to completion, s", words.interaction,
         "robot's share of the work", *(f"{kind}, %" for kind in kinds),
     )  # fmt: skip
     rows = []
@@ -69,18 +80,27 @@ def _partners(evaluation: dict[str, Any]) -> str:
                 name,
                 *_success(summary["success"]),
                 number((summary.get("time_to_completion_s") or {}).get("mean")),
-                number((summary.get("interaction_force") or {}).get("mean")),
+                number(_force(summary)),
                 number(summary.get("robot_share")),
                 *(_percent((by_kind.get(kind) or {}).get("success")) for kind in kinds),
             )
         )
     about = (
         f"With simulated partners on {settings.get('configurations', settings.get('map_count'))} starts of the "
-        f"{_maps(settings)} maps, {settings.get('actions_per_plan', 'a number not stated of')} action(s) a plan, "
-        f"{_sampler(evaluation['policy'])}, evaluation seed {settings.get('seed', 'not stated')}. The last columns are "
-        "the success with each kind of partner."
+        f"{_maps(settings)} {words.scenarios}, {settings.get('actions_per_plan', 'a number not stated of')} action(s) "
+        f"a plan, {_sampler(evaluation['policy'])}, evaluation seed {settings.get('seed', 'not stated')}. The last "
+        "columns are the success with each kind of partner."
     )
-    return f"{about}\n\n{table(header, rows)}"
+    return f"{about}\n\n{_without_blank(header, rows)}"
+
+
+def _without_blank(header: Sequence[object], rows: Sequence[Sequence[object]]) -> str:
+    """A table without the columns that have no head."""
+    return table(compress(header, header), [compress(row, header) for row in rows])
+
+
+def _force(summary: dict[str, Any]) -> float | None:
+    return (summary.get("interaction_force") or {}).get("mean")
 
 
 def _success(success: dict[str, Any]) -> Iterable[object]:

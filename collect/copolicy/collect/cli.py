@@ -9,7 +9,7 @@ from typing import Any
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number, workers
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--workers", type=workers(), help="processes (default: one for each processor)")
     # None where a flag is not given, so that a recipe can refuse it instead of passing over it.
     command.add_argument("--seed", type=seed(), help="of the schedule and of the pilots (default 0)")
+    add_task_flag(command, given=False)
     add_maps_flag(command, "training", "map_set", given=False)
     command.add_argument(
         "--orientations", action="store_true", default=None, help="each map with four start orientations"
@@ -99,7 +100,8 @@ def _simulate(arguments: argparse.Namespace) -> dict:
     # Here and below, what a command needs is loaded by it alone: `play` opens its window before anything else.
     from .simulate.command import simulate
 
-    flags = {"--seed": "seed", "--maps": "map_set", "--orientations": "orientations", "--start-noise": "start_noise",
+    flags = {"--task": "task", "--seed": "seed", "--maps": "map_set", "--orientations": "orientations",
+             "--start-noise": "start_noise",
              "--clearance": "clearance"}  # fmt: skip
     given = {flag: getattr(arguments, name) for flag, name in flags.items() if getattr(arguments, name) is not None}
     if arguments.recipe is None:

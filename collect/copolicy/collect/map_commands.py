@@ -9,6 +9,7 @@ from typing import Any
 
 from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.flag_numbers import seed, whole_number
+from copolicy.dataset.command_line.maps_flag import add_task_flag
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import new_file, require_new
 from copolicy.dataset.scenarios import SUFFIXES, ScenarioFiles
@@ -35,7 +36,7 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
         steps, "check", _check, "say in one line each what is wrong with a file", "copolicy-collect maps check lab.yaml"
     )
     command.add_argument("file", type=Path, metavar="FILE", help="maps in YAML or JSON")
-    _add_task(command)
+    add_task_flag(command)
     command = add_command(
         steps,
         "show",
@@ -47,7 +48,7 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--out", type=Path, required=True, help="the sheet to write, a PNG")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument("--width", type=whole_number("--width", 300, 10_000), default=1800, help="px (default 1800)")
-    _add_task(command)
+    add_task_flag(command)
     command = add_command(
         steps,
         "make",
@@ -64,15 +65,11 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     command.add_argument("--name", help="of the set (default: the name of the file)")
     command.add_argument("--out", type=Path, required=True, help="the file to write, .yaml or .json")
-    _add_task(command)
+    add_task_flag(command)
     command = add_command(
         steps, "schema", _schema, "print the JSON schema of a file", "copolicy-collect maps schema > maps.schema.json"
     )
-    _add_task(command)
-
-
-def _add_task(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--task", default="table", help="of the maps (default: table)")
+    add_task_flag(command)
 
 
 def _files(task: PairTask) -> ScenarioFiles:
@@ -103,11 +100,12 @@ def _show(arguments: argparse.Namespace) -> dict[str, Any]:
         raise InvalidValueError("--out", "a name that ends with .png", str(arguments.out))
     require_new(arguments.out)
     task = get_task(arguments.task)
-    files, chosen = _files(task), task.scenario_set(arguments.maps)
+    chosen = task.scenario_set(arguments.maps)
     if arguments.orientations:
         chosen = task.turned(chosen)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    size = files.draw(chosen, arguments.out, arguments.width)
+    from .map_sheet import write_map_sheet  # pygame
+
+    size = write_map_sheet(task, chosen, arguments.out, arguments.width)
     return {**chosen.describe(), "maps": len(chosen.scenarios), "out": str(arguments.out), "size": list(size)}
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from copolicy.dataset.task_spec import RECORD_HZ
 
 DT_NS = 10**9 // RECORD_HZ
-"""Length of a step, ns."""
+"""Length of a step at the rate that tasks have by default, ns."""
 
-LATE_NS = DT_NS // 4
-"""A step that begins later than this after its time counts as late."""
+LATE = 4
+"""A step that begins later than a quarter of one after its time counts as late."""
 
 SLOW_LOOP = 1.25
 """An episode whose 99th percentile of periods exceeds this many steps is flagged."""
@@ -51,14 +51,19 @@ class Tick:
 
 
 class Ticker:
-    """30 ticks a second of the monotonic clock, for any length of time without drift.
+    """The task's ticks a second of the monotonic clock, for any length of time without drift.
 
     A tick that comes late is taken as soon as possible, and the next keeps its own time. A loop that is behind by a
     whole tick or more never catches up with two steps on one reading of the sticks: the ticks it missed are let go
     and counted, and the simulation runs behind the wall clock by so much.
+
+    Attributes:
+        dt_ns: length of a step, ns.
+        due_ns: when the next tick is due.
     """
 
-    def __init__(self, clock: Callable[[], int] = time.monotonic_ns):
+    def __init__(self, clock: Callable[[], int] = time.monotonic_ns, hz: int = RECORD_HZ):
+        self.dt_ns = 10**9 // hz
         self._clock = clock
         self.restart()
 
@@ -73,16 +78,17 @@ class Ticker:
     def tick(self) -> Tick:
         """Takes the tick that is due."""
         start = self._clock()
-        skipped = max(0, (start - self.due_ns) // DT_NS)
-        scheduled = self.due_ns + skipped * DT_NS
-        self.due_ns = scheduled + DT_NS
+        skipped = max(0, (start - self.due_ns) // self.dt_ns)
+        scheduled = self.due_ns + skipped * self.dt_ns
+        self.due_ns = scheduled + self.dt_ns
         return Tick(scheduled, start, skipped)
 
 
 class LoopStatistics:
     """How well the loop kept its time over an episode, its pauses left out."""
 
-    def __init__(self):
+    def __init__(self, hz: int = RECORD_HZ):
+        self._dt_ns = 10**9 // hz
         self._periods: list[int] = []
         self._last: Tick | None = None
         self.ticks = 0
@@ -94,7 +100,7 @@ class LoopStatistics:
         if self._last is not None:
             self._periods.append(tick.start_ns - self._last.start_ns)
             self.skipped += tick.skipped
-        self.late += tick.late_ns > LATE_NS
+        self.late += tick.late_ns > self._dt_ns // LATE
         self.ticks += 1
         self._last = tick
 
@@ -111,7 +117,7 @@ class LoopStatistics:
     @property
     def slow(self) -> bool:
         """The episode is to be flagged: a tick was skipped, or periods were too long too often."""
-        return self.skipped > 0 or self.percentile_ms(99) > SLOW_LOOP * DT_NS / 1e6
+        return self.skipped > 0 or self.percentile_ms(99) > SLOW_LOOP * self._dt_ns / 1e6
 
     def percentile_ms(self, percent: float) -> float:
         """A percentile of the periods, ms; nan before the second tick."""

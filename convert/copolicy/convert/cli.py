@@ -79,7 +79,9 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must be new")
     parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
     parser.add_argument(
-        "--fps", type=whole_number("--fps", None), help=f"frames a second, a divisor of 30 (default: {_DEFAULT_FPS})"
+        "--fps",
+        type=whole_number("--fps", None),
+        help=f"frames a second, a divisor of the recorded rate, 30 of the table (default: {_DEFAULT_FPS})",
     )
     parser.add_argument(
         "--hold", choices=get_args(Hold), default=None,

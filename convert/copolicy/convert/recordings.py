@@ -48,8 +48,7 @@ def convert_recordings(
     if workers < 1:
         raise InvalidValueError("workers", "at least 1", workers)
     files, unfinished = find_recordings(folders)
-    with contextlib.suppress(ForeignRecordingError):  # said with the other files that cannot be read
-        stride(conversion.fps, recorded_task(files[0]).spec.record_hz)
+    require_rate(conversion, files[0])
     left_out = LeftOut()
     notes: list[str] = []
     with _prepared(files, conversion, min(workers, len(files))) as results:
@@ -71,6 +70,16 @@ def convert_recordings(
         "unfinished_recordings": unfinished,
         "not_verified": notes,
     }
+
+
+def require_rate(conversion: Conversion, first: Path) -> None:
+    """Checks that the rate asked for divides that of the recordings, of which the first is looked at.
+
+    Raises:
+        InvalidValueError: it does not.
+    """
+    with contextlib.suppress(ForeignRecordingError):  # said with the other files that cannot be read
+        stride(conversion.fps, recorded_task(first).spec.record_hz)
 
 
 def noted(episodes: Iterable[PreparedEpisode], notes: list[str]) -> Iterator[PreparedEpisode]:

@@ -28,9 +28,9 @@ def stride(fps: int, record_hz: int = RECORD_HZ) -> int:
     return record_hz // fps
 
 
-def frames(steps: int, fps: int) -> int:
+def frames(steps: int, fps: int, record_hz: int = RECORD_HZ) -> int:
     """Frames that some recorded steps fill, the last one perhaps in part."""
-    return -(-steps // stride(fps))
+    return -(-steps // stride(fps, record_hz))
 
 
 def frame_states(states: np.ndarray, fps: int, record_hz: int = RECORD_HZ) -> np.ndarray:

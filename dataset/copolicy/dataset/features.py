@@ -37,6 +37,9 @@ OBSERVATION_KEYS = {"agent_pos": STATE, "environment_state": ENVIRONMENT_STATE, 
 GYM_ID = "copolicy/TableCarrying-v0"
 """Name of the environment in gymnasium's registry; importing `lerobot_policy_copolicy` registers it."""
 
+PAIR_GYM_ID = "copolicy/PairTask-v0"
+"""Name of the environment of any task, `gymnasium.make(PAIR_GYM_ID, task="peg")`."""
+
 
 def features_of(spec: TaskSpec) -> dict[str, dict[str, Any]]:
     """LeRobot's feature table of a task."""

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,14 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".yaml", ".yml", ".json")
 """Endings of scenario files."""
+
+DISPLACED = "-displaced"
+"""Ends the name of a scenario whose start alone was changed."""
+
+
+def base_name(scenario: str) -> str:
+    """The name of a scenario without what says that its start was turned (`-90deg`) or displaced."""
+    return re.sub(rf"(-\d+deg)?({DISPLACED})?$", "", scenario)
 
 
 class ScenarioName(NamedTuple):
@@ -131,14 +140,6 @@ class ScenarioFiles(ABC):
 
         Raises:
             FileFormatError: no such file, or none that can be read at all.
-        """
-
-    @abstractmethod
-    def draw(self, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
-        """Draws every scenario of a set into one PNG, whose width and height in px it returns.
-
-        Raises:
-            OutputExistsError: the file exists.
         """
 
     @abstractmethod

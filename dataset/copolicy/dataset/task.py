@@ -20,20 +20,27 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
+from .features import PAIR_GYM_ID
 from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
     RUNNING,
+    Limit,
     Outcome,
     Player,
     PolicyFeatures,
+    Rule,
     Scenario,
+    SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
+    Studies,
+    TaskRules,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
+from .task_words import TaskWords
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -45,15 +52,21 @@ __all__ = [
     "RECORD_HZ",
     "RUNNING",
     "TABLE",
+    "Limit",
     "Outcome",
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "Rule",
     "Scenario",
+    "SceneView",
     "SeatExchange",
     "Settings",
     "SimulatedPlayers",
+    "Studies",
+    "TaskRules",
     "TaskSpec",
+    "TaskWords",
     "Vector",
     "World",
     "get_task",
@@ -78,12 +91,20 @@ class PairTask(ABC):
         settings_type: class of its settings.
         exchange: how an episode looks from the other seat.
         outline: what it looks like.
+        studies: what results of studies say of it.
+        orientations: how many start orientations `turned` gives a scenario; 1: there are none.
+        invitation: title of a session's window; that of the task where empty.
+        instruction: what players read before they begin; the sentence of the task where empty.
     """
 
     spec: ClassVar[TaskSpec]
     settings_type: ClassVar[type]
     exchange: ClassVar[SeatExchange | None] = None
     outline: ClassVar[Outline | None] = None
+    studies: ClassVar[Studies] = Studies()
+    orientations: ClassVar[int] = 1
+    invitation: ClassVar[str] = ""
+    instruction: ClassVar[str] = ""
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -156,6 +177,15 @@ class PairTask(ABC):
         """Episode columns with what the vector of a scenario does not say."""
         return {}
 
+    def unseen(self, columns: Mapping[str, Any]) -> str:
+        """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
+        return ""
+
+    def unseen_in(self, episodes: Sequence[Mapping[str, Any]]) -> str:
+        """How many of some episodes, by these columns, have something that no policy sees; empty: none."""
+        found = [text for columns in episodes if (text := self.unseen(columns))]
+        return f"{len(found)} of {len(episodes)} have what no policy sees: {found[0]}" if found else ""
+
     def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
         world = self.make_world(scenario, settings)
@@ -187,6 +217,10 @@ class PairTask(ABC):
         """`(T,)` what passes between the players in states `(T, n)` under actions `(T, m)`; None: not measured."""
         return None
 
+    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+        """The same in recorded states `(T, k)`."""
+        return self.interaction(self.states_of(recorded), actions)
+
     def layout(self, scenario: Any, with_goal: bool = False) -> Hashable:
         """What scenarios share that differ in their start alone, or without `with_goal` in start and goal; sortable."""
         return scenario.digest
@@ -195,9 +229,57 @@ class PairTask(ABC):
         """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
         return ""
 
+    @property
+    def has_strategy(self) -> bool:
+        """Whether `strategy` labels episodes."""
+        return type(self).strategy is not PairTask.strategy
+
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """Id of its gymnasium environment and the arguments beside its rate, under settings that are not the usual."""
+        steps = {name: value for name, value in settings.items() if name == "step_limit"}
+        others = {name: value for name, value in settings.items() if name not in steps}
+        return PAIR_GYM_ID, {"task": self.spec.name, **steps, **({"settings": others} if others else {})}
+
+    @property
+    def words(self) -> TaskWords:
+        """How cards and pages speak of it."""
+        return TaskWords.of(self.spec)
+
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
         return None
+
+    def view(self, scenario: Any) -> SceneView | None:
+        """What draws a scenario on the screen; None: `outline` is drawn as it is."""
+        return None
+
+    @property
+    def drift_limits(self) -> Mapping[str, float]:
+        """What `drift` measures, and up to where two motions are the same: here a hundred thousandth of the bounds."""
+        vector = self.spec.recorded
+        limits = 1e-5 * (np.array(vector.high) - np.array(vector.low))
+        return dict(zip(vector.names, limits.tolist(), strict=True))
+
+    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step."""
+        return np.abs(recorded - other)
+
+    def displaced(self, scenario: Any, scale: float, rng: np.random.Generator) -> Any:
+        """A scenario that begins beside its start, by up to `scale` times what the task sees fit.
+
+        Raises:
+            InvalidValueError: the task has none.
+        """
+        raise InvalidValueError("--start-noise", "no such flag", self.missing("displaced starts"))
+
+    def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
+        """What a session balances beside scenarios, such as their starts; each scenario has as many."""
+        return ()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Rules of `check` and their limits beside the generic ones."""
+        return TaskRules()
 
     @property
     def features(self) -> PolicyFeatures:
@@ -276,6 +358,12 @@ def require_table(task: PairTask, where: Path | str) -> None:
 def installed_tasks() -> list[str]:
     """Names of the tasks that are installed, sorted."""
     return sorted({entry.name for entry in entry_points(group=ENTRY_POINTS)})
+
+
+def distribution_of(task: PairTask) -> str | None:
+    """Name of the installed package that registers a task."""
+    package = next(iter(entry_points(group=ENTRY_POINTS, name=task.spec.name))).dist
+    return None if package is None else package.name
 
 
 @functools.cache

@@ -1,10 +1,13 @@
 """What a task is made of: scenarios, settings, the world, and the parts that it may offer beside them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+
+from .outline import Point, Pose
 
 
 class Scenario(Protocol):
@@ -27,7 +30,7 @@ class Settings(Protocol):
 
     @property
     def step_limit(self) -> int:
-        """Steps after which an episode ends as a time-out."""
+        """Steps after which an episode ends with the reason `timeout`."""
         ...
 
 
@@ -98,6 +101,7 @@ class SimulatedPlayers:
         make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
         make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
         make_robot: a player from scenario, name and seed.
+        options: names of what `make_pair` takes beside these; `clearance` is behind the flag of that name.
     """
 
     pairs: Mapping[str, tuple[Any, Any]]
@@ -106,6 +110,54 @@ class SimulatedPlayers:
     make_pair: Callable[..., tuple[Player, Player]]
     make_partner: Callable[[Any, str, int], Player]
     make_robot: Callable[[Any, str, int], Player]
+    options: tuple[str, ...] = ()
+
+
+class SceneView(Protocol):
+    """What `PairTask.view` gives: draws one scenario and what moves in it on pygame surfaces of any size."""
+
+    def draw(
+        self,
+        surface: Any,
+        area: Any,
+        pose: Pose,
+        forces: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+        trail: Sequence[Pose] = (),
+    ) -> Any:
+        """Draws the scene into the middle of an area, in its own shape, and returns the rectangle that it fills.
+
+        Args:
+            surface: a `pygame.Surface`.
+            area: a `pygame.Rect`.
+            pose: of the body, see `Outline.poses`.
+            forces: of both players, see `Outline.forces`.
+            trail: earlier poses, oldest first.
+        """
+        ...
+
+    def to_screen(self, point: Point) -> Point:
+        """Where a point of the scene was drawn last, px of the surface."""
+        ...
+
+
+class Studies:
+    """The part `studies` of a task: what results of studies say of it beside what they say of any task.
+
+    Attributes:
+        step_limit: steps after which an episode of a study ends; None: as the settings of the task have it.
+        definitions: what measures are in this task, in words by their names in results.
+    """
+
+    step_limit: int | None = None
+    definitions: Mapping[str, str] = MappingProxyType({})
+
+    def factors(self, scenario: Any) -> dict[str, Any]:
+        """Columns of an episode's row; results are split by `start_theta` (rad) and `obstacles` (a count), if any."""
+        return {}
+
+    def at_rest(self, recorded: np.ndarray) -> np.ndarray | None:
+        """`(T,)` whether what is moved stands, in recorded states `(T, k)`; None: not measured."""
+        return None
 
 
 class SeatExchange(Protocol):
@@ -140,3 +192,48 @@ class PolicyFeatures:
 
     encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
     symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A number and why it is that one; `{hz}` in its unit stands for the task's steps a second."""
+
+    value: float
+    unit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule.
+
+    Attributes:
+        what: what it looks after; where `find` is None, the part that a task lacks without a rule of this name.
+        find: yields the findings of an `EpisodeTable`; None in the place of a rule that only a task can bring.
+        frames: columns of the frames that it reads.
+        columns: episode columns that it reads.
+        kinds: the kinds of data that it says something about.
+        whole: it compares episodes with each other, or says something of the files as they lie; a part of the episodes
+            is not enough to apply it.
+    """
+
+    name: str
+    what: str
+    find: Callable[[Any], Iterable[Any]] | None = None
+    frames: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ("lerobot", "recordings")
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class TaskRules:
+    """The part `rules` of a task.
+
+    Attributes:
+        rules: of its own; one with the name of a generic rule stands in its place, the others come last.
+        limits: of its own rules, and those of generic rules that it sets otherwise; None where it does without.
+    """
+
+    rules: tuple[Rule, ...] = ()
+    limits: Mapping[str, Limit | None] = field(default_factory=dict)

@@ -12,6 +12,9 @@ RECORD_HZ = 30
 
 PLAYERS = ("robot", "human")
 
+TIMEOUT = "timeout"
+"""The reason of an end by the step limit, in every task."""
+
 
 @dataclass(frozen=True)
 class Vector:

@@ -13,6 +13,8 @@ from copolicy.dataset.outline import Point, Shape, square
 from copolicy.dataset.task import RUNNING, Outcome, PairTask
 from copolicy.dataset.task_spec import TaskSpec, Vector
 
+from .players import PLAYERS
+
 LENGTH = 2.0  # m, the line from -LENGTH / 2 to LENGTH / 2
 _CLOSE, _SLOW = 0.02, 0.05  # m, m/s: the peg is at the mark
 _HZ = 20
@@ -118,7 +120,7 @@ class PegOutline:
 
 
 class PegTask(PairTask):
-    """Numbers and an outline: everything else that is optional is lacking."""
+    """Numbers, an outline and simple players: everything else that is optional is lacking."""
 
     spec = TaskSpec(
         name="peg",
@@ -134,6 +136,7 @@ class PegTask(PairTask):
     )
     settings_type = Friction
     outline = PegOutline()
+    agents = PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[Line]]:

@@ -8,14 +8,13 @@ from copolicy.dataset.command_line.commands import add_command, command_parser, 
 from copolicy.dataset.command_line.flag_numbers import whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.task import get_task
 
 from .comparison import add_compare_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
 from .result_file import write_json
-from .study_flags import add_study_flags, policy_of, protocol_of, study_needs, study_settings
+from .study_flags import add_study_flags, learned_task, policy_of, protocol_of, study_needs, study_settings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,14 +49,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _coplan(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
-    chosen = get_task().scenario_set(arguments.maps)
+    task = learned_task(arguments.policy)
+    chosen = task.scenario_set(arguments.maps)
     if arguments.orientations:
-        chosen = get_task().turned(chosen)
+        chosen = task.turned(chosen)
     maps = chosen.scenarios[: arguments.limit]
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .coplan.figure import save_trajectories
     from .coplan.rollouts import coplan
-    from .summary import summarise
+    from .summary import not_measured, percent, summarise
 
     policy = policy_of(arguments.policy, arguments)
     protocol = protocol_of(arguments, [(str(arguments.policy), policy.conditions)])
@@ -83,23 +83,26 @@ def _coplan(arguments: argparse.Namespace) -> dict:
             "map_count": len(maps),
             "complete_set": arguments.limit is None,
             "repeats": arguments.repeats,
-            **study_settings(arguments, protocol),
+            **study_settings(arguments, protocol, maps),
         },
         "summary": summary,
+        **not_measured(task, summary),
         "episodes": [outcome.to_json() for outcome in outcomes],
     }
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    success = summary["success"]
-    percent = f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %"
-    save_trajectories(outcomes, picture, f"co-planning on {chosen.label}: {percent} of {success['episodes']} episodes")
+    success, force = summary["success"], summary["interaction_force"]
+    title = f"co-planning on {chosen.label}: {percent(success)} of {success['episodes']} episodes"
+    if task.outline is not None:
+        save_trajectories(outcomes, picture, title)
     write_json(arguments.out, result)  # last, so that a result is there whole or not at all
     return {
-        "success": percent,
+        "success": percent(success),
         "episodes": success["episodes"],
         "ended_by": summary["ended_by"],
         "time_to_completion_s": summary["time_to_completion_s"]["mean"],
-        "interaction_force": summary["interaction_force"]["mean"],
+        **({} if force is None else {"interaction_force": force["mean"]}),
         "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
         "result": str(arguments.out),
-        "picture": str(picture),
+        "picture": str(picture) if task.outline is not None else task.missing("outline"),
+        **not_measured(task, summary),
     }

@@ -23,7 +23,7 @@ from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.task import TABLE, get_task
+from copolicy.dataset.task import PairTask, get_task
 
 _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
@@ -73,7 +73,9 @@ class Checkpoint:
         self.fps = self.conditions.fps
         register_third_party_plugins()
         try:
-            self.policy, self._preprocess, self._postprocess = _loaded(folder, device, settings or {})
+            self.policy, self._preprocess, self._postprocess = _loaded(
+                folder, device, settings or {}, get_task(self.conditions.task)
+            )
         except CopolicyError:
             raise
         except Exception as error:
@@ -82,7 +84,7 @@ class Checkpoint:
             ) from error
         self.weights_sha256 = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
         self._config: Any = self.policy.config
-        self.task: str = getattr(self._config, "task", None) or TABLE
+        self.task = self.conditions.task
         self.name = f"policy:{self._config.type}-{self.weights_sha256[:8]}"
         indices = self._config.observation_delta_indices
         self._indices = None if indices is None else [index - 1 for index in indices if index <= 0]
@@ -185,7 +187,7 @@ class Checkpoint:
                     _set_random_state(device, state)
 
 
-def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+def _loaded(folder: Path, device: str, settings: Mapping[str, Any], task: PairTask) -> tuple[Any, Any, Any]:
     config: Any = PreTrainedConfig.from_pretrained(folder)
     config.device = device
     config.pretrained_path = folder
@@ -198,7 +200,6 @@ def _loaded(folder: Path, device: str, settings: Mapping[str, Any]) -> tuple[Any
     if unknown := sorted(set(config.input_features) - set(_OBSERVATIONS)):
         expected = f"a policy that observes {', '.join(_OBSERVATIONS)} at most"
         raise FileFormatError(folder, expected, f"one that also needs {', '.join(unknown)}")
-    task = get_task(getattr(config, "task", None) or TABLE)
     size, feature = len(task.spec.joint_action), config.action_feature
     if feature is None or tuple(feature.shape) != (size,):
         found = "none" if feature is None else f"actions of {tuple(feature.shape)}"

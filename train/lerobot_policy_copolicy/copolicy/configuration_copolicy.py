@@ -100,6 +100,7 @@ class CopolicyConfig(PreTrainedConfig):
     fps: float | None = None  # frames a second of the training data, filled in from them; an action is held as long
     physics: dict[str, float] | None = None  # of the training episodes, where they share them; filled in from them
     physics_mixture: dict[str, int] = field(default_factory=dict)  # episodes by physics (JSON), where they differ
+    unseen: str = ""  # what of the training episodes no policy sees, such as differing sizes; filled in from them
 
     normalization_mapping: dict[str, NormalizationMode] = field(default_factory=_identity)  # fixed, see above
 

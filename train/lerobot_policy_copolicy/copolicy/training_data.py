@@ -9,21 +9,22 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Collection
+from dataclasses import asdict, replace
 from typing import Any
 
 from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.task import PairTask, get_task
 from copolicy.train.episode_choice import excluded_episodes, require_episode_columns
 from copolicy.train.finite_data import mended_statistics, require_finite_frames
 from copolicy.train.memory_training import CheckedStream
 
-from ..env.configuration_table_carrying import TableCarryingEnvConfig
+from ..env.configuration import PairTaskEnvConfig
 from .callers import data_sets_of_callers, environment_of_callers
 from .configuration_copolicy import CopolicyConfig
 
 _PHYSICS = "physics"
-_LIMIT = "angular_acceleration_limit"
 _FREE = "step_limit"  # how long an episode may last is no property of the dynamics
 
 
@@ -60,7 +61,7 @@ def prepare_training(config: CopolicyConfig, meta: Any) -> frozenset[int]:
 
 
 def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[int] | None) -> None:
-    """Writes the rate of the data, and the physics of their episodes, into the configuration of a policy.
+    """Writes the rate of the data, the physics of their episodes, and what of these no policy sees, into its settings.
 
     Args:
         episodes: that are trained on; None for all.
@@ -76,6 +77,9 @@ def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[in
         logging.warning("The policy learned under other physics before: %s; these data: %s", config.physics, physics)
     config.physics = physics
     config.physics_mixture = dict(counts) if len(counts) > 1 else {}
+    config.unseen = _unseen(get_task(config.filled.task), meta, episodes)
+    if config.unseen:
+        logging.warning("Of the episodes to train on, %s", config.unseen)
     if len(known) > 1:
         logging.warning(
             "The episodes were recorded under different physics, which the checkpoint records as a mixture: %s",
@@ -84,23 +88,46 @@ def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[in
 
 
 def require_same_rate(config: CopolicyConfig) -> None:
-    """Refuses an environment of the task that plays the policy's actions at another rate than they were learned at.
+    """Refuses an environment of another task, or one that plays actions at another rate than they were learned at.
+
+    Says where its settings differ from those that the policy learned under, and what of its scenarios no policy sees.
 
     Raises:
-        InvalidValueError: `--env.fps` differs from the rate that the checkpoint records.
+        InvalidValueError: task or `--env.fps` differ from what the checkpoint records.
     """
     environment = environment_of_callers()
-    if not isinstance(environment, TableCarryingEnvConfig):
+    if not isinstance(environment, PairTaskEnvConfig):
         return
+    task = environment.pair_task
+    if config.task != task.spec.name:
+        raise InvalidValueError("--env.task", f"{config.task}, the task that the policy learned", task.spec.name)
     if config.fps is not None and environment.fps != config.fps:
         expected = f"{config.fps:g}, the frames a second of the data that the policy learned from"
         raise InvalidValueError("--env.fps", expected, environment.fps)
-    limit = (config.physics or {}).get(_LIMIT)
-    if limit is not None and not math.isclose(limit, environment.angular_acceleration_limit):
-        logging.warning(
-            "The policy learned under an angular acceleration limit of %.4g rad/s^2; the environment has %.4g "
-            "(--env.angular_acceleration_limit)", limit, environment.angular_acceleration_limit,
-        )  # fmt: skip
+    settings = asdict(environment.physics)
+    learned = {name: value for name, value in (config.physics or {}).items() if name in settings}
+    if any(not math.isclose(value, settings[name]) for name, value in learned.items()):
+        there = replace(environment.physics, **learned)
+        words = task.settings_summary(there), task.settings_summary(environment.physics)
+        logging.warning("The policy learned under %s; the environment has %s", *words)
+    if unseen := task.unseen_in([task.columns_of(scenario) for scenario in environment.scenarios]):
+        logging.warning("Of the maps of the environment, %s", unseen)
+
+
+def _unseen(task: PairTask, meta: Any, episodes: Collection[int] | None) -> str:
+    """See `PairTask.unseen_in`."""
+    scenario = next(iter(scenarios[0] for scenarios in task.scenario_sets.values() if scenarios), None)
+    table = meta.episodes
+    names = [name for name in task.columns_of(scenario) if name in table.column_names] if table and scenario else []
+    if not names:
+        return ""
+    numbers, rows = table["episode_index"], zip(*(table[name] for name in names), strict=True)
+    chosen = [
+        dict(zip(names, row, strict=True))
+        for episode, row in zip(numbers, rows, strict=True)
+        if episodes is None or episode in episodes
+    ]
+    return task.unseen_in(chosen)
 
 
 def _physics(meta: Any, episodes: Collection[int] | None) -> Counter[str]:

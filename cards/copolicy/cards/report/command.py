@@ -14,6 +14,7 @@ from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.meta_files import CHECK_FILE
 from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.outline_figure import BLUE, GREEN, ORANGE, SKY
 
 from ..artefacts import KeptFindings, kept_findings, stored_statistics
 
@@ -22,8 +23,8 @@ REPORT_NAME = "report.html"
 
 SCRIPTS = (
     "elements.js",
-    "palette.js",
     "data.js",
+    "palette.js",
     "scene.js",
     "filters.js",
     "overview.js",
@@ -39,6 +40,10 @@ SCRIPTS = (
     "main.js",
 )
 """In the order in which they run; they share one scope."""
+
+_PALETTE = " ".join(
+    f"--{name}: {paint};" for name, paint in (("blue", BLUE), ("orange", ORANGE), ("green", GREEN), ("sky", SKY))
+)
 
 
 def add_report_command(commands: argparse._SubParsersAction) -> None:
@@ -102,15 +107,35 @@ def render_page(payload: dict[str, Any]) -> str:
     script = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
     # Inside a script element only "</" and "<!--" could end the data; JSON may spell "<" as an escape.
     data = json.dumps(_plain(payload), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {
-        "{{title}}": escape(payload["title"]),
-        "{{style}}": folder.joinpath("report.css").read_text(encoding="utf-8"),
-        "{{script}}": f'(() => {{\n"use strict";\n{script}\n}})();',
-        "{{data}}": data,
+    parts = {name: escape(text) for name, text in _texts(payload).items()} | {
+        "style": f":root {{ {_PALETTE} }}\n{folder.joinpath('report.css').read_text(encoding='utf-8')}",
+        "script": f'(() => {{\n"use strict";\n{script}\n}})();',
+        "data": data,
     }
     template = folder.joinpath("template.html").read_text(encoding="utf-8")
     # One pass: what is put in is not searched again.
-    return re.sub(r"\{\{\w+\}\}", lambda match: parts[match[0]], template)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+
+
+def _texts(payload: dict[str, Any]) -> dict[str, str]:
+    """What the template says in the words of the task."""
+    words, lacking, outline = payload["words"], payload["left_out"], payload["outline"]
+    labels, end = words["labels"][1], f"an end {words['failure'].removeprefix('ended ')}"
+    coloured = "" if "labels" in lacking else f", coloured by {words['label_class']}{labels and f': {labels}'}"
+    starts = any(shape["role"] == "start" for scene in payload["scenes"] for shape in scene["shapes"])
+    marks = f"A circle marks the start, a cross {end}." if starts else f"A cross marks {end}."
+    plain = {name: words[name] for name in ("body", "interaction_unit", "scenario", "scenarios", "scene")}
+    interaction = words["interaction"].capitalize()
+    return {
+        **plain,
+        "title": payload["title"],
+        "labels": f"{words['label'].capitalize()}s",
+        "paths": f"{words['body']}{coloured}. {marks}",
+        "unit": outline["unit"] if outline else "",
+        "Interaction": interaction,
+        "interaction_note": "" if "interaction" in lacking else words["interaction_note"],
+        "graph": "Both players' forces" if "interaction" in lacking else f"{interaction} and both players' forces",
+    }
 
 
 def _plain(value: Any) -> Any:

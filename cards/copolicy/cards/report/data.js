@@ -2,16 +2,19 @@
 
 const data = JSON.parse(byId("data").textContent);
 const COLUMNS = Object.keys(data.scales);
-const WIDTH = data.window[0];
-const HEIGHT = data.window[1];
+const OUTLINE = data.outline;
+const [WIDTH, HEIGHT] = OUTLINE ? OUTLINE.size : [1200, 600];
+const UNIT = WIDTH / 1200; // of lines and marks in a scene
+const WORDS = data.words;
+const MISSING = data.left_out; // why something is not on the page, by what the task lacks
 const FRAME_SECONDS = data.frame_step / data.fps;
 
 const frameValues = decodeFrames(data.frames);
-const sides = new Set(data.episodes.flatMap((row) => row.map.sizes));
 const episodes = data.episodes.map((row) => ({
   ...row,
-  layout: layoutName(row.map),
-  outcome: row.success ? "reached the goal" : "did not",
+  scene: OUTLINE ? data.scenes[row.scene] : { name: "", obstacles: 0, shapes: [] },
+  layout: OUTLINE ? data.scenes[row.scene].name : "",
+  outcome: row.success ? WORDS.success : "did not",
 }));
 
 /** Little-endian 16-bit integers from base64. */
@@ -31,13 +34,16 @@ function column(episode, name) {
   return values;
 }
 
-function layoutName({ obstacles, sizes }) {
-  if (!obstacles.length) return "no obstacle";
-  const places = obstacles.map(([x, y]) => `(${x.toFixed(0)}, ${y.toFixed(0)})`).join(" ");
-  const own = [...new Set(sizes)].length > 1 ? sizes : sizes.slice(0, 1);
-  const wide = sides.size > 1 ? ` of ${own.join(", ")} px` : "";
-  return `${obstacles.length} obstacle${obstacles.length > 1 ? "s" : ""}${wide} at ${places}`;
-}
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Those of some entries, each with what the task must not lack before it, that are there. */
+const offered = (entries) => entries.filter(([part]) => !MISSING[part]).map(([, entry]) => entry);
+
+/** A paragraph with why something is left out. */
+const absent = (part) => make("p", { class: "absent" }, MISSING[part]);
+
+/** A place in the scene in words. */
+const placeText = (value) => value.toFixed(OUTLINE.decimals);
 
 /** Members of a list by the value of a function, in order of appearance. */
 function groupBy(list, key) {

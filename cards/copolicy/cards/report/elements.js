@@ -22,6 +22,13 @@ function fill(node, attributes, children) {
   return node;
 }
 
+/** Words beside a patch of a colour. */
+function paintKey(text, paint) {
+  const key = make("span", { class: "key" }, text);
+  key.style.setProperty("--key", paint);
+  return key;
+}
+
 /** A canvas of `width` x `height` CSS px with sharp pixels on any screen; returns its context in CSS px. */
 function sharpContext(canvas, width, height) {
   const ratio = window.devicePixelRatio || 1;

@@ -1,18 +1,18 @@
 /** The sortable table of the chosen episodes. */
 
-const TABLE_COLUMNS = [
-  ["episode_index", "#"],
-  ["pair_id", "Pair"],
-  ["source", "Source"],
-  ["map_id", "Map"],
-  ["route_class", "Route"],
-  ["termination_reason", "Ended by"],
-  ["duration_s", "Duration, s"],
-  ["force_mean", "Force, mean"],
-  ["force_p95", "Force, 95 %"],
-  ["replay_drift_px", "Drift, px"],
-  ["quality_flags", "Flags"],
-];
+const TABLE_COLUMNS = offered([
+  ["", ["episode_index", "#"]],
+  ["", ["pair_id", "Pair"]],
+  ["", ["source", "Source"]],
+  ["", ["map_id", capital(WORDS.scenario)]],
+  ["labels", ["route_class", capital(WORDS.label)]],
+  ["", ["termination_reason", "Ended by"]],
+  ["", ["duration_s", "Duration, s"]],
+  ["interaction", ["force_mean", "Force, mean"]],
+  ["interaction", ["force_p95", "Force, 95 %"]],
+  ["drift", ["replay_drift_px", `Drift, ${OUTLINE?.unit}`]],
+  ["", ["quality_flags", "Flags"]],
+]);
 const NUMBERS = new Set(["duration_s", "force_mean", "force_p95", "replay_drift_px"]);
 const PAGE = 25;
 const order = { name: "episode_index", falling: false };
@@ -69,7 +69,7 @@ function episodeRow(episode) {
   const open = make("button", { type: "button", class: "link", "aria-label": `Open ${episodeName(episode)}` }, String(episode.episode_index));
   const cells = TABLE_COLUMNS.slice(1).map(([name]) => {
     if (name === "quality_flags") return make("td", {}, flags(episode));
-    if (name === "route_class") return make("td", {}, routeKey(episode.route_class));
+    if (name === "route_class") return make("td", {}, paintKey(episode.route_class || "–", labelColour(episode.route_class)));
     if (name === "termination_reason") {
       const reason = String(episode[name]).replaceAll("_", " ");
       return make("td", { class: episode.success ? "" : "failed" }, `${episode.success ? "✓" : "✗"} ${reason}`);
@@ -82,10 +82,4 @@ function episodeRow(episode) {
 
 function flags(episode) {
   return [episode.discarded ? "discarded" : "", episode.quality_flags ?? ""].filter(Boolean).join(", ") || "–";
-}
-
-function routeKey(word) {
-  const key = make("span", { class: "key" }, word || "–");
-  key.style.setProperty("--key", routeColour(word));
-  return key;
 }

@@ -1,12 +1,12 @@
 /** The bar that chooses episodes; every section shows the chosen ones. */
 
 const FILTERS = [
-  ["source", "Source", "source"],
-  ["map_set", "Map set", "map_set"],
-  ["layout", "Obstacles", "layout"],
-  ["pair_id", "Pair", "pair_id"],
-  ["route_class", "Route", "route_class"],
-  ["outcome", "Result", "outcome"],
+  ["source", "Source"],
+  ["map_set", `${capital(WORDS.scenario)} set`],
+  ["layout", "Obstacles"],
+  ["pair_id", "Pair"],
+  ["route_class", capital(WORDS.label)],
+  ["outcome", "Result"],
 ];
 
 let selection = episodes;
@@ -14,7 +14,7 @@ let selection = episodes;
 /** Builds the bar; `changed` is called with the chosen episodes after each change. */
 function setUpFilters(changed) {
   const form = byId("filters");
-  const search = make("input", { type: "search", id: "filter-text", placeholder: "pair, map, uuid, flag …" });
+  const search = make("input", { type: "search", id: "filter-text", placeholder: `pair, ${WORDS.scenario}, uuid, flag …` });
   form.append(make("label", { class: "grow" }, "Find ", search));
   for (const [name, label] of FILTERS) {
     const values = distinct(name);

@@ -1,16 +1,21 @@
-/** Where the table was, and where the players worked against each other. */
+/** Where the body was, and where the players worked against each other. */
 
 let heat = null;
 
 function setUpHeatmaps() {
+  if (!OUTLINE) return byId("heat-figures").replaceChildren(absent("outline"));
+  if (MISSING.interaction) byId("heat-force-figure").replaceChildren(absent("interaction"));
+  const options = [60, 40, 20].map((cells) => make("option", { value: WIDTH / cells, selected: cells === 40 }, formatNumber(WIDTH / cells)));
+  byId("heat-cell").replaceChildren(...options);
   for (const id of ["heat-layout", "heat-cell"]) byId(id).addEventListener("input", () => showHeatmaps(selection));
-  for (const [id, name] of [["heat-visits", "visits"], ["heat-force", "force"]]) {
+  for (const [id, name] of offered([["outline", ["heat-visits", "visits"]], ["interaction", ["heat-force", "force"]]])) {
     byId(id).addEventListener("pointermove", (event) => readHeat(event, name));
     byId(id).addEventListener("pointerleave", () => { byId("heat-readout").textContent = ""; });
   }
 }
 
 function showHeatmaps(chosen) {
+  if (!OUTLINE) return;
   const select = byId("heat-layout");
   const kept = select.value;
   const layouts = [...groupBy(chosen, (episode) => episode.layout).keys()].sort((a, b) => a.length - b.length || a.localeCompare(b));
@@ -21,25 +26,27 @@ function showHeatmaps(chosen) {
   heat = accumulate(members, Number(byId("heat-cell").value));
   const visits = ordered([...heat.counts].filter((count) => count > 0));
   const most = visits.length ? visits[visits.length - 1] : 1;
-  const forces = ordered([...heat.counts].map((count, k) => (count ? heat.sums[k] / count : null)));
-  const strongest = quantile(forces, 0.99) || 1;
   const visitShare = (count) => (most > 1 ? Math.log(count) / Math.log(most) : 1);
   drawHeat(byId("heat-visits"), members, (k) => visitShare(heat.counts[k]),
     `Visitation of ${members.length} episodes; the most visited cell holds ${formatNumber(most * FRAME_SECONDS)} s`);
-  drawHeat(byId("heat-force"), members, (k) => heat.sums[k] / heat.counts[k] / strongest,
-    `Mean interaction force of ${members.length} episodes; 99 % of cells are below ${formatNumber(strongest)}`);
   showScale("heat-visits-scale", `${formatNumber(FRAME_SECONDS)} s`, `${formatNumber(most * FRAME_SECONDS)} s`);
+  if (MISSING.interaction) return;
+  const forces = ordered([...heat.counts].map((count, k) => (count ? heat.sums[k] / count : null)));
+  const strongest = quantile(forces, 0.99) || 1;
+  drawHeat(byId("heat-force"), members, (k) => heat.sums[k] / heat.counts[k] / strongest,
+    `Mean ${WORDS.interaction} of ${members.length} episodes; 99 % of cells are below ${formatNumber(strongest)}`);
   showScale("heat-force-scale", "0", `${formatNumber(strongest)} and more`);
 }
 
-/** Frames and sums of the size of the interaction force in each cell. */
+/** Frames and sums of the size of the interaction measure in each cell. */
 function accumulate(members, cell) {
-  const columns = Math.ceil(WIDTH / cell);
-  const rows = Math.ceil(HEIGHT / cell);
+  const columns = Math.round(WIDTH / cell);
+  const rows = Math.ceil(HEIGHT / cell - 1e-9);
   const counts = new Float64Array(columns * rows);
   const sums = new Float64Array(columns * rows);
   for (const episode of members) {
-    const [xs, ys, forces] = ["x", "y", "interaction"].map((name) => column(episode, name));
+    const [xs, ys] = ["x", "y"].map((name) => column(episode, name));
+    const forces = MISSING.interaction ? [] : column(episode, "interaction");
     for (let k = 0; k < xs.length; k++) {
       const i = Math.min(columns - 1, Math.max(0, Math.floor(xs[k] / cell)));
       const j = Math.min(rows - 1, Math.max(0, Math.floor(ys[k] / cell)));
@@ -52,29 +59,14 @@ function accumulate(members, cell) {
 
 function drawHeat(canvas, members, share, label) {
   canvas.setAttribute("aria-label", label);
-  const width = canvas.clientWidth || 480;
-  const context = sharpContext(canvas, width, (width * HEIGHT) / WIDTH);
-  context.scale(width / WIDTH, width / WIDTH);
-  context.fillStyle = colour("--floor");
-  context.fillRect(0, 0, WIDTH, HEIGHT);
+  const context = sceneContext(canvas, canvas.clientWidth || 480);
   heat.counts.forEach((count, k) => {
     if (!count) return;
     context.fillStyle = heatColour(share(k));
-    context.fillRect((k % heat.columns) * heat.cell, Math.floor(k / heat.columns) * heat.cell, heat.cell + 0.5, heat.cell + 0.5);
+    context.fillRect((k % heat.columns) * heat.cell, Math.floor(k / heat.columns) * heat.cell, heat.cell + 0.5 * UNIT, heat.cell + 0.5 * UNIT);
   });
-  context.lineWidth = 3;
-  for (const [, some] of groupBy(members, (episode) => episode.layout)) {
-    some[0].map.obstacles.forEach(([x, y], k) => {
-      const side = some[0].map.sizes[k];
-      context.strokeStyle = colour("--ink");
-      context.strokeRect(x - side / 2, y - side / 2, side, side);
-    });
-  }
-  context.strokeStyle = GOAL_COLOUR;
-  for (const goal of new Set(members.map((episode) => String(episode.map.goal)))) {
-    const [x, y] = goal.split(",").map(Number);
-    context.strokeRect(x - data.goal_size / 2, y - data.goal_size / 2, data.goal_size, data.goal_size);
-  }
+  drawFixed(context, members, "obstacle", [null, colour("--ink")]);
+  drawFixed(context, members, "goal", [null, GOAL_COLOUR]);
 }
 
 function showScale(id, low, high) {
@@ -89,5 +81,5 @@ function readHeat(event, name) {
   const k = Math.floor(y / heat.cell) * heat.columns + Math.floor(x / heat.cell);
   const count = heat.counts[k] ?? 0;
   const value = name === "visits" ? `${formatNumber(count * FRAME_SECONDS)} s` : count ? formatNumber(heat.sums[k] / count) : "never visited";
-  byId("heat-readout").textContent = `x ${Math.round(x)}, y ${Math.round(y)} px: ${value}`;
+  byId("heat-readout").textContent = `x ${placeText(x)}, y ${placeText(y)} ${OUTLINE.unit}: ${value}`;
 }

@@ -1,4 +1,4 @@
-/** One row a pair: success, duration, interaction force and routes side by side. */
+/** One row a pair: success, duration, interaction and sides passed, beside each other. */
 
 function showPairs(chosen) {
   const groups = [...groupBy(chosen, (episode) => episode.pair_id ?? "")].sort((a, b) =>
@@ -19,11 +19,14 @@ function showPairs(chosen) {
       make("td", { class: "number" }, String(members.length)),
       make("td", { class: "plotted" }, intervalPlot(successes, members.length), make("small", {}, percent(successes / members.length))),
       make("td", { class: "plotted" }, boxPlot(members.map((e) => e.duration_s), durations), make("small", {}, `${formatNumber(middle(members, "duration_s"))} s`)),
-      make("td", { class: "plotted" }, boxPlot(members.map((e) => e.force_mean), forces), make("small", {}, formatNumber(middle(members, "force_mean")))),
-      make("td", {}, sideBar(members)),
+      ...offered([
+        ["interaction", make("td", { class: "plotted" }, boxPlot(members.map((e) => e.force_mean), forces), make("small", {}, formatNumber(middle(members, "force_mean"))))],
+        ["labels", make("td", {}, sideBar(members))],
+      ]),
     );
   });
-  const heads = ["Pair", "Source", "Episodes", "Success", "Duration, s", "Interaction force", "Sides passed (L, R)"];
+  const heads = ["Pair", "Source", "Episodes", "Success", "Duration, s"];
+  heads.push(...offered([["interaction", capital(WORDS.interaction)], ["labels", data.sides ? "Sides passed (L, R)" : capital(WORDS.label)]]));
   byId("pair-table").replaceChildren(
     make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
     make("tbody", {}, ...rows),
@@ -60,10 +63,14 @@ function boxPlot(values, [from, to]) {
   );
 }
 
-/** On which side the pair carried the table past all its obstacles. */
+/** On which side of all its obstacles the pair passed; of other labels than such words, how many had which. */
 function sideBar(members) {
+  if (!data.sides) {
+    const groups = [...groupBy(members, (episode) => episode.route_class ?? "")];
+    return shareBar("", groups.map(([label, some]) => [label || "none", some.length, labelColour(label)]), members.length);
+  }
   const letters = members.map((episode) => episode.route_class ?? "").join("");
   const left = [...letters].filter((letter) => letter === "L").length;
   if (!letters) return make("small", {}, "no obstacles");
-  return shareBar("", [["L", left, ROUTE_COLOURS[0]], ["R", letters.length - left, ROUTE_COLOURS[1]]], letters.length);
+  return shareBar("", [["L", left, data.colours.sides[0]], ["R", letters.length - left, data.colours.sides[1]]], letters.length);
 }

@@ -1,17 +1,13 @@
-/** Colours: Okabe and Ito's palette, told apart with every kind of colour vision, and light or dark around it. */
+/** Colours: those of figures, which come with the data, and light or dark around them. */
 
-const ROUTE_COLOURS = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#A89B00", "#8C8C8C"];
-const SEAT_COLOURS = ["#0072B2", "#E69F00"]; // robot seat (triangle), human seat (circle)
-const GOAL_COLOUR = "#009E73";
-const FAILURE_COLOUR = "#D55E00";
+const SEAT_COLOURS = data.colours.seats; // robot, human
+const GOAL_COLOUR = data.colours.goal;
+const FAILURE_COLOUR = data.colours.failure;
 // Cividis (Nunez, Anderton and Renslow 2018), from low to high.
 const CIVIDIS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838"];
 
-/** Colour of a side word: routes of the same obstacles never share one. */
-function routeColour(word) {
-  if (!word) return colour("--muted");
-  return ROUTE_COLOURS[parseInt(word.replaceAll("L", "0").replaceAll("R", "1"), 2) % ROUTE_COLOURS.length];
-}
+/** Colour of a strategy label: labels of the same obstacles never share one. */
+const labelColour = (label) => data.colours.labels[label] ?? colour(MISSING.labels ? "--link" : "--muted");
 
 /** A colour of the style sheet as it is now. */
 function colour(name) {

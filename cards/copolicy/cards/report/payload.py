@@ -1,31 +1,46 @@
-"""The data inside the page: episodes as JSON, their frames as 16-bit integers in base64."""
+"""The data inside the page: episodes as JSON, their frames as 16-bit integers in base64, and the words of the task."""
 
 import base64
 import math
+from collections.abc import Iterable
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EPISODE_COLUMNS
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.map_config import WINDOW
-from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.dataset.outline import Outline, Shape
+from copolicy.dataset.outline_figure import (
+    BLUE,
+    FAILURE,
+    GOAL,
+    HUMAN,
+    ORANGE,
+    ROBOT,
+    decimals,
+    label_colours,
+    obstacles_of,
+)
 
 from ..artefacts import KeptFindings, estimates, statistics_doubt
+from ..dataset_card import source_text
 from ..facts import DatasetFacts
 from ..frames import EpisodeFrames, read_frames
+from ..markdown import left_out
 from ..routes import route_statistics
 
 FRAME_SCALES = {
     "x": 20, "y": 20, "theta": 10_000,
     "robot_fx": 32_000, "robot_fy": 32_000, "human_fx": 32_000, "human_fy": 32_000, "interaction": 20_000,
 }  # fmt: skip
-"""Integers in one unit of each column: a step is 0.05 px, 0.1 mrad, 1/32,000 of a full force."""
+"""Integers in one unit of each column, in a scene of 1,200 px: a step is 0.05 px, 0.1 mrad, 1/32,000 of a force."""
 
 FRAME_BYTES = 6_000_000
 """Frames take at most this much of the page; a larger data set shows every second, third, ... frame."""
 
+_SCENE = 1200
+_LARGEST = 32_767
 _COLUMNS = (*(name for name in EPISODE_COLUMNS if name != "physics"), "episode_index", "length")
 
 
@@ -45,49 +60,62 @@ def build_payload(
     Raises:
         FileFormatError: the frames cannot be read.
     """
+    outline, spec, words = facts.task.outline, facts.task.spec, facts.words
     step = max(1, math.ceil(facts.info["total_frames"] * 2 * len(FRAME_SCALES) / frame_bytes))
+    missing = {} if outline else {"outline": left_out(facts.task, "outline")}
+    if not facts.task.has_strategy:
+        missing["labels"] = left_out(facts.task, "strategy labels")
     blocks: list[np.ndarray] = []
     rows: list[dict[str, Any]] = []
+    scenes: dict[tuple[Shape, ...], int] = {}
     start = 0
     for episode, frames in zip(facts.episodes, read_frames(facts), strict=True):
-        block = _quantised(frames)[::step]
-        size = np.abs(frames.interaction)
-        config = frames.map_config
-        rows.append(
-            {name: _finite(episode[name]) for name in _COLUMNS}
-            | {
-                "map": {
-                    "start": config.start,
-                    "goal": config.goal,
-                    "obstacles": [centre for centre, _ in config.layout],
-                    "sizes": [size for _, size in config.layout],
-                },
-                "from": start,
-                "frames": len(block),
-                "force_mean": float(size.mean()),
-                "force_p95": float(np.quantile(size, 0.95)),
-            }
-        )
+        interaction = frames.interaction
+        block = _block(frames, outline, interaction)[::step]
+        row = {name: _finite(episode[name]) for name in _COLUMNS} | {"from": start, "frames": len(block)}
+        if outline is not None:
+            row["scene"] = scenes.setdefault(outline.fixed(frames.scenario), len(scenes))
+        if interaction is not None:
+            size = np.abs(interaction)
+            row |= {"force_mean": float(size.mean()), "force_p95": float(np.quantile(size, 0.95))}
+        elif not rows:
+            missing["interaction"] = left_out(facts.task, "interaction measure")
+        if not rows and facts.task.path(frames.states) is None:
+            missing["drift"] = left_out(facts.task, "path by which a re-simulation is compared")
+        rows.append(row)
         blocks.append(block)
         start += len(block)
     routes = None if statistics is None else route_statistics(statistics)
+    labels = {label for entry in (routes.configurations if routes else ()) for label in entry["counts"]}
+    labels |= set(facts.counts("route_class"))
+    scales, integers = _quantised(np.concatenate(blocks), outline, "interaction" not in missing)
     return {
         "title": title,
         "software": f"copolicy {version('lerobot_policy_copolicy')}",
         "format": facts.info["codebase_version"],
         "fps": facts.info["fps"],
-        "record_hz": RECORD_HZ,
+        "record_hz": spec.record_hz,
         "frame_step": step,
-        "window": WINDOW,
-        "goal_size": GOAL_SIZE,
-        "scales": FRAME_SCALES,
+        "words": asdict(words),
+        "left_out": missing,
+        "sources": {source: source_text(source, words, page=True) for source in facts.counts("source")},
+        "successes": spec.successes,
+        "failures": [reason for reason in spec.reasons if reason not in (*spec.successes, "timeout")],
+        "sides": all(set(label) <= {"L", "R"} for label in labels),
+        "colours": {
+            "labels": {label: paint for label, paint in label_colours(labels).items() if label},
+            "seats": [ROBOT, HUMAN], "sides": [BLUE, ORANGE], "goal": GOAL, "failure": FAILURE,
+        },
+        "outline": None if outline is None else _drawn(outline),
+        "scenes": [] if outline is None else _scenes(outline, scenes),
+        "scales": scales,
         "episodes": rows,
-        "frames": base64.b64encode(np.concatenate(blocks).astype("<i2").tobytes()).decode(),
+        "frames": base64.b64encode(integers.astype("<i2").tobytes()).decode(),
         "check": None if findings is None else _check(findings),
         "statistics": None if statistics is None else estimates(statistics),
         "statistics_doubt": statistics_doubt(statistics or {}, len(facts.episodes)),
         "routes": None if routes is None else routes.to_json(),
-    }
+    }  # fmt: skip
 
 
 def _check(findings: KeptFindings) -> dict[str, Any]:
@@ -96,11 +124,59 @@ def _check(findings: KeptFindings) -> dict[str, Any]:
     return {**kept, "state": findings.validity.state, "reason": findings.validity.reason}
 
 
-def _quantised(frames: EpisodeFrames) -> np.ndarray:
-    """`(T, 8)` integers, columns in the order of `FRAME_SCALES`."""
-    theta = (frames.theta + math.pi) % (2 * math.pi) - math.pi
-    table = np.column_stack((frames.states[:, :2], theta, frames.actions, frames.interaction))
-    return np.clip(np.rint(table * list(FRAME_SCALES.values())), -32_768, 32_767).astype(np.int16)
+def _drawn(outline: Outline) -> dict[str, Any]:
+    """The outline without what differs between episodes."""
+    body = [_polygon(outline, shape) for shape in outline.body]
+    plain = {name: getattr(outline, name) for name in ("size", "unit", "arrow", "hands")}
+    return {**plain, "body": body, "decimals": decimals(outline)}
+
+
+def _polygon(outline: Outline, shape: Shape) -> dict[str, Any]:
+    digits = decimals(outline) + 2
+    return {"role": shape.role, "corners": [[round(x, digits), round(y, digits)] for x, y in shape.corners]}
+
+
+def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[str, Any]]:
+    """What stands still, and where its obstacles are in words, with their sizes where these differ."""
+    found, digits = [(shapes, obstacles_of(shapes)) for shapes in scenes], decimals(outline)
+    several = len({size for _, obstacles in found for _, size in obstacles}) > 1
+    listed = []
+    for shapes, obstacles in found:
+        name = "no obstacle"
+        if obstacles:
+            sizes = [f"{width:g}" if width == height else f"{width:g} x {height:g}" for _, (width, height) in obstacles]
+            own = sizes if len(set(sizes)) > 1 else sizes[:1]
+            wide = f" of {', '.join(own)} {outline.unit}" if several else ""
+            places = " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in obstacles)
+            name = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}{wide} at {places}"
+        polygons = [_polygon(outline, shape) for shape in shapes]
+        listed.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
+    return listed
+
+
+def _block(frames: EpisodeFrames, outline: Outline | None, interaction: np.ndarray | None) -> np.ndarray:
+    """`(T, n)` the columns that the task offers, in the order of `FRAME_SCALES`."""
+    columns = [] if interaction is None else [interaction[:, None]]
+    if outline is not None:
+        poses = outline.poses(frames.states)
+        theta = (poses[:, 2:] + math.pi) % (2 * math.pi) - math.pi
+        columns = [poses[:, :2], theta, outline.forces(frames.actions), *columns]
+    return np.hstack(columns) if columns else np.empty((len(frames.states), 0))
+
+
+def _quantised(block: np.ndarray, outline: Outline | None, measured: bool) -> tuple[dict[str, float], np.ndarray]:
+    """Integers in a unit of each column there is, and the columns `(T, n)` in them."""
+    scales: dict[str, float] = {}
+    if outline is not None:
+        scales = dict(FRAME_SCALES)
+        for name in ("x", "y"):
+            scales[name] *= _SCENE / max(outline.size)
+        scales.pop("interaction")
+    if measured:
+        largest = np.abs(block[:, -1]).max(initial=0.0)
+        scales["interaction"] = min(FRAME_SCALES["interaction"], _LARGEST / max(float(largest), 1e-9))
+    integers = np.clip(np.rint(block * list(scales.values())), -_LARGEST - 1, _LARGEST)
+    return scales, integers.astype(np.int16)
 
 
 def _finite(value: Any) -> Any:

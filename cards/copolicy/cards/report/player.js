@@ -1,6 +1,8 @@
-/** One episode as a film: the table, both players' forces, and what they did to each other over time. */
+/** One episode as a film: the scene, both players' forces, and what they did to each other over time. */
 
 const film = { episode: null, columns: {}, time: 0, playing: false, clock: 0, others: [] };
+
+const SEAT_MARKS = ["robot", "human"].map((seat, k) => (OUTLINE?.body.some(({ role }) => role === seat) ? ["▲ ", "● "][k] : ""));
 
 function setUpPlayer() {
   const dialog = byId("player");
@@ -24,6 +26,7 @@ function setUpPlayer() {
 
 /** Shows an episode from its start, in a dialog over the page. */
 function openPlayer(episode) {
+  if (!OUTLINE) return;
   pause();
   film.episode = episode;
   film.time = 0;
@@ -35,7 +38,7 @@ function openPlayer(episode) {
   const controllers = [episode.controller_0, episode.controller_1].filter(Boolean).join(" and ");
   const facts = [
     episode.source === "simulated" ? "simulated pair" : episode.source,
-    episode.pair_id && `pair ${episode.pair_id}`, episode.map_id, `route ${episode.route_class || "none"}`,
+    episode.pair_id && `pair ${episode.pair_id}`, episode.map_id, labelText(episode).slice(0, -2),
     String(episode.termination_reason).replaceAll("_", " "), `${formatNumber(episode.duration_s)} s`, controllers, flags(episode) !== "–" && flags(episode),
   ];
   byId("player-facts").textContent = facts.filter(Boolean).join(" · ");
@@ -124,65 +127,55 @@ function drawFilm() {
   const { episode, time } = film;
   if (!episode) return;
   const canvas = byId("stage");
-  const width = canvas.clientWidth;
-  const context = sharpContext(canvas, width, (width * HEIGHT) / WIDTH);
-  context.scale(width / WIDTH, width / WIDTH);
-  context.fillStyle = colour("--floor");
-  context.fillRect(0, 0, WIDTH, HEIGHT);
-  drawMap(context, episode.map);
-  context.lineJoin = "round";
+  const context = sceneContext(canvas, canvas.clientWidth);
+  for (const role of ["goal", "obstacle", "start"]) drawFixed(context, [episode], role);
   if (byId("ghosts").checked) for (const path of film.others) drawPath(context, path, 0.3, 2.5);
   const { x: xs, y: ys, theta } = film.columns;
   const end = Math.floor(time) + 1;
-  GRIPS.forEach((grip, seat) => {
+  OUTLINE.hands.forEach((grip, seat) => {
     const points = Array.from({ length: end }, (_, k) => onScreen([xs[k], ys[k], theta[k]], grip));
     context.strokeStyle = `${SEAT_COLOURS[seat]}88`;
-    context.lineWidth = 4;
+    context.lineWidth = 4 * UNIT;
     strokePath(context, points.map(([u]) => u), points.map(([, v]) => v));
   });
   const pose = ["x", "y", "theta"].map((name) => at(name, time));
   const held = Math.floor(time); // an action holds until the next frame
   const force = (seat) => ["fx", "fy"].map((axis) => film.columns[`${seat}_${axis}`][held]);
-  drawTable(context, pose);
+  drawBody(context, pose);
   drawForce(context, pose, 0, force("robot"));
   drawForce(context, pose, 1, force("human"));
   drawGraph();
   const size = (seat) => Math.hypot(...force(seat)).toFixed(2);
-  const interaction = film.columns.interaction[held];
-  const sense = interaction > 0.02 ? "pulling apart" : interaction < -0.02 ? "pressing together" : "in agreement";
   const seconds = (time * FRAME_SECONDS).toFixed(1);
   const total = ((episode.frames - 1) * FRAME_SECONDS).toFixed(1);
   byId("player-readout").textContent =
-    `${seconds} of ${total} s · robot seat ▲ ${size("robot")} · human seat ● ${size("human")} · interaction ${interaction.toFixed(2)} (${sense})`;
+    `${seconds} of ${total} s · robot seat ${SEAT_MARKS[0]}${size("robot")} · human seat ${SEAT_MARKS[1]}${size("human")}${interactionText(held)}`;
   byId("scrub").value = Math.round(time);
   byId("scrub").setAttribute("aria-valuetext", `${seconds} of ${total} seconds`);
 }
 
-/** Interaction force (signed, upper half) and both players' sizes of force (lower half) over time. */
+/** ` · interaction 0.12 (pulling apart)`; nothing where the task measures none. */
+function interactionText(frame) {
+  if (MISSING.interaction) return "";
+  const value = film.columns.interaction[frame];
+  const [apart, together, agreed] = WORDS.interaction_senses;
+  return ` · interaction ${value.toFixed(2)} (${value > 0.02 ? apart : value < -0.02 ? together : agreed})`;
+}
+
+/** Interaction (signed, upper half) and both players' sizes of force (lower half) over time. */
 function drawGraph() {
   const canvas = byId("graph");
   const [width, height] = [canvas.clientWidth, 150];
   const context = sharpContext(canvas, width, height);
-  const { interaction } = film.columns;
   const place = (k) => (k / Math.max(1, film.episode.frames - 1)) * width;
   context.fillStyle = colour("--floor");
   context.fillRect(0, 0, width, height);
-  const strongest = Math.max(0.25, ...interaction.map(Math.abs));
-  const centre = 45;
-  const xs = Array.from(interaction, (_, k) => place(k));
+  const xs = Array.from({ length: film.episode.frames }, (_, k) => place(k));
+  context.font = "12px system-ui, sans-serif";
+  if (!MISSING.interaction) drawInteraction(context, xs, width);
   context.strokeStyle = colour("--line");
   context.lineWidth = 1;
-  strokePath(context, [0, width], [centre, centre]);
   strokePath(context, [0, width], [height - 1, height - 1]);
-  context.fillStyle = `${colour("--accent")}55`;
-  context.beginPath();
-  context.moveTo(0, centre);
-  interaction.forEach((value, k) => context.lineTo(xs[k], centre - (value / strongest) * 38));
-  context.lineTo(width, centre);
-  context.fill();
-  context.strokeStyle = colour("--accent");
-  context.lineWidth = 1.5;
-  strokePath(context, xs, Array.from(interaction, (value) => centre - (value / strongest) * 38));
   ["robot", "human"].forEach((seat, k) => {
     const [fx, fy] = [film.columns[`${seat}_fx`], film.columns[`${seat}_fy`]];
     context.strokeStyle = SEAT_COLOURS[k];
@@ -191,11 +184,27 @@ function drawGraph() {
     strokePath(context, xs, Array.from(fx, (value, i) => height - 3 - (Math.hypot(value, fy[i]) / Math.SQRT2) * 52));
   });
   context.setLineDash([]);
-  context.font = "12px system-ui, sans-serif";
   context.fillStyle = colour("--muted");
-  context.fillText(`interaction force, ±${strongest.toFixed(2)}: above pulls apart`, 6, 13);
   context.fillText("size of force: robot seat (line), human seat (dashes)", 6, 103);
   context.strokeStyle = colour("--ink");
   context.lineWidth = 1.5;
   strokePath(context, [place(film.time), place(film.time)], [0, height]);
+}
+
+function drawInteraction(context, xs, width) {
+  const { interaction } = film.columns;
+  const strongest = Math.max(0.25, ...interaction.map(Math.abs));
+  const centre = 45;
+  const ys = Array.from(interaction, (value) => centre - (value / strongest) * 38);
+  context.strokeStyle = colour("--line");
+  context.lineWidth = 1;
+  strokePath(context, [0, width], [centre, centre]);
+  context.fillStyle = `${colour("--accent")}55`;
+  tracePolygon(context, [[0, centre], ...xs.map((x, k) => [x, ys[k]]), [width, centre]]);
+  context.fill();
+  context.strokeStyle = colour("--accent");
+  context.lineWidth = 1.5;
+  strokePath(context, xs, ys);
+  context.fillStyle = colour("--muted");
+  context.fillText(`${WORDS.interaction}, ±${strongest.toFixed(2)}: above ${WORDS.interaction_above}`, 6, 13);
 }

@@ -3,6 +3,7 @@
 function showRouteStatistics() {
   const place = byId("route-statistics");
   const routes = data.routes;
+  if (MISSING.labels) return place.replaceChildren(absent("labels"));
   if (!routes || !(routes.distances.length || routes.configurations.length)) {
     const why = data.statistics
       ? "The stored statistics hold nothing about routes: copolicy-dataset stats FOLDER computes them anew."
@@ -22,7 +23,7 @@ function showRouteStatistics() {
 function distanceFromPeople(routes) {
   const demonstrations = routes.distances.reduce((sum, one) => sum + one.demonstrations, 0);
   const legend = make("p", { class: "legend" },
-    paintKey(`this data set: ${routes.played_by}`, "#0072b2"), paintKey("people", "#e69f00"),
+    paintKey(`this data set: ${routes.played_by}`, data.colours.sides[0]), paintKey("people", data.colours.sides[1]),
     paintKey("divergence of two draws from one distribution, 95 % of them", colour("--line")));
   return [
     make("h3", {}, "Distance from the routes of people"),
@@ -33,12 +34,6 @@ function distanceFromPeople(routes) {
     definition(`${routes.distances[0].definition} The first figure's; the others differ in the number of obstacles. ` +
       `People: ${routes.human_source}.`),
   ];
-}
-
-function paintKey(text, paint) {
-  const key = make("span", { class: "key" }, text);
-  key.style.setProperty("--key", paint);
-  return key;
 }
 
 const BARS = { width: 340, left: 44, right: 44, row: 36, axis: 58 };
@@ -87,7 +82,7 @@ function entropyByConfiguration(routes) {
   const modes = entropy.effective_modes ? `, ${formatNumber(entropy.effective_modes)} effective modes` : "";
   const heads = ["Configuration", "Episodes", "Routes taken", "Entropy, bits", "95 % interval", "Effective modes", "95 % interval"];
   const rows = routes.configurations.map((entry) => {
-    const parts = Object.entries(entry.counts).sort().map(([word, count]) => [word, count, routeColour(word)]);
+    const parts = Object.entries(entry.counts).sort().map(([word, count]) => [word, count, labelColour(word)]);
     return make(
       "tr", {},
       make("th", { scope: "row" }, entry.name),

@@ -1,10 +1,10 @@
 /** How well the recording kept its clock, and how well a re-simulation follows the recorded path. */
 
-const TIMING = [
-  ["achieved_hz", "Achieved rate", "Hz"],
-  ["late_ticks", "Late ticks", "an episode"],
-  ["replay_drift_px", "Re-simulation drift", "px"],
-];
+const TIMING = offered([
+  ["", ["achieved_hz", "Achieved rate", "Hz"]],
+  ["", ["late_ticks", "Late ticks", "an episode"]],
+  ["drift", ["replay_drift_px", "Re-simulation drift", OUTLINE?.unit]],
+]);
 
 function showTiming(chosen) {
   const rates = ordered(chosen.map((episode) => episode.achieved_hz));
@@ -17,8 +17,8 @@ function showTiming(chosen) {
       : "No rate was recorded.",
     `${formatNumber(late)} late ticks in ${lateIn} of ${chosen.length} episodes.`,
     drifts.length
-      ? `Recorded and re-simulated positions are at most ${formatNumber(drifts[drifts.length - 1])} px apart.`
-      : "Re-simulation drift is not known.",
+      ? `Recorded and re-simulated positions are at most ${formatNumber(drifts[drifts.length - 1])} ${OUTLINE?.unit} apart.`
+      : MISSING.drift ?? "Re-simulation drift is not known.",
   ];
   if (chosen.some((episode) => episode.source === "simulated")) {
     sentences.push("Simulated pairs have no clock that could be late: their rate is exact by construction.");

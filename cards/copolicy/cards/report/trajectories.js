@@ -1,9 +1,10 @@
-/** Ways of the table's centre, one panel for each set of obstacles or map. */
+/** Paths, one panel for each set of obstacles or scenario. */
 
 const FIRST_PANELS = 12;
 let panelLimit = FIRST_PANELS;
 
 function setUpTrajectories() {
+  if (!OUTLINE) return byId("trajectory-figures").replaceChildren(absent("outline"));
   byId("grouping").addEventListener("input", () => {
     panelLimit = FIRST_PANELS;
     showTrajectories(selection);
@@ -11,9 +12,10 @@ function setUpTrajectories() {
 }
 
 function showTrajectories(chosen) {
+  if (!OUTLINE) return;
   const key = byId("grouping").value === "map" ? (episode) => episode.map_id : (episode) => episode.layout;
   const groups = [...groupBy(chosen, key)].sort(
-    (a, b) => a[1][0].map.obstacles.length - b[1][0].map.obstacles.length || a[0].localeCompare(b[0], "en", { numeric: true }),
+    (a, b) => a[1][0].scene.obstacles - b[1][0].scene.obstacles || a[0].localeCompare(b[0], "en", { numeric: true }),
   );
   const panels = byId("panels");
   panels.replaceChildren();
@@ -32,28 +34,17 @@ function showTrajectories(chosen) {
 }
 
 function trajectoryPanel(name, members) {
-  const counts = [...groupBy(members, (episode) => episode.route_class ?? "")].sort((a, b) => b[1].length - a[1].length);
-  const words = counts.map(([word, some]) => `${word || "no route"} ${some.length}`).join(", ");
-  const canvas = make("canvas", { role: "img", "aria-label": `${name}: ${members.length} episodes; routes ${words}` });
-  const legend = make("p", { class: "legend" });
-  for (const [word, some] of counts) {
-    const key = make("span", { class: "key" }, `${word || "no route"} ${some.length}`);
-    key.style.setProperty("--key", routeColour(word));
-    legend.append(key);
-  }
+  const labelled = MISSING.labels ? [] : [...groupBy(members, (episode) => episode.route_class ?? "")];
+  const counts = labelled.sort((a, b) => b[1].length - a[1].length).map(([label, some]) => [label, `${label || `no ${WORDS.label}`} ${some.length}`]);
+  const words = counts.length ? `; ${WORDS.label}s ${counts.map(([, text]) => text).join(", ")}` : "";
+  const canvas = make("canvas", { role: "img", "aria-label": `${name}: ${members.length} episodes${words}` });
+  const legend = make("p", { class: "legend" }, ...counts.map(([label, text]) => paintKey(text, labelColour(label))));
   const figure = make("figure", {}, make("figcaption", {}, make("strong", {}, name), ` · ${members.length} episodes`), canvas, legend);
   const paths = members.map((episode) => ({ episode, xs: column(episode, "x"), ys: column(episode, "y") }));
 
   const draw = (near) => {
-    const width = canvas.clientWidth || 360;
-    const context = sharpContext(canvas, width, width * HEIGHT / WIDTH);
-    context.scale(width / WIDTH, width / WIDTH);
-    context.fillStyle = colour("--floor");
-    context.fillRect(0, 0, WIDTH, HEIGHT);
-    for (const [, some] of groupBy(members, (episode) => String(episode.map.goal))) drawGoal(context, some[0].map);
-    for (const [, some] of groupBy(members, (episode) => String(episode.map.start))) drawStart(context, some[0].map);
-    for (const [, some] of groupBy(members, (episode) => episode.layout)) drawObstacles(context, some[0].map);
-    context.lineJoin = "round";
+    const context = sceneContext(canvas, canvas.clientWidth || 360);
+    for (const role of ["goal", "start", "obstacle"]) drawFixed(context, members, role);
     for (const path of paths) {
       if (path !== near) drawPath(context, path, Math.max(0.25, Math.min(0.8, 12 / paths.length)), 2.5);
     }
@@ -62,7 +53,7 @@ function trajectoryPanel(name, members) {
   const nearest = (event) => {
     const box = canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((value) => (value * WIDTH) / box.width);
-    let [best, found] = [30 * 30, null];
+    let [best, found] = [(30 * UNIT) ** 2, null];
     for (const path of paths) {
       for (let k = 0; k < path.xs.length; k++) {
         const distance = (path.xs[k] - x) ** 2 + (path.ys[k] - y) ** 2;
@@ -90,24 +81,22 @@ function trajectoryPanel(name, members) {
 
 function drawPath(context, { episode, xs, ys }, opacity, width) {
   context.globalAlpha = opacity;
-  context.strokeStyle = routeColour(episode.route_class);
-  context.lineWidth = width;
+  context.strokeStyle = labelColour(episode.route_class);
+  context.lineWidth = width * UNIT;
   strokePath(context, xs, ys);
   context.globalAlpha = 1;
   if (episode.success) return;
   const [x, y] = [xs[xs.length - 1], ys[ys.length - 1]];
   context.strokeStyle = FAILURE_COLOUR;
-  context.lineWidth = 4;
-  context.beginPath();
-  for (const side of [-1, 1]) {
-    context.moveTo(x - 10, y - 10 * side);
-    context.lineTo(x + 10, y + 10 * side);
-  }
-  context.stroke();
+  context.lineWidth = 4 * UNIT;
+  for (const side of [-10 * UNIT, 10 * UNIT]) strokePath(context, [x - 10 * UNIT, x + 10 * UNIT], [y - side, y + side]);
 }
 
 /** What an episode is called where a line must do. */
 function episodeName(episode) {
   const pair = episode.pair_id ? `, pair ${episode.pair_id}` : "";
-  return `Episode ${episode.episode_index}${pair}, ${episode.map_id}, route ${episode.route_class || "none"}, ${episode.outcome}`;
+  return `Episode ${episode.episode_index}${pair}, ${episode.map_id}, ${labelText(episode)}${episode.outcome}`;
 }
+
+/** `route LR, `; nothing where the task has no labels. */
+const labelText = (episode) => (MISSING.labels ? "" : `${WORDS.label} ${episode.route_class || "none"}, `);

@@ -5,19 +5,23 @@ from collections.abc import Callable
 
 import numpy as np
 
-from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
+from copolicy.dataset.task_spec import Vector
 
 from ..inputs import InputSample, KeyboardHalf, Pad, RestWatch, StickCalibration, keyboard_force
 from ..rollout import Agent
 
 Force = tuple[float, float]
 
+_PLANE = Vector(("x", "y"), ("a player's full force",) * 2, (-1.0, -1.0), (1.0, 1.0))
+
 
 class PersonAgent(Agent):
     """A person with a device in hand; which one can change whenever it is unplugged.
 
-    The device is read in `act` itself, so a reading serves one step and no other.
+    The device is read in `act` itself, so a reading serves one step and no other. An action of two numbers is where the
+    stick stands, x and y; one of one number is its x, to the right positive. Full deflection is the bound of a number.
 
     Attributes:
         name: of the kind of device.
@@ -25,8 +29,19 @@ class PersonAgent(Agent):
 
     is_person = True
 
-    def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns):
+    def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns, action: Vector = _PLANE):
+        """
+        Args:
+            action: of one player of the task.
+
+        Raises:
+            InvalidValueError: it has more numbers than a stick, or a player cannot rest.
+        """
+        if not (len(action) in (1, 2) and all(low <= 0 <= high for low, high in zip(*action.bounds, strict=True))):
+            expected = "a task whose players act by one or two numbers that can be 0: a stick has no more"
+            raise InvalidValueError(f"--pilots {name}", expected, action.names)
         self.name = name
+        self._bounds = action.bounds
         self._device: Pad | KeyboardHalf | None = None
         self._calibration = StickCalibration()
         self._rest = RestWatch()
@@ -56,7 +71,7 @@ class PersonAgent(Agent):
         return self._rest.push
 
     def watch_rest(self) -> None:
-        """Looks at the stick while no table is carried; once a tick."""
+        """Looks at the stick between the episodes; once a tick."""
         if self._has_stick:
             still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
             self._rest.add(self.force(self.sample()), still)
@@ -84,7 +99,9 @@ class PersonAgent(Agent):
             self._rest.add(force, RestWatch.CARRYING)
         age = self._clock() - sample.time_ns
         self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
-        return np.array([force])
+        low, high = self._bounds
+        deflection = np.array(force[: len(high)])
+        return np.where(deflection > 0, deflection * high, deflection * -low)[None]
 
     @property
     def _has_stick(self) -> bool:

@@ -62,8 +62,8 @@ class PolicyAgent(Agent):
         chunk B                     b0    b1       the world waits: predicted where A's n_action_steps are executed
         chunk B               (o2)  b1    b2       in real time: asked for one frame before; b0 is due meanwhile
 
-    A frame's action is held for 30 / fps steps, at the rate of the data that the policy learned from. All worlds get
-    their chunks from one call of the policy.
+    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. All worlds
+    get their chunks from one call of the policy.
 
     In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
     is asked for at the start, while the world rests. A chunk is taken up at the first frame after it is ready, at the
@@ -73,6 +73,7 @@ class PolicyAgent(Agent):
     task has none, the human's half of its joint actions is executed.
 
     Attributes:
+        task: that it acts in.
         latencies: seconds that each chunk took.
         chunks: `(worlds,)` how many each world got.
     """
@@ -100,9 +101,9 @@ class PolicyAgent(Agent):
         self.name = policy.name
         self.latencies: list[float] = []
         self._policy = policy
-        self._task = task or get_task()
-        if policy.task != self._task.spec.name:
-            expected = f"a policy that has learned the task {self._task.spec.name!r}"
+        self.task = task or get_task()
+        if policy.task != self.task.spec.name:
+            expected = f"a policy that has learned the task {self.task.spec.name!r}"
             raise InvalidValueError(policy.name, expected, policy.task)
         self._fps, self._seed, self._clock = fps, seed, clock
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy") if real_time else None
@@ -115,16 +116,16 @@ class PolicyAgent(Agent):
             self._pending.cancel()
         self._pending, self._chunk = None, None
         # Another policy may be behind the same name now.
+        self._seat, spec = seat, self.task.spec
         self._rate = self._fps or self._policy.fps
-        self._hold = stride(self._rate)
-        self._seat, spec = seat, self._task.spec
-        self._exchange = self._task.exchange if seat == 1 else None
+        self._hold = stride(self._rate, spec.record_hz)
+        self._exchange = self.task.exchange if seat == 1 else None
         count, frames, size = len(starts), self._policy.n_obs_steps, len(spec.action)
         self._size = size
         scenarios, states = [start.scenario for start in starts], np.array([start.state for start in starts])
         if self._exchange is not None:
             scenarios, states = [self._exchange.scenario(one) for one in scenarios], self._exchange.states(states)
-        self._scenarios = np.array([self._task.scenario_vector(one) for one in scenarios])
+        self._scenarios = np.array([self.task.scenario_vector(one) for one in scenarios])
         # Before the start there is nothing: the first observation is repeated, as it is padded in training.
         self._states = np.repeat(states[:, None], frames, axis=1)  # (worlds, n_obs_steps, n)
         self._partner = np.zeros((count, frames, size))
@@ -196,7 +197,8 @@ class PolicyAgent(Agent):
 
     def _observe(self, states: np.ndarray, worlds: np.ndarray) -> None:
         held = np.array(self._held)  # (hold, worlds, 2 m)
-        mean = frame_actions(held.reshape(len(held), -1), self._rate)[0].reshape(held.shape[1:])[worlds]
+        joint = frame_actions(held.reshape(len(held), -1), self._rate, record_hz=self.task.spec.record_hz)[0]
+        mean = joint.reshape(held.shape[1:])[worlds]
         self._held = []
         if self._exchange is not None:
             states, mean = self._exchange.states(states), self._exchange.actions(mean)

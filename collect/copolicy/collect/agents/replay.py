@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.task import PairTask, get_task
 
 from ..rollout import Agent, Start
 
@@ -42,12 +44,17 @@ class ReplayAgent(RecordedAgent):
         physics: what led from state to state in the recording.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, task: PairTask | None = None):
         """
+        Args:
+            task: the table if None.
+
         Raises:
             FileFormatError: the file is no recording of this task.
         """
-        episode = read_episode(path)
+        episode, name = read_episode(path), (task or get_task()).spec.name
+        if episode.task != name:
+            raise FileFormatError(path, f"a recording of the task {name!r}", f"one of {episode.task!r}")
         super().__init__((episode.actions,), f"replay:{path.stem}")
         self.map_config = episode.map_config
         self.physics = episode.physics

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.exceptions import CopolicyError
+from copolicy.dataset.exceptions import CopolicyError, UnknownNameError
 from copolicy.dataset.task import PairTask, Player, SimulatedPlayers, get_task
 
 from ..rollout import Agent, Start
@@ -20,6 +20,19 @@ def simulated_players(task: PairTask) -> SimulatedPlayers:
     if task.agents is None:
         raise CopolicyError(task.missing("agents"))
     return task.agents
+
+
+def pair_name(task: PairTask, name: str | None, kind: str = "simulated pair") -> str:
+    """The name of a simulated pair, or that of the task's first one.
+
+    Raises:
+        UnknownNameError: no such pair.
+        CopolicyError: the task has no simulated players.
+    """
+    pairs = simulated_players(task).pairs
+    if name and name not in pairs:
+        raise UnknownNameError(kind, name, pairs)
+    return name or next(iter(pairs))
 
 
 class ScriptedAgent(Agent):
@@ -39,7 +52,7 @@ class ScriptedAgent(Agent):
         self._make = make
 
     @classmethod
-    def of_pair(cls, pair: str, task: PairTask | None = None, *options: Any) -> "ScriptedAgent":
+    def of_pair(cls, pair: str, task: PairTask | None = None, **options: Any) -> "ScriptedAgent":
         """A player with the profile that a simulated pair has at the seat.
 
         Args:
@@ -51,7 +64,7 @@ class ScriptedAgent(Agent):
         agents = simulated_players(task or get_task())
 
         def make(seat: int, index: int, start: Start) -> Player:
-            return agents.make_pair(start.scenario, pair, start.seed, *options)[seat]
+            return agents.make_pair(start.scenario, pair, start.seed, **options)[seat]
 
         return cls(f"scripted:{pair}", make)
 

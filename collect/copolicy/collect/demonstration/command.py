@@ -8,11 +8,9 @@ from typing import Any
 from copolicy.dataset.command_line.commands import add_command, progress
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.task import get_task
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.agents import PAIRS
 
 from ..agents.checkpoint_folder import PRETRAINED
 
@@ -31,7 +29,8 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--policy", default=PRETRAINED, help="checkpoint folder (default: pretrained, the model of the package)"
     )
-    add_maps_flag(command, "unseen")
+    add_task_flag(command)
+    add_maps_flag(command, "unseen", given=False)
     command.add_argument(
         "--map",
         type=whole_number("--map", None),
@@ -40,7 +39,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
         metavar="N",
         help="numbers of maps, one episode each (default 0)",
     )
-    command.add_argument("--partner", choices=sorted(PAIRS), default="S01", help="simulated pair (default S01)")
+    command.add_argument("--partner", metavar="PAIR", help="simulated pair of the task (default: its first one)")
     command.add_argument("--seed", type=seed(), default=0, help="of plans and partner (default 0)")
     command.add_argument("--speed", type=number("--speed", 0), default=2.0, help="times real time (default 2)")
     command.add_argument("--fps", type=whole_number("--fps", None), default=12, help="pictures a second (default 12)")
@@ -49,7 +48,8 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
-    chosen, path = get_task().scenario_set(arguments.maps), arguments.gif
+    task, path = get_task(arguments.task), arguments.gif
+    chosen = task.scenario_set(set_name(task, arguments.maps, "unseen"))
     maps = chosen.scenarios
     for name, value, least, most in (
         ("seed", arguments.seed, 0, 2**32 - 1),
@@ -66,13 +66,18 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.
     from ..agents import load_policy
+    from ..agents.scripted import pair_name
     from ..replay.film import save_gif
+    from ..replay.pictures import picture_count
+    from ..screen.outline_view import outline_of
     from .episode import demonstrate
-    from .pictures import SIZE, picture_count, pictures
+    from .pictures import SIZE, pictures
 
+    outline_of(task)
+    partner = pair_name(task, arguments.partner)
     policy = load_policy(arguments.policy)
     physics = policy.conditions.physics
-    tracks = [demonstrate(policy, maps[place], arguments.partner, arguments.seed, physics) for place in arguments.map]
+    tracks = [demonstrate(policy, maps[place], partner, arguments.seed, physics, task) for place in arguments.map]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)
     frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
@@ -86,9 +91,9 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         "pictures": count,
         "policy": policy.name,
         "learned": policy.conditions.to_json(),
-        "partner": f"simulated, human of {arguments.partner}",
+        "partner": f"simulated, human of {partner}",
         "episodes": [
-            f"{chosen.label} {place}: {track.episode.meta.termination_reason} after {track.steps / RECORD_HZ:.1f} s"
+            f"{chosen.label} {place}: {track.episode.meta.termination_reason} after {track.seconds:.1f} s"
             for place, track in zip(arguments.map, tracks, strict=True)
         ],
     }

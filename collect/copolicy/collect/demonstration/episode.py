@@ -4,15 +4,22 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
 from ..replay.track import Track, track_of
 from ..rollout import Rollout, Trace
 
 
-def demonstrate(policy: Policy, scenario: Any, partner: str = "S01", seed: int = 0, settings: Any = None) -> Track:
-    """Lets a policy on the robot's seat and a simulated partner carry the table to the end of the episode.
+def demonstrate(
+    policy: Policy,
+    scenario: Any,
+    partner: str = "S01",
+    seed: int = 0,
+    settings: Any = None,
+    task: PairTask | None = None,
+) -> Track:
+    """Lets a policy on the robot's seat and a simulated partner act to the end of the episode.
 
     Chunks come as in real time, but the world waits for each, so that the speed of the machine changes nothing.
 
@@ -22,8 +29,12 @@ def demonstrate(policy: Policy, scenario: Any, partner: str = "S01", seed: int =
         partner: name of a simulated pair, whose human is the partner.
         seed: of the policy's noise and of the partner.
         settings: of the world; the usual ones if None.
+        task: the table if None.
+
+    Raises:
+        InvalidValueError: the policy has learned another task.
     """
-    task = get_task()
+    task = task or get_task()
     robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
     settings = settings or task.settings_type()
     try:

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.artist.table_view import TableView
+from copolicy.dataset.task import SceneView
 
+from ..replay.pictures import LAST_S
 from ..replay.track import Track, sampled
 from ..screen.canvas import Canvas
-from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
+from ..screen.dialogs import outcome_colour, outcome_text
+from ..screen.outline_view import scene_view
 from ..screen.palette import MUTED, TEXT
 from ..sdl import pygame
 
@@ -16,13 +17,7 @@ SIZE = (1200, 690)
 
 _WORLD = (0, 0, 1200, 600)
 _CAPTION_Y = 646
-_LAST_S = 1.0  # for which the last picture stays
 _TRAIL_STRIDE = 3  # steps
-
-
-def picture_count(track: Track, frames_per_second: int, speed: float) -> int:
-    """How many pictures `pictures` gives."""
-    return len(sampled(track, frames_per_second, speed)) + round(_LAST_S * frames_per_second)
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
@@ -36,14 +31,14 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed:
     """
     # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
     surface = pygame.Surface(size, depth=32)
-    view = TableView(track.episode.map_config)
+    view = scene_view(track.task, track.episode.scenario)
     positions = sampled(track, frames_per_second, speed)
-    for position in [*positions, *[positions[-1]] * round(_LAST_S * frames_per_second)]:
+    for position in [*positions, *[positions[-1]] * round(LAST_S * frames_per_second)]:
         _draw(surface, view, track, position, speed)
         yield surface
 
 
-def _draw(surface: pygame.Surface, view: TableView, track: Track, position: float, speed: float) -> None:
+def _draw(surface: pygame.Surface, view: SceneView, track: Track, position: float, speed: float) -> None:
     canvas = Canvas(surface, SIZE)
     canvas.clear()
     pose = track.pose_at(position)
@@ -56,11 +51,9 @@ def _draw(surface: pygame.Surface, view: TableView, track: Track, position: floa
     ended = position >= track.steps
     reason = track.episode.meta.termination_reason
     if ended:
-        canvas.text(
-            OUTCOME_TEXTS.get(reason, reason), (600, _CAPTION_Y), 48, OUTCOME_COLOURS.get(reason, TEXT), "center"
-        )
+        canvas.text(outcome_text(reason), (600, _CAPTION_Y), 48, outcome_colour(track.task.spec, reason), "center")
     else:
-        canvas.text(f"{position / RECORD_HZ:.0f} s", (600, _CAPTION_Y - 10), 44, TEXT, "center")
+        canvas.text(f"{position / track.hz:.0f} s", (600, _CAPTION_Y - 10), 44, TEXT, "center")
         canvas.text(f"{speed:g}x", (600, _CAPTION_Y + 26), 26, MUTED, "center")
     canvas.text("simulated partner", (1128, _CAPTION_Y - 16), 36, TEXT, "midright")
     canvas.text("no person takes part", (1128, _CAPTION_Y + 18), 28, MUTED, "midright")

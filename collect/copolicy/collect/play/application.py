@@ -1,4 +1,4 @@
-"""The loop: thirty ticks a second, and between them as many pictures as there is time for."""
+"""The loop: the task's ticks, and between them as many pictures as there is time for."""
 
 from collections import Counter, deque
 
@@ -6,9 +6,8 @@ from ..inputs import Command, CommandReader, Press
 from ..screen import Canvas
 from ..screen.dialogs import draw_help, draw_toast
 from ..sdl import pygame
-from ..ticker import DT_NS, Tick
-from .failure import Failure
-from .finished import Finished
+from ..ticker import Tick
+from .finished import Failure, Finished
 from .game import Game
 from .lobby import Lobby
 from .paused import Paused
@@ -184,26 +183,26 @@ class Application:
         window, game = self._window, self.game
         if window is None:
             return
-        now = game.clock()
-        self._halfway_ns = now + DT_NS // 2
+        now, dt_ns = game.clock(), game.ticker.dt_ns
+        self._halfway_ns = now + dt_ns // 2
         starved = now - self._drawn_ns > _STARVED_NS
         if not self._fits(game.ticker.remaining_ns()) and not starved:
             return
         canvas = Canvas(window.surface)
         canvas.clear()
         trial = game.trial
-        share = (now - trial.step_ns) / DT_NS if trial and self.phase.realtime else 1.0
+        share = (now - trial.step_ns) / dt_ns if trial and self.phase.realtime else 1.0
         self.phase.draw(canvas, min(1.0, max(0.0, share)))
         if game.toast:
             draw_toast(canvas, game.toast)
         if self._help:
-            draw_help(canvas, game.roster.labels())
+            draw_help(canvas, game.roster.labels(), game.task.spec.name)
         window.show()
         self.pictures += 1
         self._drawn_ns = game.clock()
         self._drawing.append(self._drawn_ns - now)
         if not self.phase.realtime:
-            self._halfway_ns = self._drawn_ns + 10 * DT_NS  # nothing moves between the ticks
+            self._halfway_ns = self._drawn_ns + 10 * dt_ns  # nothing moves between the ticks
 
     def _sleep(self, remaining_ns: int) -> None:
         wait = remaining_ns

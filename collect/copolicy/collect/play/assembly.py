@@ -37,7 +37,8 @@ def assemble(
     """
     clock = clock or MonotonicClock()
     # The first world of a process takes long enough for a press of a button to be missed.
-    get_task().make_world(settings.map_configs()[0], settings.physics)
+    task = get_task(settings.task)
+    task.make_world(settings.map_configs()[0], settings.physics)
     lock = _lock(settings)
     stack.callback(lock.close)
     recoveries = loading.run("recordings that broke off", lambda: recover(settings.out))
@@ -50,10 +51,10 @@ def assemble(
     pilots = settings.pilots or default_pilots(sum(bool(pad.steerings) for pad in pads))
     policies = [pilot.detail for pilot in pilots if pilot.kind == "policy"]
     what = f"the policy {policies[0]}, with torch and LeRobot" if policies else "the players"
-    players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents, clock))
+    players = loading.run(what, lambda: make_players(settings.pair, pilots, settings.consents, clock, task))
     for player in players:
         stack.callback(player.agent.close)
-    say_other_physics(players, settings.physics)
+    say_other_physics(players, settings.physics, task)
     folder = loading.run("what was played before", lambda: _folder(settings))
     sounds = Sounds(settings.mute or settings.headless)
     stack.callback(sounds.close)
@@ -74,7 +75,9 @@ def _lock(settings: PlaySettings) -> CollectionLock:
 
 
 def _folder(settings: PlaySettings) -> SessionFolder:
-    return SessionFolder(settings.out, settings.pair, settings.fixed(), settings.episodes, settings.new_session)
+    return SessionFolder(
+        settings.out, settings.pair, settings.fixed(), settings.episodes, settings.new_session, settings.task
+    )
 
 
 def _join_by_order(game: Game) -> None:

@@ -4,19 +4,22 @@ import argparse
 import logging
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.task import PairTask, get_task
 
+from ..angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
 from .settings import PilotSpec, PlaySettings
 
-_ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
+_AS_GIVEN = (
+    "task", "pair", "out", "orientations", "episodes", "practice", "seed", "license", "headless", "fullscreen", "mute",
+    "new_session",
+)  # fmt: skip
 
 
 def add_play_command(commands: argparse._SubParsersAction) -> None:
@@ -25,7 +28,8 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         commands,
         "play",
         _play,
-        help="two players carry the table together: a lobby, a session of episodes, one recording each",
+        help="two players carry the table (or act in another task) together: a lobby, a session of episodes, one "
+        "recording each",
         example="copolicy-collect play --pilots keyboard policy:pretrained\n"
         "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
         needs=lambda arguments: POLICIES if any(who.startswith("policy") for who in arguments.pilots or ()) else (),
@@ -43,11 +47,12 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "--pilots",
         nargs=2,
         metavar=("A", "B"),
-        help="who plays: joystick, keyboard, scripted[:S01], replay:FILE, policy:CKPT or policy:pretrained, the model "
+        help="who plays: joystick, keyboard, scripted[:PAIR], replay:FILE, policy:CKPT or policy:pretrained, the model "
         "that comes with the package; A begins on the robot's seat, unless B alone is a policy "
         "(default: the joysticks that are plugged in, the keyboard beside them)",
     )
-    add_maps_flag(command, "training")
+    add_task_flag(command)
+    add_maps_flag(command, "training", given=False)
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument(
         "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"
@@ -69,7 +74,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
     command.add_argument(
         "--angular-limit",
-        choices=_ANGULAR_LIMITS,
+        choices=ANGULAR_LIMITS,
         help="angular acceleration, rad/s^2 (default: what a policy at the table learned with, else pi/2)",
     )
     command.add_argument(
@@ -91,56 +96,53 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
     Raises:
         CopolicyError: a value that cannot be.
     """
-    pilots = None
+    task, pilots = get_task(arguments.task), None
     if arguments.pilots:
-        first, second = (PilotSpec.parse(text) for text in arguments.pilots)
+        first, second = (PilotSpec.parse(text, arguments.task) for text in arguments.pilots)
         pilots = (first, second)
     return PlaySettings(
-        pair=arguments.pair,
-        out=arguments.out,
+        **{name: getattr(arguments, name) for name in _AS_GIVEN},
         pilots=pilots,
-        maps=arguments.maps,
-        orientations=arguments.orientations,
-        episodes=arguments.episodes,
-        practice=arguments.practice,
-        seed=arguments.seed,
+        maps=set_name(task, arguments.maps, "training"),
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
-        license=arguments.license,
-        angular_limit=_angular_limit(pilots or (), arguments.angular_limit),
-        headless=arguments.headless,
-        fullscreen=arguments.fullscreen,
+        angular_limit=_angular_limit(pilots or (), arguments.angular_limit, task),
         window=_size(arguments.window),
-        mute=arguments.mute,
         config_folder=arguments.config_dir,
-        new_session=arguments.new_session,
         countdown_s=arguments.countdown,
     )
 
 
-def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None) -> float:
-    """The limit that the policies at the table learned with; a flag wins, and is said to contradict them."""
+def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask | None = None) -> float | None:
+    """The limit that the policies in the session learned with; a flag wins, and is said to contradict them."""
     # What a session without a policy does without.
     from ..agents.checkpoint_folder import checkpoint_folder
     from ..agents.training_conditions import training_conditions
 
-    given = None if flag is None else _ANGULAR_LIMITS[flag]
+    task = task or get_task()
+    usual = task.settings_type()
+    bound = angular_limit_of(usual)
+    given = None if flag is None else angular_limit_of(limited(task, usual, flag))
     learned: dict[str, float] = {}
     for pilot in pilots:
         if pilot.kind == "policy":
             conditions = training_conditions(checkpoint_folder(pilot.detail))
-            learned[pilot.detail] = conditions.physics.angular_acceleration_limit
+            if not isinstance(conditions.physics, task.settings_type):
+                raise InvalidValueError(f"--task {task.spec.name}", "the task of the policies", pilot.detail)
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
-            rest = replace(conditions.physics, angular_acceleration_limit=Physics().angular_acceleration_limit)
-            if rest != Physics():
+            rest = conditions.physics
+            if bound is not None:
+                learned[pilot.detail] = conditions.physics.angular_acceleration_limit
+                rest = limited(task, rest, bound)
+            if rest != usual:
                 logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)
     if given is None:
         if len(set(learned.values())) > 1:
             raise InvalidValueError(
                 "--angular-limit", "a choice, since the policies learned with different ones", learned
             )
-        return next(iter(learned.values()), Physics().angular_acceleration_limit)
+        return next(iter(learned.values()), bound)
     for name, limit in learned.items():
         if not math.isclose(limit, given):
             logging.warning("--angular-limit %s: %s learned with %.4g rad/s^2", flag, name, limit)

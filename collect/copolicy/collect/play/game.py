@@ -2,19 +2,18 @@
 
 import uuid
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import get_task
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.artist.table_view import TableView
-from copolicy.tasks.table.map_config import MapConfig
+from copolicy.dataset.task import SceneView, get_task
 
 from ..recording.wall_clock import WallClockAnchor
 from ..rollout import Agent
 from ..screen.hud import Hud, SeatStatus
+from ..screen.outline_view import scene_view
 from ..session import Balance, SessionFolder
 from ..ticker import MonotonicClock, Ticker
 from .player import Player, replayed_map
@@ -30,6 +29,7 @@ class Game:
     """The state of a session that outlives its phases.
 
     Attributes:
+        task: that is played.
         roster: the players and what they hold.
         swapped: the players changed the seats that the schedule gave them.
         trial: the episode that is played or about to be.
@@ -49,12 +49,13 @@ class Game:
         clock: MonotonicClock,
     ):
         self.settings = settings
+        self.task = get_task(settings.task)
         self.roster = roster
         self.players = players = roster.players
         self.folder = folder
         self.sounds = sounds
         self.clock = clock
-        self.ticker = Ticker(clock)
+        self.ticker = Ticker(clock, self.task.spec.record_hz)
         self.anchor = WallClockAnchor.now()
         people = all(player.person for player in players)
         swap = people if settings.swap_seats is None else settings.swap_seats
@@ -62,7 +63,7 @@ class Game:
         self.maps = settings.map_configs() if replayed is None else (replayed,)
         # A policy learned the robot's half of the plans, and to listen to the human's.
         robot = int([player.spec.kind == "policy" for player in players] == [False, True])
-        self.balance = Balance(self.maps, settings.episodes, settings.seed, settings.pair, swap, robot)
+        self.balance = Balance(self.maps, settings.episodes, settings.seed, settings.pair, swap, robot, self.task)
         self.practice_left = 0 if folder.continued else settings.practice
         self.swapped = False
         self.trial: Trial | None = None
@@ -70,10 +71,10 @@ class Game:
         self.pause_reason = "player"
         self.problem = ""
         self.results: list[tuple[str, str]] = []
-        self._again: tuple[MapConfig, int] | None = None
+        self._again: tuple[Any, int] | None = None
         self._last_seating: int | None = None
         self._toast = ("", 0)
-        self._view: TableView | None = None
+        self._view: tuple[Any, SceneView] | None = None
 
     # The schedule.
 
@@ -109,7 +110,7 @@ class Game:
         if self.trial is not None and not self.trial.began:
             self.trial = self._make_trial(self.trial.map_config, self._planned, self.trial.practice)
 
-    def _make_trial(self, config: MapConfig, planned: int, practice: bool) -> Trial:
+    def _make_trial(self, config: Any, planned: int, practice: bool) -> Trial:
         self._planned = planned
         seating = planned ^ self.swapped
         robot, human = self.players[seating], self.players[1 - seating]
@@ -124,7 +125,7 @@ class Game:
             player_1_id=human.player_id,
             controller_0=robot.agent.name,
             controller_1=human.agent.name,
-            **get_task().name_of(config).columns,
+            **self.task.name_of(config).columns,
             seed=int(np.random.SeedSequence(entropy).generate_state(1)[0]),
             source="human" if robot.person or human.person else "simulated",
             consent_id=",".join(consents),
@@ -133,8 +134,8 @@ class Game:
         )
         agents = (robot.agent, human.agent)
         return Trial(
-            self.folder.next_path(), config, seating, agents, meta, self.anchor, self.settings.physics, practice,
-            self.clock,
+            self.folder.next_path(), self.task, config, seating, agents, meta, self.anchor, self.settings.physics,
+            practice, self.clock,
         )  # fmt: skip
 
     # Verdicts.
@@ -235,11 +236,11 @@ class Game:
         """The message that is to be shown now."""
         return self._toast[0] if self.clock() < self._toast[1] else ""
 
-    def view(self, config: MapConfig) -> TableView:
+    def view(self, config: Any) -> SceneView:
         """The view of a map, kept as long as the map is the same."""
-        if self._view is None or self._view.map_config != config:
-            self._view = TableView(config)
-        return self._view
+        if self._view is None or self._view[0] != config:
+            self._view = config, scene_view(self.task, config)
+        return self._view[1]
 
     def title(self, trial: Trial) -> str:
         """Where the session is."""
@@ -260,10 +261,11 @@ class Game:
             title=self.title(trial),
             done=self.folder.counts.kept_here.total() / self.settings.episodes,
             seconds=trial.seconds,
-            limit_s=trial.step_limit / RECORD_HZ,
+            limit_s=trial.step_limit / self.task.spec.record_hz,
             score=trial.score,
             seats=(statuses[0], statuses[1]),
             interaction=trial.interaction,
+            missing=self.task.missing("interaction measure"),
             late=trial.loop.late + trial.loop.skipped,
             hz=trial.loop.achieved_hz,
             practice=trial.practice,

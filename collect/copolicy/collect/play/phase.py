@@ -55,7 +55,7 @@ class Phase:
         """A player asks for something."""
 
     def tick(self, tick: Tick) -> To:
-        """A thirtieth of a second; says what follows."""
+        """A step of the task; says what follows."""
         return To.STAY
 
     def draw(self, canvas: Canvas, share: float) -> None:
@@ -77,9 +77,9 @@ class Phase:
         return self.game.trial
 
     def draw_world(self, canvas: Canvas, trial: Trial, share: float = 1.0, carrying: bool = True) -> None:
-        """Draws the table and the bars around it; before the episode the bars say who sits where."""
+        """Draws the world and the bars around it; before the episode the bars say who sits where."""
         view = self.game.view(trial.map_config)
-        pose = between(trial.before, trial.world.pose, share)
+        pose = between(trial.before, trial.pose, share)
         trail = [*trial.trail, pose]
         view.draw(canvas.surface, canvas.rect(*WORLD), pose, trial.forces, trail)
         draw_hud(canvas, self.game.hud(trial, carrying))

@@ -9,6 +9,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.physics_text import physics_summary
+from copolicy.dataset.task import PairTask, get_task
 
 from ..agents import PersonAgent, PolicyAgent, ReplayAgent, ScriptedAgent, load_policy
 from ..inputs import HALVES, KeyboardHalf, Pad
@@ -93,19 +94,22 @@ def make_players(
     specs: Sequence[PilotSpec],
     consents: Sequence[str],
     clock: Callable[[], int] = time.monotonic_ns,
+    task: PairTask | None = None,
 ) -> tuple[Player, Player]:
     """The players, with files and checkpoints loaded.
 
     Args:
         clock: of the session, ns.
+        task: that they play; the table if None.
 
     Raises:
+        InvalidValueError: a person, a recording or a policy that cannot act in the task.
         FileFormatError: a recording or a checkpoint cannot be used.
         MissingExtraError: a policy is to play and torch or LeRobot is not installed.
     """
     players = []
     for index, spec in enumerate(specs):
-        agent = _agent(spec, clock)
+        agent = _agent(spec, task or get_task(), clock)
         consent = consents[index] if spec.is_person else ""
         player_id = f"{pair}-{'ab'[index]}"
         players.append(Player(index, player_id, spec, agent, consent, ready=not spec.is_person))
@@ -124,13 +128,13 @@ def replayed_map(players: Iterable[Player]) -> Any | None:
     return maps.pop() if maps else None
 
 
-def say_other_physics(players: Iterable[Player], physics: Any) -> None:
-    """Forces of an earlier recording move the table otherwise under another physics."""
+def say_other_physics(players: Iterable[Player], physics: Any, task: PairTask | None = None) -> None:
+    """Actions of an earlier recording lead elsewhere under other settings."""
     for player in players:
         if isinstance(player.agent, ReplayAgent):
             recorded = replace(player.agent.physics, step_limit=physics.step_limit)
             if recorded != physics:
-                words = (player.agent.name, physics_summary(recorded), physics_summary(physics))
+                words = (player.agent.name, physics_summary(recorded, task), physics_summary(physics, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", *words)
 
 
@@ -139,13 +143,13 @@ def keyboard_half(name: int | str) -> KeyboardHalf | None:
     return HALVES.get(name) if isinstance(name, str) else None
 
 
-def _agent(spec: PilotSpec, clock: Callable[[], int]) -> Agent:
+def _agent(spec: PilotSpec, task: PairTask, clock: Callable[[], int]) -> Agent:
     match spec.kind:
         case "scripted":
-            return ScriptedAgent.of_pair(spec.detail)
+            return ScriptedAgent.of_pair(spec.detail, task)
         case "replay":
-            return ReplayAgent(Path(spec.detail))
+            return ReplayAgent(Path(spec.detail), task)
         case "policy":
-            return PolicyAgent(load_policy(spec.detail), real_time=True, clock=clock)
+            return PolicyAgent(load_policy(spec.detail), task, real_time=True, clock=clock)
         case kind:
-            return PersonAgent(kind, clock)
+            return PersonAgent(kind, clock, task.spec.action)

@@ -1,53 +1,47 @@
 """Before an episode: the map, who sits where, and the count-down."""
 
 import math
+from typing import ClassVar
 
 from ..inputs import Command, Press
 from ..screen import Canvas
 from ..screen.dialogs import STRIP_ROWS, draw_countdown, draw_strip_menu
 from ..screen.palette import MUTED, YELLOW
-from ..ticker import DT_NS, Tick
+from ..ticker import Tick
 from .game import Game
-from .menu import Menu
+from .menu_phase import MenuPhase
 from .phase import Phase, To
 from .player import Player
 
 _LIMB_S = 1.0  # a session without people moves on by itself
 
 
-class Ready(Phase):
+class Ready(MenuPhase):
     """Shows the episode that is about to begin; either player starts it."""
 
+    shortcuts: ClassVar = {Command.SWAP: "swap", Command.UNDO: "undo", Command.PAUSE: "quit?"}
+
     def __init__(self, game: Game):
-        super().__init__(game)
-        self._menu = Menu(
-            "",
-            [("start", "start"), ("swap seats", "swap"), ("sticks and consent", "lobby"), ("quit for now", "quit")],
-            rows=STRIP_ROWS,
-        )
-        self._choice = ""
-        self._ticks = 0
+        items = [("start", "start"), ("swap seats", "swap"), ("sticks and consent", "lobby"), ("quit for now", "quit")]
+        super().__init__(game, "", items, STRIP_ROWS)
 
     def enter(self) -> None:
         """Prepares the episode."""
         game = self.game
         game.next_trial()
         if game.folder.kept:
-            self._menu.items.insert(2, ("undo the last keep", "undo"))
+            self.top.items.insert(2, ("undo the last keep", "undo"))
 
     def handle(self, press: Press) -> None:
-        """Starts, or does what the menu offers."""
-        shortcuts = {Command.SWAP: "swap", Command.UNDO: "undo", Command.PAUSE: "quit?"}
-        self._choice = shortcuts.get(press.command) or self._menu.handle(press) or self._choice
+        """Starts, or does what the menu offers; a short cut does so whatever the menu offers."""
+        self._choice = self.shortcuts.get(press.command) or self.top.handle(press) or self._choice
 
     def tick(self, tick: Tick) -> To:
         """Follows the players' choice; a session without people needs none."""
         game = self.game
-        self._ticks += 1
-        choice, self._choice = self._choice, ""
-        if not any(player.person for player in game.players) and self._ticks * DT_NS > _LIMB_S * 1e9:
-            choice = "start"
-        if game.settings.headless:
+        self.ticks += 1
+        choice = self.take()
+        if self.alone(_LIMB_S) or game.settings.headless:
             choice = "start"
         match choice:
             case "start" if not game.roster.missing():
@@ -65,7 +59,7 @@ class Ready(Phase):
                 game.stop = "quit"
                 return To.END
             case "quit?":
-                self._menu.cursor = len(self._menu.items) - 1
+                self.top.cursor = len(self.top.items) - 1
         return To.STAY
 
     def device_lost(self, player: Player) -> None:
@@ -82,7 +76,7 @@ class Ready(Phase):
         else:
             buttons = [labels["a"] for labels in game.roster.labels()]
             hint, colour = f"{' or '.join([*buttons, 'Enter'])} starts", MUTED
-        draw_strip_menu(canvas, self._menu.labels, self._menu.cursor, hint, colour)
+        draw_strip_menu(canvas, self.top.labels, self.top.cursor, hint, colour)
 
 
 class Countdown(Phase):

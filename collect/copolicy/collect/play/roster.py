@@ -103,7 +103,7 @@ class Roster:
         return joined
 
     def watch(self) -> Player | None:
-        """Looks at the devices while no table is carried; once a tick.
+        """Looks at the devices between the episodes; once a tick.
 
         Returns:
             Who lost their device, since it is that of the other player, listed twice.

@@ -2,6 +2,8 @@
 
 import gc
 
+from copolicy.dataset.task_spec import TIMEOUT
+
 from ..inputs import Command, Press
 from ..screen import Canvas
 from ..ticker import Tick
@@ -71,8 +73,8 @@ class Running(Phase):
         if not trial.outcome.done:
             return To.STAY
         gc.enable()
-        sound = {"goal": "goal", "timeout": "timeout"}.get(trial.outcome.reason, "collision")
-        game.sounds.play(sound)
+        timeout = trial.outcome.reason == TIMEOUT
+        game.sounds.play("goal" if trial.outcome.success else TIMEOUT if timeout else "collision")
         return To.RESULT
 
     def draw(self, canvas: Canvas, share: float) -> None:

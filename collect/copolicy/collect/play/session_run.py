@@ -11,6 +11,8 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from copolicy.dataset.task import get_task
+
 from ..sdl import init_events, pygame
 from .loading import Loading
 from .settings import PlaySettings
@@ -53,16 +55,17 @@ def prepared(
     Raises:
         CopolicyError: there is no display, or see `play`.
     """
+    task = get_task(settings.task)
     with ExitStack() as stack:
         window = None
         if settings.headless:
             init_events(window=True)
         else:
-            window = Window(settings.window, settings.fullscreen)
+            window = Window(settings.window, settings.fullscreen, task.invitation or task.spec.title)
         stack.callback(_close_pygame)
         loading = Loading(window)
         # By name and not at the top: people look at the window while world, recorder and routes are imported.
-        assembly = loading.run("the table and its recorder", lambda: import_module(".assembly", __package__))
+        assembly = loading.run(f"the {settings.task} and its recorder", lambda: import_module(".assembly", __package__))
         if also is not None:
             loading.run(*also)
         application = assembly.assemble(settings, window, loading, stack, clock)

@@ -4,14 +4,15 @@ import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
-from copolicy.dataset.task import get_task
-from copolicy.tasks.table.agents import PAIRS
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.task import TABLE, get_task
+
+from ..agents.scripted import pair_name
+from ..angular_limit import angular_limit_of, limited
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 PILOT_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
@@ -25,19 +26,21 @@ class PilotSpec:
     detail: str = ""
 
     @classmethod
-    def parse(cls, text: str) -> "PilotSpec":
+    def parse(cls, text: str, task: str = TABLE) -> "PilotSpec":
         """
+        Args:
+            task: name of the task that they play.
+
         Raises:
             UnknownNameError: another kind, or another simulated pair.
             InvalidValueError: a file or a checkpoint is missing, or there is something too much.
+            CopolicyError: a simulated player of a task that has none.
         """
         kind, _, detail = text.partition(":")
         if kind not in PILOT_KINDS:
             raise UnknownNameError("pilot", kind, PILOT_KINDS)
         if kind == "scripted":
-            detail = detail or "S01"
-            if detail not in PAIRS:
-                raise UnknownNameError("simulated pair", detail, PAIRS)
+            detail = pair_name(get_task(task), detail)
         elif kind in ("replay", "policy") and not detail:
             raise InvalidValueError("pilots", f"{kind}:{'FILE' if kind == 'replay' else 'CKPT'}", text)
         elif kind in ("joystick", "keyboard") and detail:
@@ -55,6 +58,7 @@ class PlaySettings:
     """What a session is.
 
     Attributes:
+        task: its name.
         pair: pseudonym of the pair; its players are `PAIR-a` and `PAIR-b`.
         out: folder of all sessions.
         pilots: of player a and b; None for what is plugged in.
@@ -66,7 +70,7 @@ class PlaySettings:
         swap_seats: the players change seats in the middle.
         consents: record id of each player's consent, or an empty text.
         license: of the recordings, by the identifier of the Hub, or an empty text.
-        angular_limit: bound on the angular acceleration, rad/s^2.
+        angular_limit: bound on the angular acceleration, rad/s^2; the task's own if None.
         headless: no window; nobody is asked anything.
         countdown_s: before each episode.
     """
@@ -82,7 +86,7 @@ class PlaySettings:
     swap_seats: bool | None = None
     consents: tuple[str, str] = ("", "")
     license: str = ""
-    angular_limit: float = Physics().angular_acceleration_limit
+    angular_limit: float | None = None
     headless: bool = False
     fullscreen: bool = False
     window: tuple[int, int] | None = None
@@ -90,6 +94,7 @@ class PlaySettings:
     config_folder: Path | None = None
     new_session: bool = False
     countdown_s: float = 3.0
+    task: str = TABLE
 
     def __post_init__(self):
         for name, text in (("pair", self.pair), *((f"consent-{k}", one) for k, one in enumerate(self.consents) if one)):
@@ -111,26 +116,31 @@ class PlaySettings:
         self.physics  # noqa: B018  (checks the limit)
 
     @property
-    def physics(self) -> Physics:
-        """Settings of the dynamics."""
-        return Physics(angular_acceleration_limit=self.angular_limit)
+    def physics(self) -> Any:
+        """Settings of the world."""
+        task = get_task(self.task)
+        usual = task.settings_type()
+        return usual if self.angular_limit is None else limited(task, usual, self.angular_limit)
 
     @functools.cached_property
     def scenarios(self) -> ScenarioSet:
         """The maps to choose from, as a set."""
-        chosen = get_task().scenario_set(self.maps)
-        return get_task().turned(chosen) if self.orientations else chosen
+        task = get_task(self.task)
+        chosen = task.scenario_set(self.maps)
+        return task.turned(chosen) if self.orientations else chosen
 
-    def map_configs(self) -> tuple[MapConfig, ...]:
+    def map_configs(self) -> tuple[Any, ...]:
         """The maps to choose from."""
         return self.scenarios.scenarios
 
     def fixed(self) -> dict:
         """What must not change within a session."""
+        bound = angular_limit_of(self.physics)
         return {
+            **({} if self.task == TABLE else {"task": self.task}),
             "maps": self.scenarios.label,
             **({"maps_digest": self.scenarios.digest} if self.scenarios.from_file else {}),
             "orientations": self.orientations,
             "seed": self.seed,
-            "angular_limit": self.angular_limit,
+            **({} if bound is None else {"angular_limit": bound}),
         }

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
+from copolicy.dataset.outline import Pose
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
-from copolicy.dataset.task import RUNNING, Outcome, get_task
-from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
-from copolicy.tasks.table.interaction import interaction_force
+from copolicy.dataset.task import RUNNING, Outcome, PairTask
+from copolicy.dataset.task_spec import PLAYERS
 
 from ..agents import PersonAgent, PolicyAgent
 from ..recording.recorder import EpisodeRecorder
 from ..recording.wall_clock import WallClockAnchor
 from ..rollout import Agent, Rollout
+from ..screen.outline_view import outline_of
 from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
-
-Pose = tuple[float, float, float]
 
 
 class Trial:
@@ -34,9 +33,10 @@ class Trial:
     Attributes:
         agents: robot seat, human seat.
         outcome: how it stands.
+        pose: of the body.
         before: pose before the last step.
-        forces: the last action, robot xy, human xy.
-        interaction: of the last step, units of a player's full force.
+        forces: the last action as arrows, robot xy, human xy.
+        interaction: of the last step, units of a player's full force; None where the task measures none.
         score: sum of rewards.
         trail: poses, one in three.
         loop: how well the loop kept its time.
@@ -47,6 +47,7 @@ class Trial:
     def __init__(
         self,
         path: Path,
+        task: PairTask,
         map_config: Any,
         seating: int,
         agents: tuple[Agent, Agent],
@@ -57,21 +58,25 @@ class Trial:
         clock: Callable[[], int] = time.monotonic_ns,
     ):
         self.path = path
+        self.task = task
         self.map_config = map_config
         self.seating = seating
         self.agents = agents
         self.meta = meta
         self.practice = practice
-        self._rollout = Rollout(get_task(), [map_config], agents, seeds=[meta.seed], settings=physics)
+        self._rollout = Rollout(task, [map_config], agents, seeds=[meta.seed], settings=physics)
         self.world: Any = self._rollout.worlds[0]
         self.step_limit = physics.step_limit
+        self._settings = physics
         self.outcome: Outcome = RUNNING
-        self.before: Pose = self.world.pose
+        self._outline = outline_of(task)
+        self.pose: Pose = self._seen_pose()
+        self.before = self.pose
         self.forces = (0.0, 0.0, 0.0, 0.0)
-        self.interaction = 0.0
+        self.interaction: float | None = None
         self.score = 0.0
-        self.trail: list[Pose] = [self.world.pose]
-        self.loop = LoopStatistics()
+        self.trail: list[Pose] = [self.pose]
+        self.loop = LoopStatistics(task.spec.record_hz)
         self.notes: list[str] = []
         self.paused = 0
         self.step_ns = clock()
@@ -94,7 +99,7 @@ class Trial:
     @property
     def seconds(self) -> float:
         """Simulated time so far."""
-        return self.steps / RECORD_HZ
+        return self.steps / self.task.spec.record_hz
 
     def begin(self, devices: Mapping[str, str]) -> None:
         """Opens the recording.
@@ -107,9 +112,10 @@ class Trial:
             self.map_config,
             self.meta,
             self._anchor,
+            task=self.task.spec.name,
             monotonic_ns=self._clock(),
             devices=devices,
-            settings=self.world.physics,
+            settings=self._settings,
         )
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:
@@ -122,7 +128,7 @@ class Trial:
             OSError: the recording cannot be written.
         """
         world = self.world
-        self.before, self.step_ns = world.pose, tick.start_ns
+        self.before, self.step_ns = self.pose, tick.start_ns
         self._rollout.step()
         self._watch_sticks()
         (action,), (self.outcome,) = self._rollout.actions, self._rollout.outcomes
@@ -143,13 +149,23 @@ class Trial:
             inputs=(self.agents[0].input, self.agents[1].input),
             timing=timing,
         )
-        self.forces = tuple(action.tolist())
-        self.interaction = float(interaction_force(world.pose[2], action))
+        self._show(action)
         self.score += reward
         if self.steps % 3 == 0:
-            self.trail.append(world.pose)
+            self.trail.append(self.pose)
         if self.outcome.done:
             self.event("outcome", self.outcome.reason)
+
+    def _seen_pose(self) -> Pose:
+        x, y, theta = self._outline.poses(self.world.observation[None])[0].tolist()
+        return x, y, theta
+
+    def _show(self, action: np.ndarray) -> None:
+        self.pose = self._seen_pose()
+        x0, y0, x1, y1 = self._outline.forces(action[None])[0].tolist()
+        self.forces = (x0, y0, x1, y1)
+        measured = self.task.interaction(self.world.observation[None], action[None])
+        self.interaction = None if measured is None else float(measured[0])
 
     def _watch_sticks(self) -> None:
         for seat, agent in enumerate(self.agents):
@@ -166,7 +182,7 @@ class Trial:
         """The steps stop."""
         self.paused += 1
         self.forces = (0.0, 0.0, 0.0, 0.0)
-        self.before = self.world.pose
+        self.before = self.pose
         self.event("pause", reason)
 
     def resume(self) -> None:

@@ -11,11 +11,12 @@ _OF_DESKTOP = 0.86  # of the desktop's smaller side that a window takes by itsel
 class Window:
     """A window of any size."""
 
-    def __init__(self, size: tuple[int, int] | None, fullscreen: bool):
+    def __init__(self, size: tuple[int, int] | None, fullscreen: bool, title: str):
         """
         Args:
             size: px; by default what suits the desktop.
             fullscreen: begin so.
+            title: what it is for.
 
         Raises:
             RunError: there is no display.
@@ -25,7 +26,8 @@ class Window:
             desktop = pygame.display.get_desktop_sizes()[0]
             scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
             self._size = size or (round(SIZE[0] * scale), round(SIZE[1] * scale))
-            pygame.display.set_caption("loading: carry the table together")
+            self._title = title
+            pygame.display.set_caption(f"loading: {title}")
             self._open(fullscreen)
         except (pygame.error, NoDisplayError) as error:
             raise RunError(f"expected a display (or --headless), found none: {error}") from None
@@ -42,7 +44,7 @@ class Window:
 
     def loaded(self) -> None:
         """Says in the title that the session is there."""
-        pygame.display.set_caption("copolicy: carry the table together")
+        pygame.display.set_caption(f"copolicy: {self._title}")
 
     def toggle_fullscreen(self) -> None:
         """Full screen and back."""

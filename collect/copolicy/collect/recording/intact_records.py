@@ -71,8 +71,11 @@ class IntactPart:
     total_reward: float = 0.0
     events: list[EpisodeEvent] = field(default_factory=list)
     unverified: tuple[str, ...] = ()
-    loop: LoopStatistics = field(default_factory=LoopStatistics)
+    loop: LoopStatistics = field(init=False)
     recorded: array = field(default_factory=lambda: array("d"), repr=False)
+
+    def __post_init__(self):
+        self.loop = LoopStatistics(self.task.spec.record_hz)
 
     @property
     def states(self) -> np.ndarray:

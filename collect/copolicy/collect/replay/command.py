@@ -58,13 +58,11 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--limit-px",
         type=number("--limit-px", above=True),
-        default=0.01,
         help="of --verify: largest drift, px (default 0.01)",
     )
     command.add_argument(
         "--limit-rad",
         type=number("--limit-rad", above=True),
-        default=1e-4,
         help="of --verify: the same, rad (default 0.0001)",
     )
 

@@ -12,25 +12,32 @@ _SMALLEST_RANGE = 0.5  # of a full force: a calm episode shall look calm
 class ForceGraph:
     """Draws the curve once a size, and the cursor on it."""
 
-    def __init__(self, interaction: np.ndarray):
+    def __init__(self, interaction: np.ndarray | None, steps: int, missing: str = ""):
         """
         Args:
-            interaction: `(T,)`, units of a player's full force.
+            interaction: `(steps,)`, units of a player's full force; None where it is not measured.
+            steps: of the episode.
+            missing: why it is not measured; stands in the place of the curve.
         """
-        self._forces = interaction
-        self._range = max(_SMALLEST_RANGE, float(np.abs(interaction).max(initial=0.0)) * 1.1)
+        self._steps = steps
+        self._missing = missing if interaction is None else ""
+        self._forces = np.zeros(0) if interaction is None else interaction
+        self._range = max(_SMALLEST_RANGE, float(np.abs(self._forces).max(initial=0.0)) * 1.1)
         self._curve: pygame.Surface | None = None
 
     def x_of(self, rect: pygame.Rect, position: float) -> float:
         """Where a position (steps) lies in the rectangle, px."""
-        return rect.left + rect.width * position / max(1, len(self._forces))
+        return rect.left + rect.width * position / max(1, self._steps)
 
     def position_of(self, rect: pygame.Rect, x: float) -> float:
         """The inverse of `x_of`."""
-        return (x - rect.left) / rect.width * len(self._forces)
+        return (x - rect.left) / rect.width * self._steps
 
     def draw(self, surface: pygame.Surface, rect: pygame.Rect, position: float | None, font: float) -> None:
         """Draws into a rectangle; without a position there is no cursor. `font` is the height of text, px."""
+        if self._missing:
+            draw_text(surface, self._missing, rect.center, font, MUTED, "center", rect.width)
+            return
         if self._curve is None or self._curve.get_size() != rect.size:
             self._curve = self._draw_curve(rect.size)
         surface.blit(self._curve, rect)

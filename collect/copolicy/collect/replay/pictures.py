@@ -12,7 +12,8 @@ from .playback import Playback
 from .track import Track, sampled
 from .view import SIZE, ReplayView, Shown
 
-_LAST_S = 1.0  # for which the last picture stays
+LAST_S = 1.0
+"""How long the last picture of a film stays."""
 
 
 def picture_size(width: int) -> tuple[int, int]:
@@ -28,7 +29,7 @@ def picture_size(width: int) -> tuple[int, int]:
 
 def picture_count(track: Track, frames_per_second: float, speed: float) -> int:
     """How many pictures `pictures` gives."""
-    return len(sampled(track, frames_per_second, speed)) + round(_LAST_S * frames_per_second)
+    return len(sampled(track, frames_per_second, speed)) + round(LAST_S * frames_per_second)
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: float, speed: float) -> Iterator[pygame.Surface]:
@@ -37,14 +38,14 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: float, spee
     surface = pygame.Surface(size, depth=32)
     view = ReplayView(track)
     shown = Shown(hint=False)
-    playback = Playback(track.steps, speed=speed)
+    playback = Playback(track.steps, speed=speed, hz=track.hz)
     for position in sampled(track, frames_per_second, speed):
         playback.position = position
         view.draw(surface, playback, shown)
         yield surface
     playback.playing = False
     view.draw(surface, playback, shown)
-    for _ in range(round(_LAST_S * frames_per_second)):
+    for _ in range(round(LAST_S * frames_per_second)):
         yield surface
 
 

@@ -17,17 +17,19 @@ class Playback:
         position: between 0 and `steps`; fractions lie between two states.
         speed: one of `SPEEDS`.
         playing: it moves by itself.
+        hz: steps a second.
     """
 
     steps: int
     position: float = 0.0
     speed: float = 1.0
     playing: bool = True
+    hz: int = RECORD_HZ
 
     def advance(self, seconds: float) -> None:
         """Lets real time pass; stops at the end."""
         if self.playing:
-            self.seek(self.position + seconds * RECORD_HZ * self.speed)
+            self.seek(self.position + seconds * self.hz * self.speed)
             self.playing = self.position < self.steps
 
     def seek(self, position: float) -> None:

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
-from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
-from copolicy.tasks.table.map_config import WINDOW
+from copolicy.dataset.task_spec import PLAYERS
 
 from ..screen.canvas import Canvas
-from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
+from ..screen.dialogs import outcome_colour, outcome_text
+from ..screen.outline_view import outline_of
 from ..screen.palette import INK, MUTED, TEXT
 from ..sdl import pygame
 from .pictures import write_png
@@ -21,6 +21,7 @@ FRAMES = 12
 _GAP = 12
 _HEAD = 64
 _GRAPH = 120
+_LINE = 28  # which says why there is no graph
 
 
 def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 1800) -> dict[str, Any]:
@@ -57,8 +58,10 @@ def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, l
     columns = math.ceil(math.sqrt(frames * 0.75))
     rows = math.ceil(frames / columns)
     cell = (1200 - (columns + 1) * _GAP) / columns
-    cell_height = cell * WINDOW[1] / WINDOW[0]
-    size = (1200, math.ceil(_HEAD + rows * (cell_height + _GAP) + _GRAPH + _GAP))
+    scene_width, scene_height = outline_of(track.task).size
+    cell_height = cell * scene_height / scene_width
+    graph_height = _LINE if track.interaction is None else _GRAPH
+    size = (1200, math.ceil(_HEAD + rows * (cell_height + _GAP) + graph_height + _GAP))
     # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
     surface = pygame.Surface((width, math.ceil(width * size[1] / size[0])), depth=32)
     canvas = Canvas(surface, size)
@@ -69,9 +72,9 @@ def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, l
         row, column = divmod(index, columns)
         x, y = _GAP + column * (cell + _GAP), _HEAD + row * (cell_height + _GAP)
         view.draw_world(surface, canvas.rect(x, y, cell, cell_height), position)
-        canvas.text(f"{position / RECORD_HZ:.1f} s", (x + 9, y + 8), 22, INK)
+        canvas.text(f"{position / track.hz:.1f} s", (x + 9, y + 8), 22, INK)
     _draw_head(canvas, track)
-    graph = canvas.rect(_GAP, size[1] - _GRAPH - _GAP, 1200 - 2 * _GAP, _GRAPH)
+    graph = canvas.rect(_GAP, size[1] - graph_height - _GAP, 1200 - 2 * _GAP, graph_height)
     view.draw_graph(surface, graph, 20 * canvas.scale)
     return surface, positions
 
@@ -88,5 +91,6 @@ def _draw_head(canvas: Canvas, track: Track) -> None:
     canvas.text(track.path.name, (_GAP + 4, 10), 32, TEXT, max_width=700)
     canvas.text("  ·  ".join(text for text in about if text), (_GAP + 4, 38), 22, MUTED, max_width=800)
     reason = meta.termination_reason
-    text = OUTCOME_TEXTS.get(reason, reason.replace("_", " "))
-    canvas.text(text, (1200 - _GAP - 4, 32), 38, OUTCOME_COLOURS.get(reason, MUTED), "midright", 320)
+    canvas.text(
+        outcome_text(reason), (1200 - _GAP - 4, 32), 38, outcome_colour(track.task.spec, reason), "midright", 320
+    )

@@ -10,10 +10,7 @@ from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.outline import Pose, between
 from copolicy.dataset.recording.log import Recording, read_recording
-from copolicy.dataset.task import get_task, require_table
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.features import theta_of
-from copolicy.tasks.table.interaction import interaction_force
+from copolicy.dataset.task import PairTask, get_task
 
 
 @dataclass(frozen=True)
@@ -31,29 +28,37 @@ class Track:
 
     Attributes:
         path: of the recording.
-        episode: states, actions, metadata, map.
-        poses: `T + 1`, px and rad.
-        forces: `(T + 1, 4)` robot xy, human xy; none at the end.
-        interaction: `(T,)` interaction force of each step, units of a player's full force; positive pulls apart.
+        task: of the episode.
+        episode: states, actions, metadata, scenario.
+        poses: `T + 1`, see `Outline.poses`; none where the task has no outline.
+        forces: `(T + 1, 4)` robot xy, human xy; zero at the end.
+        interaction: `(T,)` interaction force of each step, units of a player's full force; positive pulls apart; None
+            where the task measures none.
         moments: what happened, in order, without start and end.
     """
 
     path: Path
+    task: PairTask
     episode: Episode
     poses: tuple[Pose, ...]
     forces: np.ndarray
-    interaction: np.ndarray
+    interaction: np.ndarray | None
     moments: tuple[Moment, ...] = ()
 
     @property
     def steps(self) -> int:
         """T, and the position of the last state."""
-        return len(self.interaction)
+        return len(self.episode.actions)
+
+    @property
+    def hz(self) -> int:
+        """Steps a second."""
+        return self.task.spec.record_hz
 
     @property
     def seconds(self) -> float:
         """Length in simulated time."""
-        return self.steps / RECORD_HZ
+        return self.steps / self.hz
 
     def pose_at(self, position: float) -> Pose:
         """The pose at a position between 0 and T, steps; between two states a way between them."""
@@ -66,16 +71,12 @@ class Track:
         a, b, c, d = self.forces[min(int(position), self.steps)].tolist()
         return a, b, c, d
 
-    def interaction_at(self, position: float) -> float:
-        """The interaction force at a position; the last one at the end."""
-        return float(self.interaction[min(int(position), self.steps - 1)]) if self.steps else 0.0
-
 
 def read_track(path: Path | str) -> Track:
     """Reads and verifies a recording.
 
     Raises:
-        FileFormatError: it cannot be read, is damaged, broke off, or is no recording of this task.
+        FileFormatError: it cannot be read, is damaged, broke off, or is no recording of a task that is installed.
     """
     path = Path(path)
     if path.name.endswith(".part"):
@@ -85,17 +86,15 @@ def read_track(path: Path | str) -> Track:
 
 
 def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> Track:
-    """The track of an episode in memory.
-
-    Raises:
-        FileFormatError: it is of another task than the table.
-    """
-    require_table(get_task(episode.task), path)
+    """The track of an episode in memory."""
+    task = get_task(episode.task)
     states = np.vstack((episode.states, episode.final_state))
-    theta = theta_of(states)
-    poses = tuple((x, y, angle) for (x, y), angle in zip(states[:, :2].tolist(), theta.tolist(), strict=True))
-    forces = np.vstack((episode.actions, np.zeros(4)))
-    return Track(path, episode, poses, forces, interaction_force(theta[1:], episode.actions), moments)
+    poses: tuple[Pose, ...] = ()
+    forces = np.zeros((len(states), 4))
+    if task.outline is not None:
+        poses = tuple((x, y, theta) for x, y, theta in task.outline.poses(states).tolist())
+        forces[:-1] = task.outline.forces(episode.actions)
+    return Track(path, task, episode, poses, forces, task.interaction(states[1:], episode.actions), moments)
 
 
 def _moments(recording: Recording) -> tuple[Moment, ...]:
@@ -105,6 +104,6 @@ def _moments(recording: Recording) -> tuple[Moment, ...]:
 
 def sampled(track: Track, frames_per_second: float, speed: float) -> list[float]:
     """Positions of the frames of a film of the whole track, steps; the last one is its end."""
-    stride = RECORD_HZ * speed / frames_per_second
+    stride = track.hz * speed / frames_per_second
     positions = itertools.takewhile(lambda position: position < track.steps, itertools.count(0.0, stride))
     return [*positions, float(track.steps)]

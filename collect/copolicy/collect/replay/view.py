@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
-from copolicy.tasks.table.artist.table_view import TableView
+from copolicy.dataset.task_spec import PLAYERS
 
 from ..screen.canvas import Canvas
-from ..screen.dialogs import OUTCOME_COLOURS, OUTCOME_TEXTS
+from ..screen.dialogs import outcome_colour, outcome_text
+from ..screen.outline_view import scene_view
 from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, YELLOW
 from ..sdl import pygame
 from .graph import ForceGraph
@@ -55,8 +55,8 @@ class ReplayView:
 
     def __init__(self, track: Track):
         self._track = track
-        self._table = TableView(track.episode.map_config)
-        self._graph = ForceGraph(track.interaction)
+        self._scene = scene_view(track.task, track.episode.scenario)
+        self._graph = ForceGraph(track.interaction, track.steps, track.task.missing("interaction measure"))
 
     def draw(self, surface: pygame.Surface, playback: Playback, shown: Shown) -> None:
         """Draws everything."""
@@ -85,10 +85,10 @@ class ReplayView:
         pose = track.pose_at(position)
         trail: list[Pose] = [*track.poses[: int(position) + 1 : _TRAIL_STRIDE], pose] if trails else []
         acting = track.forces_at(position) if forces else (0.0, 0.0, 0.0, 0.0)
-        return self._table.draw(surface, area, pose, acting, trail)
+        return self._scene.draw(surface, area, pose, acting, trail)
 
     def draw_graph(self, surface: pygame.Surface, area: pygame.Rect, font: float) -> None:
-        """Draws the interaction force alone, without a cursor."""
+        """Draws the interaction force alone, without a cursor, or why there is none."""
         self._graph.draw(surface, area, None, font)
 
     def position_at(self, surface: pygame.Surface, point: tuple[int, int], held: bool = False) -> float | None:
@@ -111,14 +111,13 @@ class ReplayView:
         canvas.text(track.path.name, (20, 9), 30, TEXT, max_width=430)
         about = (meta.map_id, meta.pair_id and f"pair {meta.pair_id}", meta.quality_flags.replace(",", ", "))
         canvas.text("  ·  ".join(text for text in about if text), (20, 36), 22, MUTED, max_width=430)
-        canvas.text(f"{playback.position / RECORD_HZ:.1f}", (612, 30), 50, TEXT, "midright")
+        canvas.text(f"{playback.position / track.hz:.1f}", (612, 30), 50, TEXT, "midright")
         canvas.text(f"of {track.seconds:.1f} s", (624, 24), 24, MUTED, "midleft")
         canvas.text(f"step {int(playback.position)} of {track.steps}", (624, 44), 20, MUTED, "midleft")
         _draw_play_mark(canvas, 815, 30, playback.playing)
         canvas.text(f"{playback.speed:g}x", (845, 31), 34, TEXT, "midleft")
         reason = meta.termination_reason
-        text = OUTCOME_TEXTS.get(reason, reason.replace("_", " "))
-        canvas.text(text, (1180, 31), 36, OUTCOME_COLOURS.get(reason, MUTED), "midright", 260)
+        canvas.text(outcome_text(reason), (1180, 31), 36, outcome_colour(track.task.spec, reason), "midright", 260)
 
     def _draw_seat(self, canvas: Canvas, seat: int, position: float) -> None:
         x, y, width, height = _PANEL
@@ -141,14 +140,14 @@ class ReplayView:
         canvas.bar(x, y, width, height, share, SKY)
         apart = next((mark for mark in _RULER if track.seconds / mark <= 12), 120)
         for second in range(0, int(track.seconds) + 1, apart):
-            at = x + width * second * RECORD_HZ / max(1, track.steps)
+            at = x + width * second * track.hz / max(1, track.steps)
             canvas.text(f"{second} s" if second else "0", (at, y + height + 6), 20, MUTED, "midtop")
         for moment in track.moments:
             at = x + width * min(moment.step, track.steps) / max(1, track.steps)
             with canvas.patch(at, y + height / 2, 9) as patch:
                 patch.circle(SURROUND, canvas.point(at, y + height / 2), 6 * canvas.scale)
                 patch.circle(YELLOW, canvas.point(at, y + height / 2), 4.5 * canvas.scale)
-        near = [moment for moment in track.moments if 0 <= playback.position - moment.step <= RECORD_HZ]
+        near = [moment for moment in track.moments if 0 <= playback.position - moment.step <= track.hz]
         if near:
             text = f"{near[-1].kind}: {near[-1].detail}" if near[-1].detail else near[-1].kind
             canvas.text(text, (x, 877), 20, YELLOW, "bottomleft", 600)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..sdl import NoDisplayError, open_display, pygame
 from .pictures import write_png
@@ -33,7 +32,7 @@ class Viewer:
         Raises:
             RunError: there is no display.
         """
-        self.playback = Playback(track.steps)
+        self.playback = Playback(track.steps, hz=track.hz)
         self.shown = Shown()
         self.open = True
         self._track = track
@@ -87,7 +86,7 @@ class Viewer:
         elif event.type == pygame.KEYDOWN:
             self._key(event.key, bool(event.mod & pygame.KMOD_SHIFT))
         elif event.type == pygame.MOUSEWHEEL:
-            self.playback.step(RECORD_HZ * event.y)
+            self.playback.step(self.playback.hz * event.y)
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             self._press(event.pos)
         elif event.type == pygame.MOUSEMOTION and self._dragging:
@@ -98,7 +97,7 @@ class Viewer:
 
     def _key(self, key: int, shift: bool) -> None:
         playback, shown = self.playback, self.shown
-        stride = RECORD_HZ if shift else 1
+        stride = playback.hz if shift else 1
         if key in (pygame.K_q, pygame.K_ESCAPE):
             if shown.help and key == pygame.K_ESCAPE:
                 shown.help = False

@@ -5,16 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from copolicy.dataset.task import TABLE
+from copolicy.dataset.task_spec import TIMEOUT, TaskSpec
+
 from .canvas import WORLD, Canvas
 from .palette import FLOOR, GREEN, INK, MUTED, PANEL, SKY, TEXT, VERMILION, YELLOW, Colour, mix
 
-OUTCOME_COLOURS: dict[str, Colour] = {
-    "goal": GREEN,
-    "collision_obstacle": VERMILION,
-    "collision_wall": VERMILION,
-    "timeout": YELLOW,
-}
-OUTCOME_TEXTS = {
+_OUTCOMES = {
     "goal": "Goal!",
     "collision_obstacle": "Obstacle hit",
     "collision_wall": "Wall hit",
@@ -28,6 +25,18 @@ STRIP_ROWS = 2
 """Rows of `draw_strip_menu`."""
 
 
+def outcome_text(reason: str) -> str:
+    """How an episode ended, in words."""
+    return _OUTCOMES.get(reason, reason.replace("_", " "))
+
+
+def outcome_colour(spec: TaskSpec, reason: str) -> Colour:
+    """The colour of an end: a success, a time-out, another end of the world, or one that the world did not make."""
+    if reason == TIMEOUT:
+        return YELLOW
+    return GREEN if reason in spec.successes else VERMILION if reason in spec.reasons else MUTED
+
+
 class _Labels(Protocol):
     """What is printed on a gamepad, see `inputs.gamepads.Labels`."""
 
@@ -36,7 +45,7 @@ class _Labels(Protocol):
 
 HELP = (
     ("", "gamepad", "keyboard"),
-    ("move the table", "left stick or d-pad", "W A S D   and   arrows"),
+    ("move the {}", "left stick or d-pad", "W A S D   and   arrows"),
     ("choose, start", "{a}", "Enter, E or Space"),
     ("back", "{b}", "Backspace, Q or right Shift"),
     ("pause and menu", "{start} {back}", "Esc or P"),
@@ -49,7 +58,7 @@ HELP = (
     ("this help", "", "F1 or H"),
     ("full screen, sound", "", "F11, M"),
 )
-"""What to do, how on a gamepad (`{a}` stands for what is printed there), how on the keyboard."""
+"""What to do (`{}` stands for the task), how on a gamepad (`{a}` for what is printed there), how on the keyboard."""
 
 
 @dataclass(frozen=True)
@@ -125,15 +134,15 @@ def draw_entry(canvas: Canvas, title: str, text: str) -> None:
     canvas.text(f"{text}|", (236, _MIDDLE + 2), 32, INK, "midleft", 730)
 
 
-def draw_help(canvas: Canvas, pads: Sequence[_Labels] = ()) -> None:
-    """All commands, by what is printed on the gamepads in hand, and by keys."""
+def draw_help(canvas: Canvas, pads: Sequence[_Labels] = (), task: str = TABLE) -> None:
+    """All commands of a session of a task, by what is printed on the gamepads in hand, and by keys."""
     canvas.dim()
     canvas.box(110, 80, 980, 600)
     canvas.text("Help", (600, 118), 46, TEXT, "center")
     y = 158
     for what, pad, keys in HELP:
         head = not what
-        canvas.text(what, (150, y), 28, TEXT, max_width=430)
+        canvas.text(what.format(task), (150, y), 28, TEXT, max_width=430)
         controls = _CONTROL.findall(pad)
         if controls:
             pad = " / ".join(filter(None, (labels.either(*controls) for labels in pads))) or "-"

@@ -37,7 +37,8 @@ class Hud:
         limit_s: of an episode.
         score: sum of rewards so far.
         seats: robot, human.
-        interaction: units of a player's full force, positive where they pull apart.
+        interaction: units of a player's full force, positive where they pull apart; None where it is not measured.
+        missing: why it is not measured.
         late: late and skipped ticks of this episode.
         hz: rate that the loop keeps, nan before it runs.
         practice: it does not count.
@@ -50,7 +51,8 @@ class Hud:
     limit_s: float
     score: float
     seats: tuple[SeatStatus, SeatStatus]
-    interaction: float = 0.0
+    interaction: float | None = 0.0
+    missing: str = ""
     late: int = 0
     hz: float = math.nan
     practice: bool = False
@@ -86,19 +88,22 @@ def _draw_seat(canvas: Canvas, seat: int, x: float, status: SeatStatus) -> None:
 
 
 def _draw_interaction(canvas: Canvas, hud: Hud) -> None:
-    """A scale from pressing together to pulling apart."""
+    """A scale from pressing together to pulling apart, and how the loop keeps its time."""
     x, y, width = 440, 706, 320
-    canvas.text("together", (x, 676), 22, MUTED)
-    canvas.text("apart", (x + width, 676), 22, MUTED, "topright")
-    canvas.bar(x, y, width, 12, 0.0, SKY)
-    share = min(1.0, abs(hud.interaction))
-    half = width / 2 * share
-    middle = x + width / 2
-    colour = VERMILION if share > 0.6 else SKY
-    if share > 0.02:
-        left_end = middle if hud.interaction > 0 else middle - half
-        pygame.draw.rect(canvas.surface, colour, canvas.rect(left_end, y + 1, half, 10))
-    pygame.draw.rect(canvas.surface, TEXT, canvas.rect(middle - 2, y - 5, 4, 22))
+    if hud.interaction is None:
+        canvas.text(hud.missing, (600, y + 6), 20, MUTED, "center", 440)
+    else:
+        canvas.text("together", (x, 676), 22, MUTED)
+        canvas.text("apart", (x + width, 676), 22, MUTED, "topright")
+        canvas.bar(x, y, width, 12, 0.0, SKY)
+        share = min(1.0, abs(hud.interaction))
+        half = width / 2 * share
+        middle = x + width / 2
+        colour = VERMILION if share > 0.6 else SKY
+        if share > 0.02:
+            left_end = middle if hud.interaction > 0 else middle - half
+            pygame.draw.rect(canvas.surface, colour, canvas.rect(left_end, y + 1, half, 10))
+        pygame.draw.rect(canvas.surface, TEXT, canvas.rect(middle - 2, y - 5, 4, 22))
     if hud.late:
         canvas.text(f"late ticks: {hud.late}", (600, 742), 22, YELLOW, "center")
     elif math.isfinite(hud.hz):

@@ -1,13 +1,13 @@
 """Which map and which seats come next, so that every configuration gets its share across pairs."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 
 Configuration = tuple[str, int]
 """Map id, and who sits where: 0 with player a on the robot's seat, 1 with player b there."""
@@ -32,14 +32,23 @@ class Balance:
     """A seeded schedule that looks at what there is already.
 
     The next configuration is the one that was kept least often over all pairs; among equals the one that this
-    session tried least, then the map, the start and the goal that it met least, then chance. It depends on the seed,
-    the pair and the recordings in the folder alone: a session that goes on another day goes on where it was, a
-    discarded episode comes back after the others.
+    session tried least, then the map, then what else the task balances (`PairTask.balanced`: start and goal of the
+    table), then chance. It depends on the seed, the pair and the recordings in the folder alone: a session that goes
+    on another day goes on where it was, a discarded episode comes back after the others.
 
     Seats change once, in the middle of a session, and the session begins with the seats that were kept less.
     """
 
-    def __init__(self, maps: Sequence[Any], episodes: int, seed: int, pair: str, swap: bool, seating: int = 0):
+    def __init__(
+        self,
+        maps: Sequence[Any],
+        episodes: int,
+        seed: int,
+        pair: str,
+        swap: bool,
+        seating: int = 0,
+        task: PairTask | None = None,
+    ):
         """
         Args:
             maps: to choose from; repeated ones count once, one of a file as often as its weight says.
@@ -48,11 +57,13 @@ class Balance:
             pair: its name, so that pairs begin differently.
             swap: seats change in the middle; otherwise they stay as they are.
             seating: who sits where if they stay, see `Configuration`.
+            task: of the maps; the table if None.
         """
-        names = {get_task().name_of(config): config for config in maps}
+        task = task or get_task()
+        names = {task.name_of(config): config for config in maps}
         self._maps = {name.scenario: config for name, config in names.items()}
         self._weights = {name.scenario: name.weight for name in names}
-        self._places = {name: (config.start, config.goal) for name, config in self._maps.items()}
+        self._places = {name: list(enumerate(task.balanced(config))) for name, config in self._maps.items()}
         self._episodes = episodes
         self._entropy = [seed, *pair.encode()]
         self._swap = swap
@@ -61,25 +72,23 @@ class Balance:
     def next(self, counts: Counts) -> tuple[Any, int]:
         """Map and seats of the next episode."""
         seating = self.seating(counts)
-        starts, goals = Counter(), Counter()
+        met: Counter[tuple[int, Hashable]] = Counter()
         for (name, _), count in counts.tried.items():
-            if name in self._places:
-                starts[self._places[name][0]] += count
-                goals[self._places[name][1]] += count
+            for place in self._places.get(name, ()):
+                met[place] += count
         names = list(self._maps)
         chance = np.random.default_rng([*self._entropy, counts.tried.total()]).permutation(len(names))
 
         def burden(index: int) -> tuple[float, ...]:
             name = names[index]
             own, other = (name, seating), (name, 1 - seating)
-            start, goal = self._places[name]
             weight = self._weights[name]
             return (
                 counts.kept[own] / weight,
                 counts.tried[own] / weight,
                 counts.tried[other] / weight,
                 counts.kept[other] / weight,
-                starts[start] + goals[goal],
+                sum(met[place] for place in self._places[name]),
                 int(chance[index]),
             )
 

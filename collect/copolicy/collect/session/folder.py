@@ -14,6 +14,7 @@ from typing import Any
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import replace_json, sync_folder
+from copolicy.dataset.task import TABLE
 
 from .balance import Counts
 from .recorded import Recorded, recordings
@@ -47,7 +48,15 @@ class SessionFolder:
         continued: it was begun at an earlier time.
     """
 
-    def __init__(self, out: Path, pair: str, settings: Mapping[str, Any], episodes: int, fresh: bool = False):
+    def __init__(
+        self,
+        out: Path,
+        pair: str,
+        settings: Mapping[str, Any],
+        episodes: int,
+        fresh: bool = False,
+        task: str = TABLE,
+    ):
         """Continues the pair's last session where it is not finished, else begins another.
 
         Args:
@@ -56,13 +65,14 @@ class SessionFolder:
             settings: what must not change within a session; JSON-able.
             episodes: that the session is to keep.
             fresh: begin another in any case.
+            task: whose recordings count.
 
         Raises:
             InvalidValueError: the unfinished session has other settings.
             FileFormatError: its `session.json` is damaged.
             OSError: the folder cannot be written to.
         """
-        everything = list(recordings(out))
+        everything = [one for one in recordings(out) if one.task == task]
         self.continued = False
         number = self._last_number(out, pair)
         if number and not fresh:

@@ -5,19 +5,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.exceptions import FileFormatError, UnknownNameError
 from copolicy.dataset.files.listing import broken_links, distinct_files
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.log import read_metadata
 from copolicy.dataset.recording.soundness import require_version
+from copolicy.dataset.task import TABLE, get_task
 
 PRACTICE = "practice"
 """Quality flag of an episode to try things out; it is marked discarded too."""
 
 OFF_CENTRE = "stick_off_centre"
 """Quality flag of an episode with a stick that pushed while nobody touched it; the event of it says whose."""
-
-_COMPLETE = ("goal", "collision_obstacle", "collision_wall", "timeout")
 
 
 @dataclass(frozen=True)
@@ -27,6 +26,7 @@ class Recorded:
     Attributes:
         counts: it was played to its end and kept, and was no practice.
         seating: 1 where player b sat on the robot's seat.
+        task: its name.
     """
 
     path: Path
@@ -36,6 +36,7 @@ class Recorded:
     success: bool
     practice: bool
     counts: bool
+    task: str = TABLE
 
 
 def recordings(folder: Path) -> Iterator[Recorded]:
@@ -46,8 +47,10 @@ def recordings(folder: Path) -> Iterator[Recorded]:
     for path in distinct_files(folder, "*.mcap"):
         try:
             records = read_metadata(path)
-            if episode_records.START_DIGEST in records.get("dataset_info", {}):  # else it is not ours
+            info = records.get("dataset_info", {})
+            if episode_records.START_DIGEST in info:  # else it is not ours
                 require_version(path, records)
+            task = info.get("task", TABLE)
             result = records[episode_records.RESULT]
             players, flags = records["players"], result["quality_flags"].split(",")
             yield Recorded(
@@ -57,8 +60,13 @@ def recordings(folder: Path) -> Iterator[Recorded]:
                 int(players["player_0_id"] == f"{players['pair_id']}-b"),
                 result["success"] == "true",
                 PRACTICE in flags,
-                result["discarded"] == "false" and PRACTICE not in flags and result["termination_reason"] in _COMPLETE,
+                result["discarded"] == "false"
+                and PRACTICE not in flags
+                and result["termination_reason"] in get_task(task).spec.reasons,
+                task,
             )
+        except UnknownNameError:
+            logging.warning("not counted: %s: a recording of the task %r, which is not installed", path, task)
         except FileFormatError as error:
             logging.warning("not counted: %s", error)
         except KeyError as error:

@@ -7,25 +7,23 @@ import os
 import time
 import uuid
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import as_completed
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
+from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.files.listing import is_hidden
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import TABLE, PairTask, get_task
 from copolicy.dataset.worker_pool import WorkerPool
-from copolicy.tasks.table.agents import PAIRS
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
-from copolicy.tasks.table.start_pose import displaced_start
 
+from ..agents.scripted import pair_name, simulated_players
 from ..recording.episode_file import PART_SUFFIX
 from ..recording.wall_clock import WallClockAnchor
 from .episode_job import EpisodeJob, EpisodeResult
@@ -36,14 +34,15 @@ def simulate(
     out: Path | str,
     episodes: int,
     seed: int,
-    map_set: str = "training",
+    map_set: str | None = None,
     workers: int | None = None,
     orientations: bool = False,
     pairs: Sequence[str] | None = None,
-    physics: Physics | None = None,
+    physics: Any = None,
     started_ns: int | None = None,
     start_noise: float = 0.0,
     clearance: float | None = None,
+    task: str = TABLE,
 ) -> dict:
     """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
 
@@ -54,24 +53,27 @@ def simulate(
         out: the folder; made if missing.
         episodes: how many.
         seed: of the schedule and of the pilots.
-        map_set: name of a set of maps, a file of maps, or one of its splits as `FILE#split`.
+        map_set: name of a set of maps, a file of maps, or one of its splits as `FILE#split`; by default the task's
+            first set.
         workers: processes; by default one for each processor.
         orientations: each map with four start orientations.
-        pairs: names out of `PAIRS`; by default all.
-        physics: settings of the dynamics.
+        pairs: names of simulated pairs; by default all.
+        physics: settings of the world.
         started_ns: the moment that the recordings carry, UTC, nanoseconds since 1970; by default now. With a given
             one, equal calls write equal bytes.
-        start_noise: how far from the map's start episodes begin, see `displaced_start`; 0 begins at the start.
+        start_noise: how far from the map's start episodes begin, see `PairTask.displaced`; 0 begins at the start.
         clearance: how wide both players keep from obstacles, instead of their habits' own.
+        task: its name.
 
     Returns:
         Counts and rates, JSON-able.
 
     Raises:
         OutputExistsError: the folder holds recordings already, or is none; nothing was written.
-        UnknownNameError: no such map set or pair.
+        UnknownNameError: no such task, map set or pair.
         FileFormatError: a file of maps that cannot be used.
-        InvalidValueError: less than one episode or worker, or a negative seed.
+        InvalidValueError: less than one episode or worker, a negative seed, or an option that the task lacks.
+        CopolicyError: the task has no simulated players.
         OSError: the disk refuses; no recording of this call is left.
     """
     out = Path(out)
@@ -80,30 +82,32 @@ def simulate(
     for name, (value, bound) in least.items():
         if value < bound:
             raise InvalidValueError(name, f"at least {bound}", value)
-    task = get_task()
-    chosen = task.scenario_set(map_set)
-    maps = (task.turned(chosen) if orientations else chosen).scheduled
-    pairs = tuple(PAIRS) if pairs is None else tuple(pairs)
-    for pair in pairs:
-        if pair not in PAIRS:
-            raise UnknownNameError("pair", pair, PAIRS)
+    of = get_task(task)
+    players = simulated_players(of)
+    if clearance is not None and "clearance" not in players.options:
+        raise InvalidValueError("--clearance", "no such flag", of.missing("clearance of simulated players"))
+    chosen = of.scenario_set(map_set or next(iter(of.scenario_sets)))
+    maps = (of.turned(chosen) if orientations else chosen).scheduled
+    pairs = tuple(players.pairs) if pairs is None else tuple(pair_name(of, pair, "pair") for pair in pairs)
     _refuse_recordings(out)
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
     # Other maps, other episodes: a file may have the name of another one.
-    variant = f"{chosen.label.replace('#', '.')}-{chosen.digest}" if chosen.from_file else map_set
+    variant = f"{chosen.label.replace('#', '.')}-{chosen.digest}" if chosen.from_file else chosen.name
+    variant = variant if task == TABLE else f"{task}-{variant}"
     variant += f"{'-orientations' if orientations else ''}"
     variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
     variant += "" if clearance is None else f"-clearance_{clearance:g}"
-    physics = physics or Physics()
+    settings = physics or of.settings_type()
+    options = {} if clearance is None else {"clearance": clearance}
     jobs = []
     for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed)):
-        meta = _meta(maps[place], pair, variant, seed, index)
-        config = maps[place]
+        scenario = maps[place]
+        meta = _meta(of, scenario, pair, variant, seed, index)
         if start_noise:
-            config = displaced_start(config, start_noise, np.random.default_rng((seed, index)))
+            scenario = of.displaced(scenario, start_noise, np.random.default_rng((seed, index)))
             meta = replace(meta, map_id=f"{meta.map_id}-displaced")
-        jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", config, physics, meta, anchor, clearance))
+        jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", task, scenario, settings, meta, anchor, options))
     new = not out.exists()
     out.mkdir(parents=True, exist_ok=True)
     started = time.perf_counter()
@@ -115,7 +119,7 @@ def simulate(
     return _summary(out, results, time.perf_counter() - started)
 
 
-def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
+def _meta(task: PairTask, scenario: Any, pair: str, variant: str, seed: int, index: int) -> EpisodeMeta:
     software = version("lerobot_policy_copolicy")
     return EpisodeMeta(
         episode_uuid=str(uuid.uuid5(uuid.NAMESPACE_OID, f"copolicy {software} {variant} {pair} {seed} {index}")),
@@ -125,7 +129,7 @@ def _meta(map_config: MapConfig, pair: str, variant: str, seed: int, index: int)
         player_1_id=f"{pair}-human",
         controller_0="scripted",
         controller_1="scripted",
-        **get_task().name_of(map_config).columns,
+        **task.name_of(scenario).columns,
         seed=int(np.random.SeedSequence((seed, index)).generate_state(1)[0]),
         source="simulated",
         software_version=software,
@@ -153,10 +157,9 @@ def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]
 
 def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[EpisodeJob]]:
     """Episodes with the same goal and obstacles together: planning around them takes time, and a process keeps it."""
-    by_plan: dict[tuple, list[EpisodeJob]] = defaultdict(list)
+    by_plan: dict[Hashable, list[EpisodeJob]] = defaultdict(list)
     for job in jobs:
-        config = job.map_config
-        by_plan[config.goal, config.squares].append(job)
+        by_plan[get_task(job.task).layout(job.scenario, with_goal=True)].append(job)
     parts = -(-workers // len(by_plan))
     return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
 

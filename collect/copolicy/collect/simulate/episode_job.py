@@ -1,13 +1,14 @@
 """One episode of a scripted pair, recorded as fast as the machine goes."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import TABLE, get_task
 
 from ..agents import ScriptedAgent
 from ..recording.recorder import EpisodeRecorder
@@ -20,17 +21,19 @@ class EpisodeJob:
     """All that a worker needs for one episode."""
 
     path: Path
-    map_config: Any
-    physics: Any
+    task: str
+    scenario: Any
+    settings: Any
     meta: EpisodeMeta
     anchor: WallClockAnchor
-    clearance: float | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def record(self) -> "EpisodeResult":
-        """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, carry the table."""
-        options = () if self.clearance is None else (self.clearance,)
-        robot, human = (ScriptedAgent.of_pair(self.meta.pair_id, None, *options) for _ in range(2))
-        return record_episode(self.path, self.map_config, (robot, human), self.meta, self.anchor, self.physics)
+        """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, act until the episode ends."""
+        task = get_task(self.task)
+        robot, human = (ScriptedAgent.of_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
+        agents = (robot, human)
+        return record_episode(self.path, self.scenario, agents, self.meta, self.anchor, self.settings, self.task)
 
 
 @dataclass(frozen=True)
@@ -50,19 +53,21 @@ def record_episode(
     meta: EpisodeMeta,
     anchor: WallClockAnchor,
     settings: Any = None,
+    task: str = TABLE,
 ) -> EpisodeResult:
     """Lets two agents act until the episode ends, and records it.
 
     Args:
         path: of the finished file.
-        scenario: the map.
+        scenario: of the task; the map.
         agents: robot, human; `meta.seed` is their seed.
         meta: what is known at the start.
         anchor: moment of the first step.
-        settings: of the dynamics.
+        settings: of the world.
+        task: its name.
     """
-    rollout = Rollout(get_task(), [scenario], agents, seeds=[meta.seed], settings=settings)
-    with EpisodeRecorder(path, scenario, meta, anchor, settings=settings) as recorder:
+    rollout = Rollout(get_task(task), [scenario], agents, seeds=[meta.seed], settings=settings)
+    with EpisodeRecorder(path, scenario, meta, anchor, settings=settings, task=task) as recorder:
         rollout.observers.append(_Recording(recorder))
         rollout.run()
         (outcome,) = rollout.outcomes

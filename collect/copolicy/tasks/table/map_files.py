@@ -85,7 +85,7 @@ class MapFile(Struct, forbid_unknown_fields=True):
 
 
 class MapFiles(ScenarioFiles):
-    """Reads, checks, draws and makes map files."""
+    """Reads, checks and makes map files."""
 
     schema: Mapping[str, Any] = msgspec.json.schema(MapFile)
     bounds: Mapping[str, tuple[float, float]] = {
@@ -105,12 +105,6 @@ class MapFiles(ScenarioFiles):
     def problems(self, path: Path) -> list[Problem]:
         """See `ScenarioFiles.problems`."""
         return self._read(path)[1]
-
-    def draw(self, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
-        """See `ScenarioFiles.draw`."""
-        from .artist.map_sheet import write_map_sheet  # pygame
-
-        return write_map_sheet(chosen, path, width)
 
     def make(self, name: str, count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
         """See `ScenarioFiles.make`."""

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -21,8 +23,12 @@ from .routes import route_class
 from .scene_outline import TableOutline
 from .seats import TableSeats
 from .spec import SPEC
+from .studies import TableStudies
 
 if TYPE_CHECKING:
+    from copolicy.dataset.task_words import TaskWords
+
+    from .artist.table_view import TableView
     from .map_files import MapFiles
     from .recording import TableMessages
     from .world import TableWorld
@@ -37,6 +43,12 @@ class TableTask(PairTask):
     settings_type = Physics
     exchange = TableSeats()
     outline = TableOutline()
+    studies = TableStudies()
+    orientations = 4
+    invitation = "carry the table together"
+    instruction = "Carry the table to the green goal together. Nobody knows which way the other will go."
+    drift_limits: Mapping[str, float] = MappingProxyType({"px": 0.01, "rad": 1e-4})
+    """Sums of a double stay below 1e-9."""
 
     @property
     def agents(self) -> SimulatedPlayers:
@@ -70,6 +82,11 @@ class TableTask(PairTask):
     def columns_of(self, scenario: MapConfig) -> dict[str, Any]:
         """The size of the obstacles, and that of each where they differ."""
         return {"obstacle_size": scenario.obstacle_size, "obstacle_sizes": sizes_text(scenario)}
+
+    def unseen(self, columns: Mapping[str, Any]) -> str:
+        """The sizes of obstacles that differ: the vector has their centres, and the scan takes all for 50 px."""
+        sizes = columns.get("obstacle_sizes")
+        return f"the size of each obstacle, where they differ ({sizes} px)" if sizes else ""
 
     def make_world(self, scenario: MapConfig, settings: Physics | None = None) -> "TableWorld":
         """A table at rest at the start of a map."""
@@ -112,6 +129,10 @@ class TableTask(PairTask):
         """See `interaction_force`."""
         return interaction_force(theta_of(states), actions)
 
+    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """By the recorded orientation itself, not by its cosine and sine."""
+        return interaction_force(recorded[:, 2], actions)
+
     def layout(self, scenario: MapConfig, with_goal: bool = False) -> tuple:
         """The obstacles, whatever their order, and the goal."""
         # Without the size where it is the same for all: it then tells the map sets apart, which is not meant here.
@@ -123,6 +144,18 @@ class TableTask(PairTask):
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
 
+    def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
+        """An environment of its own."""
+        names = ("step_limit", "angular_acceleration_limit")
+        return GYM_ID, {name: settings[name] for name in names if name in settings}
+
+    @property
+    def words(self) -> "TaskWords":
+        """Of the table and its maps."""
+        from .words import WORDS
+
+        return WORDS
+
     def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The table on its map, as `SceneImage` draws it."""
         from .artist.scene_image import SceneImage  # pygame
@@ -131,12 +164,41 @@ class TableTask(PairTask):
         for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
             yield image.draw((x, y, theta))
 
+    def view(self, scenario: MapConfig) -> "TableView":
+        """The floor, the map and the table as people know them."""
+        from .artist.table_view import TableView  # pygame
+
+        return TableView(scenario)
+
+    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Of the position and of the orientation, the shorter way round."""
+        turn = recorded[:, 2] - other[:, 2]
+        rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)
+        return np.column_stack((np.linalg.norm(recorded[:, :2] - other[:, :2], axis=1), rad))
+
+    def displaced(self, scenario: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
+        """See `displaced_start`."""
+        from .start_pose import displaced_start  # pymunk
+
+        return displaced_start(scenario, scale, rng)
+
+    def balanced(self, scenario: MapConfig) -> tuple:
+        """Start and goal."""
+        return scenario.start, scenario.goal
+
     @property
     def recording(self) -> "TableMessages":
         """The table's own messages."""
         from .recording import TableMessages  # protobuf
 
         return TableMessages()
+
+    @property
+    def rules(self) -> TaskRules:
+        """Map, motion and contacts."""
+        from .rules import RULES
+
+        return RULES
 
     @property
     def features(self) -> PolicyFeatures:

@@ -16,10 +16,9 @@ import numpy as np
 
 from copolicy.dataset.clock import frames
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS
+from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS, PAIR_GYM_ID, bounds_of
 from copolicy.dataset.files.staging import new_folder
-from copolicy.tasks.table.features import BOUNDS, TASK
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.task import distribution_of
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
@@ -27,8 +26,11 @@ from .source import ExportEpisode, ExportSource
 _FORMAT_VERSION = "0.5.0"
 """Version of Minari whose layout this is; a later one reads it, an earlier one says that it cannot."""
 
-_ENTRY_POINT = "lerobot_policy_copolicy.env.table_carrying:TableCarryingEnv"
-_TERMINATIONS = ("goal", "collision_obstacle", "collision_wall")  # any other end cuts the episode off
+_PACKAGE = "lerobot_policy_copolicy"
+_ENTRY_POINTS = {
+    GYM_ID: f"{_PACKAGE}.env.table_carrying:TableCarryingEnv",
+    PAIR_GYM_ID: f"{_PACKAGE}.env.pair_env:PairEnv",
+}
 
 
 def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
@@ -40,12 +42,13 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
     """
     if not re.fullmatch(r"[\w-]+-v\d+", out.name):
         raise InvalidValueError("--out", "a folder named as Minari names data sets, NAME-vN", out.name)
+    spec, package, facts = source.task.spec, distribution_of(source.task), source.facts()
     with new_folder(out) as partial:
         folder = partial / "data"
         folder.mkdir(parents=True)
         path = folder / "main_data.hdf5"
         with new_hdf5(path, track_order=True) as (file, storage):
-            bounds = {feature: BOUNDS[feature].astype(np.float32) for feature in (*OBSERVATION_KEYS.values(), ACTION)}
+            bounds = {feature: limits.astype(np.float32) for feature, limits in bounds_of(spec).items()}
             for number, episode in enumerate(source.episodes()):
                 group = file.create_group(f"episode_{number}")
                 _write_episode(group, number, episode)
@@ -60,12 +63,12 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
             "observation_space": json.dumps({"type": "Dict", "subspaces": subspaces}),
             "action_space": json.dumps(_box(bounds[ACTION])),
             "env_spec": json.dumps(_environment(source)),
-            "requirements": ["lerobot_policy_copolicy[train]"],
+            "requirements": [f"{_PACKAGE}[train]", *([package] if package not in (None, _PACKAGE) else [])],
             "dataset_id": out.name,
             "minari_version": _FORMAT_VERSION,
             "dataset_size": round(path.stat().st_size / 1e6, 1),
-            "description": f"{TASK} Two players, one table; sources: {', '.join(source.facts()['sources'])}.",
-            "copolicy": source.facts(),
+            "description": f"{spec.sentence} {source.task.words.cast}; sources: {', '.join(facts['sources'])}.",
+            "copolicy": facts,
         }
         (folder / "metadata.json").write_text(json.dumps(metadata, indent=1), encoding="utf-8")
     return {"frames": source.frames, "dataset_id": out.name}
@@ -73,13 +76,14 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
 
 def _environment(source: ExportSource) -> dict[str, Any]:
     """The entries of gymnasium's `EnvSpec`."""
-    kwargs = {"step_limit": Physics().step_limit, **source.environment}
+    gym_id, told = source.environment
+    kwargs = {"step_limit": source.task.settings_type().step_limit, **told}
     return {
-        "id": GYM_ID,
-        "entry_point": _ENTRY_POINT,
+        "id": gym_id,
+        "entry_point": _ENTRY_POINTS[gym_id],
         "reward_threshold": None,
         "nondeterministic": False,
-        "max_episode_steps": frames(kwargs["step_limit"], source.fps),
+        "max_episode_steps": frames(kwargs["step_limit"], source.fps, source.task.spec.record_hz),
         "order_enforce": True,
         "disable_env_checker": False,
         "kwargs": kwargs,
@@ -89,7 +93,7 @@ def _environment(source: ExportSource) -> dict[str, Any]:
 
 
 def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
-    # The task's bounds scale the values for training, a table can turn a little faster; a space must hold all.
+    # The task's bounds scale the values for training, the world can leave them a little; a space must hold all.
     paths = {feature: f"observations/{name}" for name, feature in OBSERVATION_KEYS.items()} | {ACTION: "actions"}
     for feature, path in paths.items():
         values = np.asarray(group[path])
@@ -106,11 +110,13 @@ def _box(bounds: np.ndarray) -> dict[str, Any]:
 
 def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> None:
     last = np.arange(len(episode)) == len(episode) - 1
-    terminated = episode.meta["termination_reason"] in _TERMINATIONS
+    # Any other end than those of the task cuts the episode off.
+    reason = episode.meta["termination_reason"]
+    terminated = reason != "timeout" and reason in episode.task.spec.reasons
     observations = (
         np.vstack((episode.states, episode.final_state())),
         np.tile(episode.environment, (len(episode) + 1, 1)),
-        np.vstack((episode.human_actions, episode.actions[-1:, 2:])),
+        np.vstack((episode.human_actions, episode.actions[-1:, episode.human_actions.shape[1] :])),
     )
     arrays = {
         **{f"observations/{key}": values for key, values in zip(OBSERVATION_KEYS, observations, strict=True)},

@@ -1,7 +1,7 @@
 """Exports to a Zarr v2 store as diffusion_policy's ReplayBuffer reads it, with the arrays of the original program.
 
-`data/obs (N, 18)`, `data/action (N, 4)`, `data/past_action (N, 4)`, `meta/episode_ends (E,)`; obs is the table's
-state (7) followed by the map (11). What a row means is the alignment:
+`data/obs`, `data/action`, `data/past_action`, `meta/episode_ends (E,)`; obs is the state followed by the vector of the
+scenario: `(N, 18)` of the table, and actions `(N, 4)`. What a row means is the alignment:
 
     ours      obs[i] is the state in which action[i] was taken, past_action[i] the action of the row before. A policy
               that the original's training makes of it acts on what it sees; this is what to train on.
@@ -24,13 +24,10 @@ import numpy as np
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.files.staging import new_folder
+from copolicy.dataset.task import TABLE
 from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.dynamics import step_angular, step_linear
-from copolicy.tasks.table.features import ACTION_NAMES, ENVIRONMENT_NAMES, STATE_NAMES, theta_of
-from copolicy.tasks.table.physics import Physics
 
-from ..upstream.episode import states_7
-from ..upstream.zarr import ZARR_HZ
+from ..upstream.zarr import ZARR_HZ, one_step_on
 from .source import ExportEpisode, ExportSource
 
 Alignment = Literal["ours", "upstream"]
@@ -44,10 +41,14 @@ def export_replay_buffer(source: ExportSource, out: Path, alignment: Alignment =
     """Writes the store at `out`; returns facts for the summary.
 
     Raises:
-        InvalidValueError: `upstream` of a data set at another rate than 10 or 30 Hz.
+        InvalidValueError: `upstream` of another task than the table, or of a data set at another rate than 10 or 30 Hz.
         MissingExtraError: numcodecs is not installed.
         OutputExistsError: there is something at `out`.
     """
+    spec = source.task.spec
+    if alignment == "upstream" and spec.name != TABLE:
+        expected = f"ours: upstream is the layout of the original program, whose task is {TABLE!r}"
+        raise InvalidValueError("--alignment", expected, f"upstream for the task {spec.name!r}")
     if alignment == "upstream" and source.fps not in (ZARR_HZ, RECORD_HZ):
         raise InvalidValueError("--alignment", f"a data set at {ZARR_HZ} or {RECORD_HZ} Hz for upstream", source.fps)
     with new_folder(out) as partial:
@@ -64,8 +65,8 @@ def export_replay_buffer(source: ExportSource, out: Path, alignment: Alignment =
             **source.facts(),
             "fps": fps,
             "alignment": alignment,
-            "obs": [*STATE_NAMES, *ENVIRONMENT_NAMES],
-            "action": list(ACTION_NAMES),
+            "obs": [*spec.state.names, *spec.scenario.names],
+            "action": list(spec.joint_action.names),
             "past_action": "action of the row before" if not _exact(source.fps, alignment) else "of the step before",
             "episodes": [
                 {key: _jsonable(value) for key, value in row.items() if key != "length"} for row in source.rows
@@ -80,23 +81,16 @@ def _exact(fps: int, alignment: Alignment) -> bool:
 
 
 def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """obs `(T, 18)`, action and past_action `(T, 4)`."""
+    """obs `(T, n)`, action and past_action `(T, m)`."""
     states, actions = episode.states.astype(float), episode.actions.astype(float)
     past = previous_actions(actions)
     if _exact(episode.fps, alignment):
         kept = slice(None, None, RECORD_HZ // ZARR_HZ)
         states, actions, past = episode.next_states().astype(float)[kept], actions[kept], past[kept]
     elif alignment == "upstream":
-        states = _one_step_on(states, actions, episode.physics)
+        states = one_step_on(states, actions, episode.physics)
     environment = np.tile(episode.environment.astype(float), (len(states), 1))
     return np.hstack((states, environment)), actions, past
-
-
-def _one_step_on(states: np.ndarray, actions: np.ndarray, physics: Physics) -> np.ndarray:
-    """States `(T, 7)` one step of 1/30 s after `actions` began in `states`."""
-    position, velocity = step_linear(states[:, :2], states[:, 4:6], actions, physics)
-    theta, omega = step_angular(theta_of(states), states[:, 6], actions, physics)
-    return states_7(np.column_stack((position, theta, velocity, omega)))
 
 
 def _jsonable(value: Any) -> Any:

@@ -20,7 +20,7 @@ import numpy as np
 from copolicy.dataset.edit.groups import By, groups
 from copolicy.dataset.edit.parts import Part, deal
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS
+from copolicy.dataset.features import OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_file
 
 from .hdf5_file import new_hdf5
@@ -76,7 +76,8 @@ def export_robomimic(source: ExportSource, out: Path, validation: Validation | N
                 masks[mask].append(name)
         if validation is not None:
             masks |= _set_apart(source, motions, validation)
-        environment = {"env_name": GYM_ID, "type": _GYM, "env_kwargs": source.environment}
+        gym_id, kwargs = source.environment
+        environment = {"env_name": gym_id, "type": _GYM, "env_kwargs": kwargs}
         data.attrs.update({"total": source.frames, "env_args": json.dumps(environment)})
         data.attrs["copolicy"] = json.dumps(source.facts())
         for mask, names in masks.items():
@@ -88,12 +89,12 @@ def _write_demo(group: h5py.Group, episode: ExportEpisode) -> None:
     count = len(episode)
     environment = np.tile(episode.environment, (count, 1))
     before = episode.states, environment, episode.human_actions
-    after = episode.next_states(), environment, episode.actions[:, 2:]
+    after = episode.next_states(), environment, episode.actions[:, episode.human_actions.shape[1] :]
     arrays = {
         "actions": episode.actions,
         "rewards": episode.rewards,
         "dones": (np.arange(count) == count - 1).astype(np.int64),
-        # Enough to set the environment to: the table's state and the map.
+        # Enough to set the environment to: the state and the vector of the scenario.
         "states": np.hstack((episode.states, environment)),
         **{f"obs/{key}": values for key, values in zip(OBSERVATION_KEYS, before, strict=True)},
         **{f"next_obs/{key}": values for key, values in zip(OBSERVATION_KEYS, after, strict=True)},

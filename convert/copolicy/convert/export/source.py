@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.physics_text import physics_counts, physics_of
-from copolicy.dataset.task import PairTask, require_table
+from copolicy.dataset.task import PairTask
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,7 +101,6 @@ class ExportSource:
         """
         folder = LeRobotFolder.open(root)
         task, info = folder.task, folder.info
-        require_table(task, root)
         folder.require_task(tuple(features_of(task.spec)))
         record_hz = task.spec.record_hz
         fps, hold = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))
@@ -141,19 +140,20 @@ class ExportSource:
         }
 
     @property
-    def environment(self) -> dict[str, Any]:
-        """What the environment must be told to go on as the episodes did, beside its defaults.
+    def environment(self) -> tuple[str, dict[str, Any]]:
+        """Id of the environment, and what it must be told to go on as the episodes did, beside its defaults.
 
         A setting in which the episodes differ keeps its default; `facts` says which physics they have.
         """
         default: Any = self.task.settings_type()
         settings = [physics_of(row["physics"], self.task) or default for row in self.rows]
-        kwargs: dict[str, Any] = {"fps": self.fps}
-        for name in ("step_limit", "angular_acceleration_limit"):
-            values = {getattr(physics, name, None) for physics in settings}
-            if len(values) == 1 and values != {getattr(default, name, None)}:
-                kwargs[name] = values.pop()
-        return kwargs
+        others = {}
+        for setting in fields(default):
+            values = {getattr(physics, setting.name) for physics in settings}
+            if len(values) == 1 and values != {getattr(default, setting.name)}:
+                others[setting.name] = values.pop()
+        gym_id, kwargs = self.task.environment(others)
+        return gym_id, {"fps": self.fps, **kwargs}
 
     def episodes(self) -> Iterator[ExportEpisode]:
         """The exported episodes in order; one data file is in memory at a time.

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.flag_numbers import whole_number
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import require_new
 
 from ..lerobot.prepare import Conversion
-from ..recordings import find_recordings
+from ..recordings import find_recordings, require_rate
 from .plan import LOCK_FILE, ShardPlan, absolute
 
 SHARD_EPISODES = 500
@@ -135,10 +134,10 @@ def convert_in_shards(
     """
     from .executors import SlurmOptions, require_executor, run_local, run_ray, submit_slurm
 
-    stride(conversion.fps)
     require_new(root)
     require_executor(scale.executor, scale.slurm.get("partition"))
     files, unfinished = find_recordings(folders)
+    require_rate(conversion, files[0])
     root = root.absolute()
     folder = (scale.folder or root.parent / f".{root.name}.shards").absolute()
     plan = ShardPlan(

@@ -4,7 +4,7 @@ import shutil
 from dataclasses import asdict
 from importlib.metadata import version
 
-from copolicy.dataset.checks.checking import RECORDING_RULES, check_table
+from copolicy.dataset.checks.checking import check_table, of_recordings
 from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.files.staging import new_folder, replace_json, replace_text
@@ -17,8 +17,8 @@ from .plan import DATA_SET, RECORD_FILE, ShardPlan
 def convert_shard(plan: ShardPlan, rank: int) -> int:
     """Makes a shard, unless it is there; what a killed process left of it goes first.
 
-    Every recording is read once: its check sums are verified, it is held against the rules for single recordings at
-    30 Hz, and its frames are written. The shard appears complete, in one renaming, or not at all.
+    Every recording is read once: its check sums are verified, it is held against the rules for single recordings
+    at their rate, and its frames are written. The shard appears complete, in one renaming, or not at all.
 
     Returns:
         Number of its episodes.
@@ -81,11 +81,11 @@ def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | 
 
 
 def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[Episode]) -> dict:
-    """Findings of the recordings at 30 Hz, named by their place among the shard's episodes."""
+    """Findings of the recordings at their rate, named by their place among the shard's episodes."""
     if not episodes:
         return {"applied": [], "findings": []}
     labels = [str(place) for place in range(len(prepared))]
-    result = check_table(recordings_table(plan.root, labels, episodes), RECORDING_RULES)
+    result = check_table(recordings_table(plan.root, labels, episodes), of_recordings)
     findings = list(result.findings)
     for label, episode in zip(labels, episodes, strict=True):
         findings += not_verified(label, episode)

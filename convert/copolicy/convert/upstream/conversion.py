@@ -16,6 +16,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import broken_links, distinct_files
 from copolicy.dataset.files.staging import require_new
+from copolicy.tasks.table.spec import SPEC
 
 from ..lerobot.prepare import Conversion, LeftOut, PreparedEpisode, admit, prepare_from
 from .episode import UpstreamOptions
@@ -99,7 +100,7 @@ def convert_upstream(
         DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is left behind.
         MissingExtraError: lerobot or zarr is not installed.
     """
-    stride(fps)
+    stride(fps, SPEC.record_hz)
     require_new(root)
     source = open_upstream(path)
     if source.format == "zarr":

@@ -13,8 +13,8 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.tasks.table.dynamics import undo_angular, undo_linear
-from copolicy.tasks.table.features import map_of
+from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
+from copolicy.tasks.table.features import map_of, theta_of
 from copolicy.tasks.table.physics import Physics
 
 from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
@@ -93,6 +93,13 @@ class ZarrStore:
             notes += (f"a row differs from the dynamics by {trajectory.residual:.2g} px or rad",)
         origin = f"{self.path.name}, episode {index}"
         return build_episode(trajectory, finding.config, content, ZARR_HZ, origin, flags, notes)
+
+
+def one_step_on(states: np.ndarray, actions: np.ndarray, physics: Physics) -> np.ndarray:
+    """States `(T, 7)` one step of 1/30 s after `actions` began in `states`, as a store's rows hold them."""
+    position, velocity = step_linear(states[:, :2], states[:, 4:6], actions, physics)
+    theta, omega = step_angular(theta_of(states), states[:, 6], actions, physics)
+    return states_7(np.column_stack((position, theta, velocity, omega)))
 
 
 def _whole_numbers(ends: np.ndarray, path: Path) -> np.ndarray:

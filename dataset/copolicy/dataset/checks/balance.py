@@ -1,20 +1,17 @@
 """Whether the maps, and the pairs over the maps, are there equally often."""
 
 import functools
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
 
+from ..scenarios import base_name
 from ..task import PairTask
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding
-from .limits import limit
-from .rule import Rule
-
-_VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
 
 
 def _maps(table: EpisodeTable) -> Iterator[Finding]:
@@ -29,14 +26,14 @@ def _maps(table: EpisodeTable) -> Iterator[Finding]:
             message = f"of the {len(maps)} maps of {name} have no episode"
             yield Finding("", "balance", missing, 0, "warning", message)
         expected = share * episodes
-        if expected.min() < limit("balance.expected"):
+        if expected.min() < table.limit("balance.expected"):
             message = f"episodes for each map of {name}: too few to tell whether they are balanced"
-            yield Finding("", "balance", float(expected.min()), limit("balance.expected"), "info", message)
+            yield Finding("", "balance", float(expected.min()), table.limit("balance.expected"), "info", message)
             continue
         p = float(chisquare(found, expected).pvalue)
-        if p < limit("balance.p"):
+        if p < table.limit("balance.p"):
             message = f"the maps of {name} have {found.min()} to {found.max()} episodes; p of a chi-square test"
-            yield Finding("", "balance", p, limit("balance.p"), "warning", message)
+            yield Finding("", "balance", p, table.limit("balance.p"), "warning", message)
 
 
 def _pairs(table: EpisodeTable) -> Iterator[Finding]:
@@ -46,9 +43,9 @@ def _pairs(table: EpisodeTable) -> Iterator[Finding]:
         return
     counts = Counter(pairs[known].tolist())
     most, least = max(counts.values()), min(counts.values())
-    if most / least > limit("balance.pairs"):
+    if most / least > table.limit("balance.pairs"):
         message = f"the largest of {len(counts)} pairs has {most} episodes, the smallest {least}"
-        yield Finding("", "balance_pairs", most / least, limit("balance.pairs"), "warning", message)
+        yield Finding("", "balance_pairs", most / least, table.limit("balance.pairs"), "warning", message)
     if len(counts) < 2 or len(set(maps[known])) < 2:
         return
     rows, columns = np.unique(pairs[known], return_inverse=True)[1], np.unique(maps[known], return_inverse=True)[1]
@@ -56,12 +53,12 @@ def _pairs(table: EpisodeTable) -> Iterator[Finding]:
     np.add.at(cells, (rows, columns), 1)
     result = chi2_contingency(cells)
     smallest = float(np.asarray(result[3]).min())
-    if smallest < limit("balance.expected"):
+    if smallest < table.limit("balance.expected"):
         message = "episodes for each pair on each map: too few to tell whether pairs and maps are mixed"
-        yield Finding("", "balance_pairs", smallest, limit("balance.expected"), "info", message)
-    elif float(result[1]) < limit("balance.p"):  # pyright: ignore[reportArgumentType]
+        yield Finding("", "balance_pairs", smallest, table.limit("balance.expected"), "info", message)
+    elif float(result[1]) < table.limit("balance.p"):  # pyright: ignore[reportArgumentType]
         message = "pairs did not carry on the same maps; p of a chi-square test of pair against map"
-        yield Finding("", "balance_pairs", float(result[1]), limit("balance.p"), "warning", message)  # pyright: ignore[reportArgumentType]
+        yield Finding("", "balance_pairs", float(result[1]), table.limit("balance.p"), "warning", message)  # pyright: ignore[reportArgumentType]
 
 
 def _by_set(table: EpisodeTable) -> dict[str, Counter[str]]:
@@ -72,7 +69,7 @@ def _by_set(table: EpisodeTable) -> dict[str, Counter[str]]:
 
 
 def _base_maps(table: EpisodeTable) -> np.ndarray:
-    return np.array([_VARIANT.sub("", name) for name in table.columns["map_id"].tolist()], str)
+    return np.array([base_name(name) for name in table.columns["map_id"].tolist()], str)
 
 
 def _stated_weights(table: EpisodeTable) -> dict[str, int]:

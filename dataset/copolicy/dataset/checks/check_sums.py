@@ -6,10 +6,10 @@ import numpy as np
 
 from ..exceptions import CopolicyError
 from ..files.meta_files import CHECK_FILE, MANIFEST_FILE
+from ..task_parts import Rule
 from ..versions.manifest import Manifest
 from .episode_table import EpisodeTable
 from .finding import Finding
-from .rule import Rule, each
 
 
 def _reading(table: EpisodeTable) -> Iterator[Finding]:
@@ -17,28 +17,23 @@ def _reading(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _indices(table: EpisodeTable) -> Iterator[Finding]:
-    frames = table.frames["frame_index"]
     expected = np.arange(table.frame_count) - np.repeat(table.starts, table.counts)
-    wrong = np.add.reduceat((frames != expected).astype(int), table.starts)
-    message = "frame_index does not count from 0 in steps of 1"
-    yield from each(table, wrong > 0, "rows", wrong, 0, "error", message, table.framed)
-    first = table.of_framed("dataset_from_index")
-    wrong = np.add.reduceat(
-        (table.frames["index"] != expected + np.repeat(first, table.counts)).astype(int), table.starts
-    )
-    message = "index does not go on from the episode's dataset_from_index"
-    yield from each(table, wrong > 0, "rows", wrong, 0, "error", message, table.framed)
+    first = np.repeat(table.of_framed("dataset_from_index"), table.counts)
+    for name, due, message in (
+        ("frame_index", expected, "frame_index does not count from 0 in steps of 1"),
+        ("index", expected + first, "index does not go on from the episode's dataset_from_index"),
+    ):
+        wrong = table.count(table.frames[name] != due)
+        yield from table.found("rows", wrong > 0, wrong, 0, message)
 
 
 def _ranges(table: EpisodeTable) -> Iterator[Finding]:
     first, end = table.columns["dataset_from_index"], table.columns["dataset_to_index"]
-    differs = end - first != table.columns["length"]
     message = "dataset_from_index and dataset_to_index span another length"
-    yield from each(table, differs, "rows", end - first, "length", "error", message)
+    yield from table.found("rows", end - first != table.columns["length"], end - first, "length", message)
     gap = np.zeros(len(first), bool)
     gap[1:] = first[1:] != end[:-1]
-    message = "begins where the episode before does not end"
-    yield from each(table, gap, "rows", first, "dataset_to_index", "error", message)
+    yield from table.found("rows", gap, first, "dataset_to_index", "begins where the episode before does not end")
 
 
 def _manifest(table: EpisodeTable) -> Iterator[Finding]:

@@ -1,6 +1,6 @@
 """Runs every rule over a data set."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +9,13 @@ from ..exceptions import FileFormatError
 from ..files.file_kinds import kind_of
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
-from ..task import require_table
-from . import balance, check_sums, contacts, inputs, leakage, loading, maps, mixtures, motion, schema, timing
+from ..task import PairTask
+from ..task_parts import Rule
+from . import balance, check_sums, inputs, leakage, loading, maps, mixtures, schema, timing
 from .episode_table import EpisodeTable
 from .finding import SEVERITIES, Finding
 from .read_recordings import read_recordings
 from .result import CheckResult
-from .rule import Rule
 
 RULES: tuple[Rule, ...] = (
     *schema.RULES,
@@ -23,46 +23,53 @@ RULES: tuple[Rule, ...] = (
     *loading.RULES,
     *timing.RULES,
     *inputs.RULES,
-    *motion.RULES,
+    *timing.MOTION_RULES,
     *leakage.DUPLICATE_RULES,
     *maps.RULES,
-    *contacts.RULES,
+    Rule("goal_contact", "rule for where successes end"),
+    Rule("obstacle_contact", "rule for the obstacles on its way"),
+    Rule("wall_contact", "rule for the walls around it"),
     *balance.RULES,
     *mixtures.CONSENT_RULES,
     *leakage.RULES,
     *mixtures.RULES,
 )
-"""Every rule, in the order of the report."""
+"""The generic rules in the order of the report, and the places of those that only a task can bring."""
 
-RECORDING_RULES: tuple[Rule, ...] = tuple(rule for rule in RULES if "recordings" in rule.kinds and not rule.whole)
-"""The rules that say something of each recording, whatever else there is: any part of a folder can be held against
-them on its own."""
 
-DATA_SET_RULES: tuple[Rule, ...] = tuple(rule for rule in RULES if rule not in RECORDING_RULES)
-"""The others, for the data set that the recordings became: both together leave no rule out."""
+def rules_of(task: PairTask) -> tuple[Rule, ...]:
+    """Every rule for data of a task."""
+    own = {rule.name: rule for rule in task.rules.rules}
+    return (*(own.pop(rule.name, rule) for rule in RULES), *own.values())
+
+
+def of_recordings(rule: Rule) -> bool:
+    """Whether a rule says something of each recording, whatever else there is: any part of a folder can be held
+    against such rules on its own, and the data set that the recordings became against the others."""
+    return "recordings" in rule.kinds and not rule.whole
+
+
+def of_data_sets(rule: Rule) -> bool:
+    """The others: both together leave no rule out."""
+    return not of_recordings(rule)
 
 
 def read_table(root: Path) -> EpisodeTable:
     """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
 
     Raises:
-        FileFormatError: neither, or data of another task than the rules know.
+        FileFormatError: neither, or data of a task that is not installed.
         MissingExtraError: a LeRobot data set without pyarrow.
     """
     if (root / INFO_FILE).is_file():
         from .read_lerobot import read_lerobot
 
-        return _of_the_table(read_lerobot(root))
+        return read_lerobot(root)
     if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
         broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)] if root.is_dir() else []
         found = broken[0] if broken else kind_of(root)
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
-    return _of_the_table(read_recordings(root))
-
-
-def _of_the_table(table: EpisodeTable) -> EpisodeTable:
-    require_table(table.task, table.root)
-    return table
+    return read_recordings(root)
 
 
 def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
@@ -91,15 +98,15 @@ def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:
     return CheckResult(result.table, findings, (*result.applied, "against"), result.not_applied)
 
 
-def check_table(table: EpisodeTable, rules: Sequence[Rule] = RULES) -> CheckResult:
-    """Applies every one of the rules that a table has the columns for."""
+def check_table(table: EpisodeTable, wanted: Callable[[Rule], bool] = lambda rule: True) -> CheckResult:
+    """Applies every wanted rule that a table has the columns for and its task the part."""
     findings: list[Finding] = []
     applied: list[str] = []
     not_applied: dict[str, str] = {}
-    for rule in rules:
+    for rule in filter(wanted, rules_of(table.task)):
         reason = _why_not(rule, table)
-        if reason:
-            not_applied[rule.name] = reason
+        if reason or rule.find is None:
+            not_applied[rule.name] = reason or table.task.missing(rule.what)
             continue
         applied.append(rule.name)
         with np.errstate(all="ignore"):  # a number that is none is a finding of `finite`

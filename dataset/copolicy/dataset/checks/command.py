@@ -13,7 +13,8 @@ from ..files.local_path import require_hub_name
 from ..files.meta_files import CHECK_FILE, RAW_FOLDER
 from ..files.staging import replace_json
 from ..publication.repo_id import checked_repo_id
-from .limits import LIMITS
+from ..task import TABLE, get_task
+from .limits import limits_of
 from .result import CheckResult
 from .stored_check import check_document, content_hash
 
@@ -42,6 +43,7 @@ def add_check_command(commands: argparse._SubParsersAction) -> None:
         help=f"keep the findings in a data set folder, as {CHECK_FILE} (default: yes)",
     )
     parser.add_argument("--rules", action="store_true", help="print every limit with its reason, and check nothing")
+    parser.add_argument("--task", default=TABLE, metavar="NAME", help="with --rules: whose (default: %(default)s)")
 
 
 def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
@@ -51,7 +53,9 @@ def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
 
 def _check(arguments: argparse.Namespace) -> dict:
     if arguments.rules:
-        return {name: f"{one.value:g} {one.unit}: {one.reason}" for name, one in LIMITS.items()}
+        return {
+            name: f"{one.value:g} {one.unit}: {one.reason}" for name, one in limits_of(get_task(arguments.task)).items()
+        }
     if arguments.path is None:
         raise InvalidValueError("PATH", "a folder, or USER/NAME of a data set on the Hub", None)
     from .checking import add_leaks, check_dataset  # scipy, which `--help` need not wait for

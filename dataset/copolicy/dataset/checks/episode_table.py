@@ -1,13 +1,16 @@
 """All that the rules look at: the episodes of a data set side by side, their frames in one run of rows."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..features import ACTION
 from ..task import PairTask, get_task
-from .finding import Finding
+from .finding import Figure, Finding, Severity
+from .limits import limits_of
 
 COLUMN_TYPES: dict[str, type] = {"str": str, "float": float, "int": np.int64, "bool": bool}
 """How the kinds of episode columns are held in arrays."""
@@ -73,9 +76,18 @@ class EpisodeTable:
         """`(F,)` share of each episode's frames that a mask `(N,)` marks."""
         return np.add.reduceat(marks.astype(np.int64), self.starts) / self.counts
 
-    def any(self, marks: np.ndarray) -> np.ndarray:
-        """`(F,)` whether a mask `(N,)` marks any frame of each episode."""
-        return np.logical_or.reduceat(marks, self.starts)
+    def count(self, marks: np.ndarray) -> np.ndarray:
+        """`(F,)` frames of each episode that a mask `(N,)` marks."""
+        return np.add.reduceat(marks.astype(int), self.starts)
+
+    def largest(self, values: np.ndarray) -> np.ndarray:
+        """`(F,)` largest of a value `(N,)` in each episode."""
+        return np.maximum.reduceat(values, self.starts)
+
+    def force(self, player: int) -> np.ndarray:
+        """`(N, m)` a player's action in units of its full force, the farthest of its bounds."""
+        actions = np.split(self.frames[ACTION], 2, axis=1)[player]
+        return actions / np.abs(self.task.spec.action.bounds).max(axis=0).astype(actions.dtype)
 
     def longest_run(self, marks: np.ndarray) -> np.ndarray:
         """`(F,)` frames of the longest unbroken run of a mask `(N,)` within each episode."""
@@ -91,3 +103,29 @@ class EpisodeTable:
         inside[self.starts] = False
         later = np.flatnonzero(inside)
         return values[later] - values[later - 1], later
+
+    def limit(self, name: str) -> float:
+        """The number of a rule's limit, of the task or a generic one."""
+        return limits_of(self.task)[name].value
+
+    def found(
+        self, rule: str, where: np.ndarray, figures: np.ndarray, limit: Figure, message: str,
+        severity: Severity = "error",
+    ) -> Iterator[Finding]:  # fmt: skip
+        """One finding for every episode that a mask `(E,)` or `(F,)` marks, with its own figure."""
+        places = self.framed if len(where) == len(self.framed) else range(len(self.labels))
+        for place in np.flatnonzero(where):
+            figure = figures[place]
+            plain = figure.item() if isinstance(figure, np.generic) else figure
+            yield Finding(self.labels[places[place]], rule, plain, limit, severity, message)
+
+    def beyond(self, rule: str, figures: np.ndarray, message: str, severity: Severity = "error") -> Iterator[Finding]:
+        """A finding for every episode whose figure `(E,)` or `(F,)` is over the limit of the rule, or is none."""
+        bound = self.limit(rule)
+        return self.found(rule, ~(figures <= bound), figures, bound, message, severity)
+
+    def graded(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
+        """An error over the limit `RULE.error`, a warning over `RULE.warning`."""
+        warning, error = self.limit(f"{rule}.warning"), self.limit(f"{rule}.error")
+        yield from self.found(rule, figures > error, figures, error, message)
+        yield from self.found(rule, (figures > warning) & ~(figures > error), figures, warning, message, "warning")

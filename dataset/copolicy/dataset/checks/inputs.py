@@ -6,11 +6,9 @@ import numpy as np
 
 from ..features import ACTION, STATE
 from ..interaction import alike, may_be_one_device, pushing
-from ..task_spec import PLAYERS
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding
-from .limits import limit
-from .rule import Rule, each
 
 _WHO = ("source", "controller_0", "controller_1")
 
@@ -20,96 +18,80 @@ def _finite(table: EpisodeTable) -> Iterator[Finding]:
         if values.dtype.kind != "f":
             continue
         rows = values.reshape(table.frame_count, -1)
-        wrong = np.add.reduceat((~np.isfinite(rows).all(axis=1)).astype(int), table.starts)
-        message = f"frames whose {name} is not finite"
-        yield from each(table, wrong > 0, "finite", wrong, 0, "error", message, table.framed)
+        wrong = table.count(~np.isfinite(rows).all(axis=1))
+        yield from table.found("finite", wrong > 0, wrong, 0, f"frames whose {name} is not finite")
 
 
 def _action_range(table: EpisodeTable) -> Iterator[Finding]:
-    largest = np.maximum.reduceat(np.abs(table.frames[ACTION]).max(axis=1), table.starts).astype(float)
-    bound = limit("action_range")
+    actions = table.frames[ACTION]
+    low, high = table.task.spec.joint_action.bounds.astype(actions.dtype)
+    # In full forces; exact where the bounds are -1 and 1.
+    scaled = (actions - (low + high) / 2) / ((high - low) / 2)
+    largest, bound = table.largest(np.abs(scaled).max(axis=1)).astype(float), table.limit("action_range")
     message = "an action is larger than a player's full force"
-    yield from each(table, largest > bound, "action_range", largest, bound, "error", message, table.framed)
+    yield from table.found("action_range", largest > bound, largest, bound, message)
 
 
 def _state_range(table: EpisodeTable) -> Iterator[Finding]:
-    states = table.frames[STATE].astype(float)
-    low, high = table.task.spec.state.bounds
-    outside = np.maximum(low - states, states - high)[:, :2].max(axis=1)
-    worst = np.maximum.reduceat(outside, table.starts)
-    message = "the table's centre is this many px outside the window"
-    yield from each(table, worst > 0, "state_range", worst, 0.0, "error", message, table.framed)
-    off = np.maximum.reduceat(np.abs(states[:, 2] ** 2 + states[:, 3] ** 2 - 1), table.starts)
-    bound = limit("unit_circle")
-    message = "cos_theta and sin_theta are not of one angle"
-    yield from each(table, off > bound, "state_range", off, bound, "error", message, table.framed)
+    vector = table.task.spec.state
+    states, (low, high) = table.frames[STATE].astype(float), vector.bounds
+    tolerances = table.limit("state_range") * (high - low)
+    outside = np.maximum(low - states, states - high)
+    for name, unit, tolerance, values in zip(vector.names, vector.units, tolerances.tolist(), outside.T, strict=True):
+        worst = table.largest(values)
+        message = f"{name} is this far outside its bounds, in {unit}"
+        yield from table.found("state_range", worst > tolerance, worst, tolerance, message)
 
 
 def _idle(table: EpisodeTable) -> Iterator[Finding]:
     human = table.of_framed("source") == "human"
-    usual, never, run = limit("idle.warning"), limit("idle.error"), limit("idle_run")
-    for player, name in enumerate(PLAYERS):
-        idle = np.linalg.norm(_action(table, player), axis=1) < limit("idle_force")
+    usual, never, run = (table.limit(name) for name in ("idle.warning", "idle.error", "idle_run"))
+    for player, seat in enumerate(table.task.spec.players):
+        who = f"player {player} ({seat})"
+        idle = np.linalg.norm(table.force(player), axis=1) < table.limit("idle_force")
         share = table.share(idle)
         absent = (share >= never) & human
-        message = f"player {player} ({name}) gave no force in the whole episode"
-        yield from each(table, absent, "idle", share, never, "error", message, table.framed)
-        message = f"share of frames in which player {player} ({name}) gave no force"
-        yield from each(table, (share > usual) & ~absent, "idle", share, usual, "warning", message, table.framed)
+        yield from table.found("idle", absent, share, never, f"{who} gave no force in the whole episode")
+        message = f"share of frames in which {who} gave no force"
+        yield from table.found("idle", (share > usual) & ~absent, share, usual, message, "warning")
         seconds = table.longest_run(idle) / table.fps
-        message = f"player {player} ({name}) gave no force for this many s at a stretch"
-        yield from each(
-            table, (seconds > run) & ~(share > usual), "idle_run", seconds, run, "info", message, table.framed
-        )
+        message = f"{who} gave no force for this many s at a stretch"
+        yield from table.found("idle_run", (seconds > run) & ~(share > usual), seconds, run, message, "info")
 
 
 def _identical(table: EpisodeTable) -> Iterator[Finding]:
     """A frame in which nobody gives a force says nothing: two idle players are no copy of each other."""
-    pushed = table.share(pushing(table.frames[ACTION]))
-    share = np.divide(table.share(alike(table.frames[ACTION])), pushed, out=np.zeros_like(pushed), where=pushed > 0)
-    bound = limit("identical")
+    actions = np.hstack((table.force(0), table.force(1)))
+    pushed = table.share(pushing(actions))
+    share = np.divide(table.share(alike(actions)), pushed, out=np.zeros_like(pushed), where=pushed > 0)
+    bound = table.limit("identical")
     found = share >= bound
     # A scripted pair may be made to act as one, and two kinds of device, or halves of a keyboard, are two for sure.
     people = table.of_framed("source") == "human"
     columns = zip(*(table.of_framed(name).tolist() for name in _WHO), strict=True)
     devices = np.array([may_be_one_device(*who) for who in columns], bool)
-    message = "both players gave the same actions: one device moved both"
-    yield from each(table, found & devices, "identical", share, bound, "error", message, table.framed)
     message = "both players gave the same actions"
-    yield from each(table, found & people & ~devices, "identical", share, bound, "warning", message, table.framed)
-    yield from each(table, found & ~people, "identical", share, bound, "info", message, table.framed)
-
-
-def _with_keys(table: EpisodeTable, player: int) -> np.ndarray:
-    return np.char.find(np.char.lower(table.of_framed(f"controller_{player}")), "keyboard") >= 0
+    yield from table.found("identical", found & devices, share, bound, f"{message}: one device moved both")
+    yield from table.found("identical", found & people & ~devices, share, bound, message, "warning")
+    yield from table.found("identical", found & ~people, share, bound, message, "info")
 
 
 def _saturated(table: EpisodeTable) -> Iterator[Finding]:
-    bound = limit("saturated")
-    for player, name in enumerate(PLAYERS):
-        share = table.share(np.abs(_action(table, player)).max(axis=1) > limit("saturated_force"))
+    bound = table.limit("saturated")
+    for player, seat in enumerate(table.task.spec.players):
+        share = table.share(np.abs(table.force(player)).max(axis=1) > table.limit("saturated_force"))
         # A key knows nothing but its stop, and a player at keys is no mistake.
-        keys = _with_keys(table, player)
-        message = f"share of frames in which player {player} ({name}) was at the stop"
-        yield from each(table, (share > bound) & ~keys, "saturated", share, bound, "warning", message, table.framed)
-        yield from each(table, (share > bound) & keys, "saturated", share, bound, "info", message, table.framed)
-
-
-def _action(table: EpisodeTable, player: int) -> np.ndarray:
-    return table.frames[ACTION][:, 2 * player : 2 * player + 2]
+        keys = np.char.find(np.char.lower(table.of_framed(f"controller_{player}")), "keyboard") >= 0
+        message = f"share of frames in which player {player} ({seat}) was at the stop"
+        yield from table.found("saturated", (share > bound) & ~keys, share, bound, message, "warning")
+        yield from table.found("saturated", (share > bound) & keys, share, bound, message, "info")
 
 
 RULES = (
     Rule("finite", "all numbers of the frames are finite", _finite, (STATE, ACTION)),
     Rule("action_range", "actions within a player's full force", _action_range, (ACTION,)),
-    Rule("state_range", "the table in the window, its angle an angle", _state_range, (STATE,)),
+    Rule("state_range", "states within the bounds of the task", _state_range, (STATE,)),
     Rule("idle", "both players take part", _idle, (ACTION,), ("source",)),
-    Rule(
-        "identical",
-        "the players do not act as one",
-        _identical,
-        (ACTION,),
-        _WHO,
-    ),
+    Rule("identical", "the players do not act as one", _identical, (ACTION,), _WHO),
     Rule("saturated", "sticks are not always at their stop", _saturated, (ACTION,), ("controller_0", "controller_1")),
 )

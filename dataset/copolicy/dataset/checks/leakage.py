@@ -10,9 +10,9 @@ import numpy as np
 
 from ..features import ACTION, STATE
 from ..lerobot_folder.info import split_range
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding, Severity
-from .rule import Rule
 
 PEOPLE = ("pair_id", "player_0_id", "player_1_id")
 

@@ -7,10 +7,9 @@ import numpy as np
 
 from ..exceptions import CopolicyError
 from ..features import features_of
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding, Severity
-from .limits import limit
-from .rule import Rule
 
 
 def _files(table: EpisodeTable) -> Iterator[Finding]:
@@ -46,13 +45,13 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
     for name, values in ((name, values) for name, values in table.frames.items() if name in ours):
         rows = values.reshape(table.frame_count, -1).astype(float)
         if name in stored and np.isfinite(rows).all():  # else said by `finite`
-            yield from _against_frames(name, stored[name], rows)
+            yield from _against_frames(table, name, stored[name], rows)
 
 
-def _against_frames(name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
+def _against_frames(table: EpisodeTable, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
     from ..lerobot_folder.loading import STATISTICS, numbers
 
-    warning, error = limit("frame_statistics.warning"), limit("frame_statistics.error")
+    warning, error = (table.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))
     figures = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     scale = 1 + np.abs(rows).max(axis=0)
     off = {kind: float((np.abs(numbers(stored[kind], None) - figures[kind]) / scale).max()) for kind in STATISTICS}

@@ -1,64 +1,39 @@
-"""Whether the maps that the episodes name are the ones in their rows."""
+"""Whether an episode has one scenario throughout, the one that it names, and begins at its start."""
 
-import functools
-import math
-import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from copolicy.tasks.table.features import map_of
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.maps import MAP_SETS, map_set
-
 from ..exceptions import CopolicyError
 from ..features import ENVIRONMENT_STATE, STATE
-from ..lerobot_folder.exclusions import FLAG
+from ..scenarios import base_name
+from ..task import PairTask
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding
-from .limits import limit
-from .rule import Rule, each
-
-DISPLACED = "-displaced"
-"""Ends the name of a map whose start alone was changed."""
-
-_UNLIKE = float("inf")
 
 
 def _constant(table: EpisodeTable) -> Iterator[Finding]:
     moved, later = table.changes(table.frames[ENVIRONMENT_STATE])
     changed = np.zeros(table.frame_count, int)
     changed[later] = (moved != 0).any(axis=1)
-    changes = np.add.reduceat(changed, table.starts)
-    message = f"{ENVIRONMENT_STATE} changes within the episode"
-    yield from each(table, changes > 0, "map_constant", changes, 0, "error", message, table.framed)
+    changes = table.count(changed)
+    yield from table.found("map_constant", changes > 0, changes, 0, f"{ENVIRONMENT_STATE} changes within the episode")
 
 
-def _named(table: EpisodeTable) -> Iterator[Finding]:
+def _names(table: EpisodeTable) -> Iterator[Finding]:
     columns = (table.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
     for label, name, group, digest in zip(table.labels, *columns, strict=True):
-        family = name.split("-")[0]
-        if digest:  # of a file, whose maps bear its name
-            if group in MAP_SETS or not name.startswith(f"{group}-"):
-                yield Finding(label, "map_name", name, f"{group}-...", "error", "map_set is not the file of map_id")
-            continue
+        known = _named(table.task).get(base_name(name))
         if not name:
             yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
-        elif family != "custom" and named_map(name) is None:
+        elif known is None and not digest and not name.startswith("custom-"):
             yield Finding(label, "map_name", name, "a map of a set", "error", "map_id is not the name of a known map")
-        elif group != family and not (group == "paper36" and family == "training"):
-            yield Finding(label, "map_name", group, family, "error", "map_set is not the set of map_id")
-    flagged = (
-        np.char.find(table.columns["quality_flags"], "map_mismatch") >= 0 if "quality_flags" in table.columns else ()
-    )
-    for place in np.flatnonzero(flagged):
-        flags = str(table.columns["quality_flags"][place]).split(",")
-        then = "it was recovered" if "map_recovered" in flags else "the one in the rows may be wrong"
-        if any(flag.startswith(FLAG) for flag in flags):
-            then += "; excluded from training"
-        message = f"the importer found another map in the file than was played (map_mismatch): {then}"
-        yield Finding(table.labels[place], "map_name", None, None, "warning", message)
+        elif known is not None and group != known[0]:
+            yield Finding(label, "map_name", group, known[0], "error", "map_set is not the set of map_id")
 
 
 def _files(table: EpisodeTable) -> Iterator[Finding]:
@@ -74,69 +49,57 @@ def _files(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _rows(table: EpisodeTable) -> Iterator[Finding]:
-    rows = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
-    bound = limit("map_position")
-    files: dict[tuple[str, str], MapConfig] = {}
+    rows, (low, high) = _scenarios(table), table.task.spec.scenario.bounds
+    outside = (np.maximum(low - rows, rows - high) / (high - low)).max(axis=1)
+    bound = table.limit("map_position")
+    yield from table.found(
+        "map_rows", ~(outside <= bound), outside, bound, f"{ENVIRONMENT_STATE} is outside its bounds"
+    )
     for place, row in zip(table.framed, rows, strict=True):
-        name, digest = (str(table.columns[column][place]) for column in ("map_id", "map_set_digest"))
-        expected = None if digest else named_map(name)
-        if expected is None and not digest:
-            continue
+        name = str(table.columns["map_id"][place])
+        _, expected = _named(table.task).get(name, ("", None))
         try:
-            found = map_of(row, MapConfig.obstacle_size)
+            table.task.scenario_of_vector(row, {name: values[place] for name, values in table.columns.items()})
         except CopolicyError as error:
             yield Finding(table.labels[place], "map_rows", None, None, "error", str(error))
             continue
-        if expected is None:  # the file is not here: the first episode on a map says what it is
-            expected = files.setdefault((digest, name), found)
-        distance = map_distance(found, expected, start=not name.endswith(DISPLACED))
-        if not distance <= bound:
-            figure = "other obstacles" if distance == _UNLIKE else distance
-            message = f"start, goal or obstacles in the rows are not those of {name}"
-            yield Finding(table.labels[place], "map_rows", figure, bound, "error", message)
+        if expected is not None:
+            away = float((np.abs(row - table.task.scenario_vector(expected)) / (high - low)).max())
+            if not away <= bound:
+                message = f"{ENVIRONMENT_STATE} is not that of {name}"
+                yield Finding(table.labels[place], "map_rows", away, bound, "error", message)
 
 
 def _start(table: EpisodeTable) -> Iterator[Finding]:
-    first = table.frames[STATE][table.starts].astype(float)
-    start = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
-    away = np.linalg.norm(first[:, :2] - start[:, :2], axis=1)
-    bound = limit("map_start")
-    message = "the episode begins this many px from its map's start"
-    yield from each(table, ~(away <= bound), "map_start", away, bound, "error", message, table.framed)
+    task, (low, high) = table.task, table.task.spec.state.bounds
+    away = np.zeros(len(table.framed))
+    for number, (place, row) in enumerate(zip(table.framed, _scenarios(table), strict=True)):
+        try:
+            columns = {name: values[place] for name, values in table.columns.items()}
+            start = task.states_of(np.array([task.start_of(task.scenario_of_vector(row, columns))]))[0]
+        except CopolicyError:
+            continue  # said by `map_rows`
+        away[number] = (np.abs(table.frames[STATE][table.starts[number]] - start) / (high - low)).max()
+    yield from table.beyond("map_start", away, "the episode begins this far from its map's start")
 
 
-def map_distance(found: MapConfig, expected: MapConfig, start: bool = True) -> float:
-    """Largest distance in px between the parts of two maps, whatever the order of their obstacles; a turned start
-    counts with the way of the table's end. Infinite where the number of obstacles differs."""
-    own, other = sorted(found.squares), sorted(expected.squares)
-    if len(own) != len(other):
-        return _UNLIKE
-    ends = [(found.goal, expected.goal), *((a, b) for (a, _), (b, _) in zip(own, other, strict=True))]
-    distances = [math.dist(one, other) for one, other in ends]
-    if start:
-        turn = math.remainder(found.start[2] - expected.start[2], 2 * math.pi)
-        distances += [math.dist(found.start[:2], expected.start[:2]), 96 * abs(turn)]
-    return max(distances)
+def _scenarios(table: EpisodeTable) -> np.ndarray:
+    return table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
 
 
-@functools.cache
-def named_map(name: str) -> MapConfig | None:
-    """The map behind a `map_id`, by the names that `task.identify` gives; None if it is of no set."""
-    match = re.fullmatch(r"([a-z0-9]+)-(\d+)(?:-(\d+)deg)?", name.removesuffix(DISPLACED))
-    if match is None or match[1] not in MAP_SETS or int(match[2]) >= len(MAP_SETS[match[1]]):
-        return None
-    if match[3] is None:
-        return MAP_SETS[match[1]][int(match[2])]
-    turned = map_set(match[1], orientations=True)[4 * int(match[2]) : 4 * int(match[2]) + 4]
-    return next((config for config in turned if round(math.degrees(config.start[2])) == int(match[3])), None)
+@cache
+def _named(task: PairTask) -> Mapping[str, tuple[str, Any]]:
+    """Set and scenario by name, of all sets that come with a task."""
+    known = [scenario for scenarios in task.scenario_sets.values() for scenario in scenarios]
+    return {name: (group, scenario) for scenario in known for name, group in [task.identify(scenario)]}
 
 
 RULES = (
     Rule("map_constant", "one map an episode", _constant, (ENVIRONMENT_STATE,)),
-    Rule("map_names", "map_id and map_set name a known map", _named, (), ("map_id", "map_set", "map_set_digest")),
+    Rule("map_names", "map_id and map_set name a known map", _names, (), ("map_id", "map_set", "map_set_digest")),
     Rule("map_files", "maps of one name are of one file", _files, (),
          ("map_set", "map_set_version", "map_set_digest"), whole=True),
-    Rule("map_rows", "start, goal and obstacles of the rows are the named map's", _rows, (ENVIRONMENT_STATE,),
+    Rule("map_rows", "the scenario of the rows is the named map's", _rows, (ENVIRONMENT_STATE,),
          ("map_id", "map_set_digest")),
     Rule("map_start", "episodes begin at their map's start", _start, (STATE, ENVIRONMENT_STATE)),
 )  # fmt: skip

@@ -8,10 +8,9 @@ import numpy as np
 from ..episode import EPISODE_COLUMNS, Source, termination_reasons
 from ..features import ACTION, HUMAN_ACTION, features_of
 from ..lerobot_folder.info import stripped_hint
+from ..task_parts import Rule
 from .episode_table import EpisodeTable
 from .finding import Finding
-from .limits import limit
-from .rule import Rule, each
 
 CLOCK_FEATURES: dict[str, dict] = {
     "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
@@ -73,33 +72,32 @@ def _columns(table: EpisodeTable) -> Iterator[Finding]:
         if name in table.columns:
             values = table.columns[name]
             unknown = ~np.isin(values, choices)
-            yield from each(table, unknown, "schema", values, "one of the known", "error", f"unknown {name}")
+            yield from table.found("schema", unknown, values, "one of the known", f"unknown {name}")
     if "episode_uuid" in table.columns:
         uuids = table.columns["episode_uuid"]
-        yield from each(table, uuids == "", "schema", uuids, "a name", "error", "no episode_uuid")
+        yield from table.found("schema", uuids == "", uuids, "a name", "no episode_uuid")
 
 
 def _outcome(table: EpisodeTable) -> Iterator[Finding]:
-    reached = np.isin(table.columns["termination_reason"], table.task.spec.successes)
-    figures = table.columns["termination_reason"]
-    differs = reached & ~table.columns["success"]
-    yield from each(table, differs, "outcome", figures, "success", "error", "ended at the goal but is no success")
+    reasons, successes = table.columns["termination_reason"], table.task.spec.successes
+    reached, success = np.isin(reasons, successes), table.columns["success"]
+    message = "ended at the goal but is no success"
+    yield from table.found("outcome", reached & ~success, reasons, "success", message)
     # An episode of the original program may be a success by its own flag; ours end as soon as the goal is touched.
-    differs = ~reached & table.columns["success"]
-    yield from each(table, differs, "outcome", figures, "goal", "error", "a success that did not end at the goal")
+    message = "a success that did not end at the goal"
+    yield from table.found("outcome", ~reached & success, reasons, " or ".join(successes), message)
 
 
 def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:
-    done, success = (table.frames[name].reshape(-1).astype(bool) for name in ("next.done", "next.success"))
     last = np.zeros(table.frame_count, bool)
     last[table.ends] = True
-    marks = np.add.reduceat((done != last).astype(int), table.starts)
-    message = "next.done is not true at the last frame alone"
-    yield from each(table, marks > 0, "outcome", marks, 0, "error", message, table.framed)
-    expected = last & np.repeat(table.of_framed("success"), table.counts)
-    marks = np.add.reduceat((success != expected).astype(int), table.starts)
-    message = "next.success contradicts the episode's success"
-    yield from each(table, marks > 0, "outcome", marks, 0, "error", message, table.framed)
+    for name, expected, message in (
+        ("next.done", last, "next.done is not true at the last frame alone"),
+        ("next.success", last & np.repeat(table.of_framed("success"), table.counts),
+         "next.success contradicts the episode's success"),
+    ):  # fmt: skip
+        marks = table.count(table.frames[name].reshape(-1).astype(bool) != expected)
+        yield from table.found("outcome", marks > 0, marks, 0, message)
 
 
 def _alignment(table: EpisodeTable) -> Iterable[Finding]:
@@ -107,10 +105,9 @@ def _alignment(table: EpisodeTable) -> Iterable[Finding]:
     previous = np.zeros_like(human)
     previous[1:] = human[:-1]
     previous[table.starts] = 0
-    off = np.maximum.reduceat(np.abs(stored - previous).max(axis=1), table.starts).astype(float)
-    bound = limit("previous_action")
+    off, bound = table.largest(np.abs(stored - previous).max(axis=1)).astype(float), table.limit("previous_action")
     message = f"{HUMAN_ACTION} is not the human action of the frame before"
-    return each(table, ~(off <= bound), "alignment", off, bound, "error", message, table.framed)
+    return table.found("alignment", ~(off <= bound), off, bound, message)
 
 
 RULES = (

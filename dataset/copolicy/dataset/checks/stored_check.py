@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from ..exceptions import CopolicyError
 from .finding import SEVERITIES
-from .limits import LIMITS, RULES_VERSION
+from .limits import RULES_VERSION, limits_of
 from .result import CheckResult
 
 SCHEMA = "copolicy-check-1"
@@ -59,7 +59,7 @@ def check_document(
         "rules": len(result.applied),
         "applied": list(result.applied),
         "not_applied": result.not_applied,
-        "limits": {name: asdict(limit) for name, limit in LIMITS.items()},
+        "limits": {name: asdict(limit) for name, limit in limits_of(result.table.task).items()},
         "counts": {severity: result.count(severity) for severity in SEVERITIES},
         "strict": strict,
         "passed": not result.failed(strict),

@@ -1,6 +1,19 @@
-"""The flag `--maps` of every command that carries on maps."""
+"""The flags `--maps` and `--task` of every command that acts in scenarios."""
 
 import argparse
+
+from ..task import TABLE, PairTask
+
+
+def add_task_flag(command: argparse.ArgumentParser, given: bool = True) -> None:
+    """Adds `--task NAME`; without `given` its value is None where nobody gave it."""
+    default = TABLE if given else None
+    command.add_argument("--task", default=default, metavar="NAME", help=f"task that is installed (default: {TABLE})")
+
+
+def set_name(task: PairTask, given: str | None, default: str) -> str:
+    """The value of `--maps`, or its default; the first set of a task that has none of that name."""
+    return given or (default if default in task.scenario_sets else next(iter(task.scenario_sets)))
 
 
 def add_maps_flag(command: argparse.ArgumentParser, default: str, dest: str = "maps", given: bool = True) -> None:

@@ -1,16 +1,14 @@
 """Which episodes of a data set belong together: those of a pair and its partners, of a map, or copies alone."""
 
-import re
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Literal
 
+from ..scenarios import base_name
 from .selection import Row, consents_of
 
 By = Literal["pairs", "maps", "episodes"]
 """What stays together: people who carried together or with the same partner; a map; nothing but copies."""
-
-_VARIANT = re.compile(r"(-\d+deg)?(-displaced)?$")
 
 
 def groups(rows: Sequence[Row], motions: Sequence[Hashable], by: By, same_consent: bool = False) -> list[list[int]]:
@@ -53,7 +51,7 @@ def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
 
 def base_map(row: Row) -> str:
     """The map of an episode, whatever its start orientation."""
-    return _VARIANT.sub("", row.get("map_id") or "")
+    return base_name(row.get("map_id") or "")
 
 
 class _Joined:

@@ -1,7 +1,6 @@
 """What `copolicy-dataset diff` compares: a folder, a release of a folder, or a revision on the Hub; with statistics."""
 
 import math
-import re
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from ..exceptions import FileFormatError
 from ..files.json_file import read_json
 from ..files.meta_files import STATISTICS_FILE
 from ..publication.data_version import TAG_PREFIX
+from ..publication.repo_id import repo_id_problem
 from .content import read_content
 from .digests import Content
 from .release_record import read_release
@@ -51,7 +51,7 @@ def read_side(text: str) -> Side:
     if revision and Path(name).is_dir():
         record = read_release(Path(name), revision)
         return Side(text, record.content, None, record.content_hash)
-    if re.fullmatch(r"[\w.-]+/[\w.-]+", name):
+    if repo_id_problem(name) is None:
         from ..files.meta_files import RAW_FOLDER
         from ..hub.repository import download, resolve
 

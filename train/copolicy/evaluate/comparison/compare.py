@@ -41,14 +41,23 @@ def compare(methods: Sequence[Method]) -> dict[str, Any]:
             for method in methods
         },
         "differences": [_difference(methods[0], other, parts) for other in methods[1:]],
-        "definitions": DEFINITIONS,
+        **_definitions(first),
     }
+
+
+def _definitions(first: Result) -> dict[str, dict[str, str]]:
+    """What the measures mean; the reason of one that the task lacks, where the result has it, stands apart."""
+    if first.measures_interaction:
+        return {"definitions": DEFINITIONS}
+    reason = first.not_measured.get("interaction_force", "left out: no result has it")
+    definitions = {name: text for name, text in DEFINITIONS.items() if name != "interaction_mean"}
+    return {"definitions": definitions, "not_measured": {"interaction_mean": reason}}
 
 
 def _parts(first: Result) -> dict[str, Part]:
     """By number of obstacles and, with partners, by kind."""
     parts: dict[str, Part] = {}
-    for count in sorted({row["obstacles"] for row in first.rows}):
+    for count in sorted({row["obstacles"] for row in first.rows if "obstacles" in row}):
         name = f"{count} obstacle{'s' * (count != 1)}"
         parts[name] = lambda run, count=count: subset(run, "obstacles", count)
     for kind in dict.fromkeys(row["partner"] for row in first.rows if "partner" in row):
@@ -72,7 +81,7 @@ def _summary(runs: Sequence[Mapping[Key, Values]]) -> dict[str, Any]:
 def _run_means(runs: Sequence[Mapping[Key, Values]], name: str) -> list[float]:
     means = []
     for run in runs:
-        values = np.array([one[name] for one in run.values()])
+        values = np.array([one.get(name, np.nan) for one in run.values()])
         finite = values[np.isfinite(values)]
         means.append(float(finite.mean()) if len(finite) else float("nan"))
     return means

@@ -8,40 +8,45 @@ def markdown(comparison: Mapping[str, Any]) -> str:
     """Methods in rows, then differences in rows, then what they mean."""
     methods, settings = comparison["methods"], comparison["settings"]
     parts = list(next(iter(methods.values()))["parts"])
-    head = ["method", "runs", "success, % (max)", "time, s", "interaction force", *(f"{name}, %" for name in parts)]
-    rows = [[name, *_method(one, parts)] for name, one in methods.items()]
+    missing = comparison.get("not_measured", {})
+    measures = {"time_s": ("time, s", 2), "interaction_mean": ("interaction force", 4)}
+    measures = {name: measure for name, measure in measures.items() if name not in missing}
+    labels = [label for label, _ in measures.values()]
+    rows = [
+        [
+            name,
+            str(one["success"]["runs"]),
+            f"{_percent(one['success'])} ({100 * one['success']['max']:.1f})",
+            *(_plain(one[measure], digits) for measure, (_, digits) in measures.items()),
+            *(_percent(one["parts"][part]["success"]) for part in parts),
+        ]
+        for name, one in methods.items()
+    ]
     text = [
         f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes a "
         f"run, {settings.get('actions_per_plan', '?')} actions a plan, hold {settings.get('hold', '?')}, at most "
         f"{settings.get('step_limit', '?')} steps ({comparison['label']}).",
-        _table(head, rows),
+        _table(["method", "runs", "success, % (max)", *labels, *(f"{part}, %" for part in parts)], rows),
     ]
     if comparison["differences"]:
-        head = ["difference", "success, points", "time, s", "interaction force", "McNemar p", "between runs, points"]
-        text.append(_table(head, [_difference(one) for one in comparison["differences"]]))
-    notes = comparison["definitions"]
-    text.append("\n".join(f"- {name}: {notes[name]}." for name in ("success", "bootstrap_95", "between_runs")))
+        rows = [
+            [
+                f"{one['first']} - {one['second']}",
+                _interval(one["success"], 100, 1),
+                *(_interval(one[measure], 1, digits) for measure, (_, digits) in measures.items()),
+                *_tests(one),
+            ]
+            for one in comparison["differences"]
+        ]
+        text.append(_table(["difference", "success, points", *labels, "McNemar p", "between runs, points"], rows))
+    notes = {name: comparison["definitions"][name] for name in ("success", "bootstrap_95", "between_runs")}
+    text.append("\n".join(f"- {name}: {note}." for name, note in {**notes, **missing}.items()))
     return "\n\n".join(text) + "\n"
 
 
-def _method(one: Mapping[str, Any], parts: list[str]) -> list[str]:
-    success = one["success"]
-    return [
-        str(success["runs"]),
-        f"{_percent(success)} ({100 * success['max']:.1f})",
-        _plain(one["time_s"], 2),
-        _plain(one["interaction_mean"], 4),
-        *(_percent(one["parts"][name]["success"]) for name in parts),
-    ]
-
-
-def _difference(one: Mapping[str, Any]) -> list[str]:
+def _tests(one: Mapping[str, Any]) -> list[str]:
     between, mcnemar = one["between_runs"], one["mcnemar"]
     return [
-        f"{one['first']} - {one['second']}",
-        _interval(one["success"], 100, 1),
-        _interval(one["time_s"], 1, 2),
-        _interval(one["interaction_mean"], 1, 4),
         f"{mcnemar['p']:.3g} ({mcnemar['only_first']} against {mcnemar['only_second']})" if mcnemar else "",
         "{:+.1f} to {:+.1f}, p {:.3g}".format(*(100 * bound for bound in between["interval_95"]), between["p"])
         if between

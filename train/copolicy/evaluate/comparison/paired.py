@@ -11,7 +11,7 @@ REPLICATES = 10_000
 BOOTSTRAP = f"percentile bootstrap over maps, {REPLICATES} replicates, all episodes of a map drawn together"
 
 METRICS = ("success", "time_s", "interaction_mean", "interaction_p95", "robot_share", "deadlock_s")
-"""What is compared, where the rows have it: success as 0 or 1, time of successes only, s, forces, shares."""
+"""What is compared, where all rows have it: success as 0 or 1, time of successes only, s, forces, shares."""
 
 Key = tuple[Hashable, ...]
 Values = dict[str, float]
@@ -19,7 +19,7 @@ Values = dict[str, float]
 
 def episode_key(row: Mapping[str, Any]) -> Key:
     """What makes two episodes the same episode: place in the list of starts, map, partner, repeat."""
-    return row["map_index"], row["map_id"], row["start_theta"], row.get("partner", ""), row["repeat"]
+    return row["map_index"], row["map_id"], row.get("start_theta"), row.get("partner", ""), row["repeat"]
 
 
 def base_map(map_id: str) -> str:
@@ -31,7 +31,7 @@ def episode_values(rows: Iterable[Mapping[str, Any]]) -> dict[Key, Values]:
     """Metrics of each episode; the time of a failure is nan, since it says nothing about how fast a robot is."""
     found = {}
     for row in rows:
-        values = {name: float(row[name]) for name in METRICS if name in row}
+        values = {name: float(row[name]) for name in METRICS if row.get(name) is not None}
         if not row["success"]:
             values["time_s"] = math.nan
         found[episode_key(row)] = values

@@ -8,6 +8,7 @@ from typing import Any
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.policies.documents import ComparedDocument
+from copolicy.dataset.task import TABLE
 
 from .paired import Key, Values, episode_key, episode_values
 
@@ -15,6 +16,7 @@ _WHAT = "a result of copolicy-eval coplan or partner"
 # Where the noise of the plans comes from and what computes them is no part of the protocol.
 _FREE_SETTINGS = ("seed", "device")
 _COLUMNS = ("map_index", "map_id", "start_theta", "obstacles", "repeat", "success", "time_s", "interaction_mean")
+_OF_THE_TABLE = ("start_theta", "obstacles")  # a result that names no task is of it
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class Result:
         weights: digest of the checkpoint's weights; empty where a scripted robot acted.
         rows: one an episode, as in the file.
         values: metrics of each episode.
+        not_measured: why a measure is null, by its name in the summary.
     """
 
     path: Path
@@ -35,6 +38,7 @@ class Result:
     weights: str
     rows: tuple[dict[str, Any], ...]
     values: dict[Key, Values]
+    not_measured: dict[str, str]
 
     @classmethod
     def read(cls, path: Path) -> "Result":
@@ -47,7 +51,8 @@ class Result:
             study, label, rows = str(content["study"]), str(content["label"]), tuple(content["episodes"])
             settings = {key: one for key, one in content["settings"].items() if key not in _FREE_SETTINGS}
             weights = str(content["policy"].get("weights_sha256", ""))
-            missing = [name for row in rows[:1] for name in _COLUMNS if name not in row]
+            needed = [name for name in _COLUMNS if "task" not in settings or name not in _OF_THE_TABLE]
+            missing = [name for row in rows[:1] for name in needed if name not in row]
             values = {} if missing else episode_values(rows)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise FileFormatError(path, _WHAT, f"none: {type(error).__name__} {error}") from None
@@ -55,7 +60,12 @@ class Result:
             raise FileFormatError(path, _WHAT, f"episodes without {', '.join(missing)}")
         if not rows or len(values) < len(rows):
             raise FileFormatError(path, "at least one episode, and each once", f"{len(rows)}, {len(values)} distinct")
-        return cls(path, study, label, settings, weights, rows, values)
+        return cls(path, study, label, settings, weights, rows, values, content.get("not_measured") or {})
+
+    @property
+    def measures_interaction(self) -> bool:
+        """Whether its task has an interaction measure."""
+        return all("interaction_mean" in values for values in self.values.values())
 
     @property
     def success(self) -> float:
@@ -95,8 +105,9 @@ def read_methods(files: Mapping[str, Sequence[Path]]) -> list[Method]:
 def _require_same_protocol(first: Result, run: Result) -> None:
     if run.study != first.study:
         raise FileFormatError(run.path, f"the study {first.study!r} as in {first.path}", repr(run.study))
-    for name in sorted(first.settings.keys() | run.settings.keys()):
-        expected, found = first.settings.get(name), run.settings.get(name)
+    for name in ("task", *sorted(first.settings.keys() | run.settings.keys())):
+        usual = TABLE if name == "task" else None
+        expected, found = first.settings.get(name, usual), run.settings.get(name, usual)
         if name == "map_set":
             _require_same_maps(first, run)
         elif expected != found:

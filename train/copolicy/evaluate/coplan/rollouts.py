@@ -1,21 +1,19 @@
 """The paper's co-planning study: both players act on one sampled plan, on every map of a set at once.
 
 Protocol (paper, section V-A): from the last To observations a joint plan is sampled, its first actions are executed,
-then the next plan is sampled. A plan lives at the data set's rate, so each of its actions is held for 30 / fps steps
-of the world (the original program's evaluation skips that hold and plays a 10 Hz plan three times too fast).
+then the next plan is sampled. A plan lives at the data set's rate, so each of its actions is held for record_hz / fps
+steps of the world (the original program's evaluation skips that hold and plays a 10 Hz plan three times too fast).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.rollout import Rollout, Trace
-from copolicy.dataset.task import get_task
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.interaction import interaction_force
+from copolicy.dataset.task import PairTask, get_task
 
 
 @dataclass(frozen=True)
@@ -23,8 +21,9 @@ class Outcome:
     """One episode of a study.
 
     Attributes:
-        path: `(steps + 1, 2)` the table's centre, px.
-        interaction: `(steps,)` interaction force, units of a player's full force.
+        path: `(steps + 1, 2)` of the point that the task follows, in the unit of its outline; None: it has none.
+        interaction: `(steps,)` the task's interaction measure; None: it has none.
+        task: that it is of.
     """
 
     map_index: int
@@ -33,31 +32,39 @@ class Outcome:
     success: bool
     reason: str
     plans: int
-    path: np.ndarray
-    interaction: np.ndarray
+    path: np.ndarray | None
+    interaction: np.ndarray | None
+    task: PairTask = field(default_factory=get_task, kw_only=True, repr=False)
+    end: int | None = field(default=None, kw_only=True, repr=False)
 
     @property
     def steps(self) -> int:
-        """Steps of 1/30 s."""
-        return len(self.interaction)
+        """Steps of the world."""
+        return len(self.interaction) if self.end is None and self.interaction is not None else int(self.end or 0)
 
     def to_json(self) -> dict:
         """The row of `eval.json`."""
-        size = np.abs(self.interaction)
         return {
             "map_index": self.map_index,
-            "map_id": get_task().identify(self.map_config)[0],
-            "start_theta": self.map_config.start[2],
-            "obstacles": len(self.map_config.obstacles),
+            "map_id": self.task.identify(self.map_config)[0],
+            **self.task.studies.factors(self.map_config),
             "repeat": self.repeat,
             "success": self.success,
             "reason": self.reason,
             "steps": self.steps,
-            "time_s": self.steps / RECORD_HZ,
+            "time_s": self.steps / self.task.spec.record_hz,
             "plans": self.plans,
-            "interaction_mean": float(size.mean()),
-            "interaction_p95": float(np.quantile(size, 0.95)),
+            **interaction_columns(self.interaction),
         }
+
+
+def interaction_columns(interaction: np.ndarray | None) -> dict[str, float | None]:
+    """The columns of an episode's row with its interaction `(T,)`; null where the task does not measure it."""
+    size = None if interaction is None else np.abs(interaction)
+    return {
+        "interaction_mean": None if size is None else float(size.mean()),
+        "interaction_p95": None if size is None else float(np.quantile(size, 0.95)),
+    }
 
 
 def coplan(
@@ -81,23 +88,42 @@ def coplan(
         One outcome for each map and repeat, in that order.
     """
     episodes = [(index, config, repeat) for index, config in enumerate(maps) for repeat in range(repeats)]
-    agent = PolicyAgent(policy, get_task(), fps=fps, seed=seed)
+    agent = PolicyAgent(policy, get_task(policy.task), fps=fps, seed=seed)
     rollout = together(agent, [config for _, config, _ in episodes], physics)
-    trace = Trace(rollout)
-    while len(rollout.running):
-        rollout.step()
-        on_step(len(episodes) - len(rollout.running))
-    return [Outcome(*episode, *measured(rollout, trace, agent, k)) for k, episode in enumerate(episodes)]
+    trace = traced_to_the_end(rollout, on_step)
+    about = {"task": rollout.task}
+    return [
+        Outcome(*episode, *measured(rollout, trace, agent, k), end=rollout.ends[k], **about)
+        for k, episode in enumerate(episodes)
+    ]
 
 
 def together(agent: PolicyAgent, maps: Sequence[Any], physics: Any) -> Rollout:
     """A rollout at the start of maps in which both players act on the agent's chunks."""
-    return Rollout(get_task(), maps, (agent, agent.other_half()), settings=physics)
+    return Rollout(agent.task, maps, (agent, agent.other_half()), settings=physics)
 
 
-def measured(rollout: Rollout, trace: Trace, agent: Any, index: int) -> tuple[bool, str, int, np.ndarray, np.ndarray]:
-    """The last five fields of the `Outcome` of a world."""
+def traced_to_the_end(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:
+    """Steps until every world has ended; `on_step` is called after each step with the number of those that have."""
+    trace = Trace(rollout)
+    while len(rollout.running):
+        rollout.step()
+        on_step(len(rollout.worlds) - len(rollout.running))
+    return trace
+
+
+def measured(
+    rollout: Rollout, trace: Trace, agent: Any, index: int
+) -> tuple[bool, str, int, np.ndarray | None, np.ndarray | None]:
+    """The five fields of the `Outcome` of a world from `success` on."""
     end, states = rollout.outcomes[index], trace.states(index)
-    force = interaction_force(states[1:, 2], trace.actions(index))
+    interaction = rollout.task.interaction_recorded(states[1:], trace.actions(index))
     chunks = int(agent.chunks[index]) if isinstance(agent, PolicyAgent) else 0
-    return end.success, end.reason, chunks, states[:, :2], force
+    return end.success, end.reason, chunks, _followed(rollout.task, states), interaction
+
+
+def _followed(task: PairTask, recorded: np.ndarray) -> np.ndarray | None:
+    """`(T, 2)` the point that a task follows in recorded states, else the middle of the body of its outline."""
+    states = task.states_of(recorded)
+    path = task.path(states)
+    return path if path is not None or task.outline is None else task.outline.poses(states)[:, :2]

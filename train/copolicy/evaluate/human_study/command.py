@@ -14,10 +14,16 @@ from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.publication.licences import checked_licence
-from copolicy.dataset.task import get_task
 
 from ..result_file import write_json
-from ..study_flags import add_protocol_flags, policy_settings, protocol_of
+from ..study_flags import (
+    add_protocol_flags,
+    policy_settings,
+    protocol_of,
+    stated_settings,
+    task_entry,
+    unseen_entry,
+)
 
 
 def add_human_command(commands: argparse._SubParsersAction) -> None:
@@ -57,14 +63,12 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--configurations",
         type=whole_number("--configurations", None),
-        default=60,
-        help="starts shared out among people, as in `partner` (default: 60)",
+        help="starts shared out among people, as in `partner` (default: 60, or all of a smaller set)",
     )
     command.add_argument(
         "--episodes-per-robot",
         type=whole_number("--episodes-per-robot", 1, 10_000),
-        default=12,
-        help="starts of each person, the same with every robot (default: 12)",
+        help="starts of each person, the same with every robot (default: 12, or as many as there are)",
     )
     command.add_argument("--out", required=True, type=Path, help="where the plan goes; it holds the key: keep it shut")
     add_protocol_flags(command, actions_per_plan=1)
@@ -127,7 +131,6 @@ def _plan(arguments: argparse.Namespace) -> dict:
     from .plan import Robot, make_plan, williams_square
 
     require_new(arguments.out, overwrite=arguments.overwrite)
-    chosen = get_task().scenario_set(arguments.maps)
     robots = []
     for text in arguments.policies:
         name, path = split_name(text)
@@ -135,18 +138,21 @@ def _plan(arguments: argparse.Namespace) -> dict:
             raise InvalidValueError("NAME=CKPT", "a name for each robot", text)
         robots.append(Robot.of(name, path))
     folders = [(robot.name, checkpoint_folder(robot.checkpoint)) for robot in robots]
-    physics = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders]).physics
+    protocol = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders])
+    chosen = protocol.task.scenario_set(arguments.maps)
+    starts = study_configurations(chosen, arguments.configurations)
+    asked, (stated, unusual) = arguments.episodes_per_robot, stated_settings(protocol.task, protocol.physics)
     plan = make_plan(
         robots,
         chosen.label,
-        study_configurations(chosen, arguments.configurations),
+        starts,
         arguments.participants,
-        arguments.episodes_per_robot,
+        min(12, len(starts)) if asked is None else asked,
         arguments.seed,
         actions_per_plan=arguments.actions_per_plan,
-        step_limit=physics.step_limit,
-        angular_acceleration_limit=physics.angular_acceleration_limit,
+        world={**stated, **unusual},
         settings=policy_settings(arguments),
+        task_name=protocol.task.spec.name,
     )
     write_json(arguments.out, plan.to_json())
     orders = len(williams_square(len(robots)))
@@ -155,10 +161,11 @@ def _plan(arguments: argparse.Namespace) -> dict:
         "plan_id": plan.plan_id,
         "participants": list(plan.trials),
         "robots": [robot.name for robot in robots],
-        "episodes_per_participant": len(robots) * arguments.episodes_per_robot,
+        "episodes_per_participant": len(next(iter(plan.trials.values()))),
         "counterbalanced": f"{orders} orders of robots"
         + ("" if arguments.participants % orders == 0 else f": complete only with a multiple of {orders} participants"),
         "next": f"copolicy-eval human run {arguments.out} --participant {next(iter(plan.trials))} --out RECORDINGS",
+        **unseen_entry(protocol.task, starts),
     }
 
 
@@ -170,7 +177,7 @@ def _run(arguments: argparse.Namespace) -> dict:
     checked_licence(arguments.license)
     plan = StudyPlan.read(arguments.plan)
     plan.of(arguments.participant)
-    human = PilotSpec.parse(arguments.human)
+    human = PilotSpec.parse(arguments.human, plan.task_name)
     # Deferred: a wrong call should not wait for torch and pygame.
     from .session import run_session
 
@@ -213,7 +220,13 @@ def _summarise(arguments: argparse.Namespace) -> dict:
         settings = (
             {}
             if plan is None
-            else {"plan_id": plan.plan_id, "maps": plan.maps, **plan.map_set, "step_limit": plan.step_limit}
+            else {
+                **task_entry(plan.task),
+                "plan_id": plan.plan_id,
+                "maps": plan.maps,
+                **plan.map_set,
+                "step_limit": plan.physics.step_limit,
+            }
         )
         write_json(
             arguments.out,
@@ -228,8 +241,9 @@ def _summarise(arguments: argparse.Namespace) -> dict:
 def _lines(summary: dict) -> dict:
     robots = {}
     for name, one in summary["robots"].items():
-        line = {"success": _value(one["success"], 100, 1, " %"), "time": _value(one["time_s"], 1, 2, " s")}
-        robots[name] = {**line, "interaction_force": _value(one["interaction_mean"], 1, 4, "")}
+        robots[name] = {"success": _value(one["success"], 100, 1, " %"), "time": _value(one["time_s"], 1, 2, " s")}
+        if "interaction_mean" in summary["tests"]:
+            robots[name]["interaction_force"] = _value(one["interaction_mean"], 1, 4, "")
     tests = {}
     for measure, test in summary["tests"].items():
         f = test["anova"]
@@ -242,7 +256,8 @@ def _lines(summary: dict) -> dict:
         question: {robot: _value(value, 1, 2, "") for robot, value in one["robots"].items()}
         for question, one in summary.get("ratings", {}).items()
     }
-    return {"robots": robots, "anova": tests, **({"ratings": ratings} if ratings else {})}
+    missing = {name: summary[name] for name in ("not_measured",) if name in summary}
+    return {"robots": robots, "anova": tests, **({"ratings": ratings} if ratings else {}), **missing}
 
 
 def _value(one: dict, scale: float, digits: int, unit: str) -> str:

@@ -2,9 +2,8 @@
 
 import hashlib
 import json
-import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,13 @@ from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
-from copolicy.dataset.task import get_task
-from copolicy.tasks.table.map_config import MapConfig
-from copolicy.tasks.table.physics import Physics
+from copolicy.dataset.task import TABLE, PairTask, get_task
+
+from ..study_flags import LIMIT, usual_settings
 
 _VERSION = 1
 _WHAT = "a plan of copolicy-eval human plan"
+_WORLD = ("step_limit", LIMIT, "physics")
 
 
 @dataclass(frozen=True)
@@ -70,30 +70,38 @@ class StudyPlan:
         robots: that are compared.
         configurations: starts that are shared out among participants.
         trials: of each participant, in order.
+        world: its settings, as `stated_settings` gives them; the usual ones where there are none.
         settings: of the policies, as `--num-inference-steps` gives them.
+        task_name: of what is done together.
     """
 
     plan_id: str
     maps: str
     robots: tuple[Robot, ...]
-    configurations: tuple[MapConfig, ...]
+    configurations: tuple[Any, ...]
     trials: dict[str, tuple[PlannedTrial, ...]]
     seed: int = 0
     actions_per_plan: int = 1
-    step_limit: int = 2000
-    angular_acceleration_limit: float = math.pi / 2
+    world: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
+    task_name: str = TABLE
 
     @property
-    def physics(self) -> Physics:
+    def task(self) -> PairTask:
+        """What is done together."""
+        return get_task(self.task_name)
+
+    @property
+    def physics(self) -> Any:
         """Settings of the world."""
-        return Physics(self.angular_acceleration_limit, self.step_limit)
+        stated = {name: value for name, value in self.world.items() if name != "physics"}
+        return replace(usual_settings(self.task), **self.world.get("physics", stated))
 
     @property
     def map_set(self) -> dict[str, dict[str, str]]:
         """Name, version and digest of a file that the starts are from, as settings of a result."""
-        name = self.configurations[0].named
-        if name is None:
+        name = self.task.name_of(self.configurations[0])
+        if not name.digest:
             return {}
         return {"map_set": {"name": self.maps, "version": name.version, "digest": name.digest, "from": "file"}}
 
@@ -109,14 +117,11 @@ class StudyPlan:
 
     def to_json(self) -> dict[str, Any]:
         """The file of the plan."""
-        content = asdict(self)
-        content["configurations"] = [
-            {**_columns(config), **json.loads(config.to_json())} for config in self.configurations
-        ]
+        configurations = [{**_columns(self.task, one), **json.loads(one.to_json())} for one in self.configurations]
         return {
             "study_plan": _VERSION,
             "note": "This file tells which robot is which: whoever runs the sessions should not read it.",
-            **content,
+            **_content(self, configurations),
         }
 
     @classmethod
@@ -129,14 +134,18 @@ class StudyPlan:
         try:
             if content["study_plan"] != _VERSION:
                 raise FileFormatError(path, f"{_WHAT}, version {_VERSION}", f"version {content['study_plan']}")
+            content["task_name"] = content.pop("task", TABLE)
+            content["world"] = {name: content[name] for name in _WORLD if name in content}
             fields = {name: content[name] for name in cls.__dataclass_fields__}
+            task = get_task(content["task_name"])
             fields["robots"] = tuple(Robot(**one) for one in content["robots"])
-            fields["configurations"] = tuple(_configuration(one) for one in content["configurations"])
+            fields["configurations"] = tuple(_configuration(task, one) for one in content["configurations"])
             fields["trials"] = {
                 name: tuple(PlannedTrial(**one) for one in trials) for name, trials in content["trials"].items()
             }
             plan = cls(**fields)
             digest = _digest(plan)
+            plan.physics  # noqa: B018 (checks the settings)
         except (KeyError, TypeError, AttributeError, ValueError, InvalidValueError) as error:
             raise FileFormatError(path, _WHAT, f"none: {type(error).__name__} {error}") from None
         if plan.plan_id != digest:
@@ -147,7 +156,7 @@ class StudyPlan:
 def make_plan(
     robots: Sequence[Robot],
     maps: str,
-    configurations: Sequence[MapConfig],
+    configurations: Sequence[Any],
     participants: int,
     episodes_per_robot: int,
     seed: int,
@@ -198,25 +207,38 @@ def weights_digest(checkpoint: str) -> str:
     return hashlib.sha256((checkpoint_folder(checkpoint) / "model.safetensors").read_bytes()).hexdigest()
 
 
-def _columns(config: MapConfig) -> dict[str, Any]:
+def _columns(task: PairTask, config: Any) -> dict[str, Any]:
     """How the file of the plan names a start; of a map from a file all that recordings say of it."""
-    name = get_task().name_of(config)
-    return {"map_id": name.scenario} if config.named is None else name.columns
+    name = task.name_of(config)
+    return name.columns if name.digest else {"map_id": name.scenario}
 
 
-def _configuration(entry: dict[str, Any]) -> MapConfig:
-    config = MapConfig.from_json(json.dumps(entry))
-    if "map_set_digest" not in entry:
+def _configuration(task: PairTask, entry: dict[str, Any]) -> Any:
+    columns = ScenarioName("", "").columns
+    config = task.scenario_of_json(json.dumps({name: value for name, value in entry.items() if name not in columns}))
+    if "map_set_digest" not in entry or not hasattr(config, "named"):
         return config
-    return replace(config, named=ScenarioName(*(entry[name] for name in ScenarioName("", "").columns)))
+    return replace(config, named=ScenarioName(*(entry[name] for name in columns)))
+
+
+def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The fields of a plan as its file has them; one that names no task is of the table."""
+    content: dict[str, Any] = {}
+    for name, value in asdict(replace(plan, configurations=())).items():
+        content |= value if name == "world" else {name: value}
+    content["configurations"] = list(configurations)
+    if (task := content.pop("task_name")) != TABLE:
+        content["task"] = task
+    return content
 
 
 def _digest(plan: StudyPlan) -> str:
-    content: dict[str, Any] = {**asdict(plan), "plan_id": ""}
-    for one in content["configurations"]:
+    configurations = [asdict(one) if is_dataclass(one) else json.loads(one.to_json()) for one in plan.configurations]
+    for one in configurations:
         for later in ("obstacle_sizes", "named"):  # of later versions: plans without them keep their digest
-            if not one[later]:
+            if later in one and not one[later]:
                 del one[later]
+    content = {**_content(plan, configurations), "plan_id": ""}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]
 
 

@@ -11,8 +11,9 @@ from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.recording.log import Recording, read_recording
 from copolicy.dataset.task import get_task
-from copolicy.dataset.task_spec import RECORD_HZ
 
+from ..coplan.rollouts import interaction_columns
+from ..study_flags import task_entry
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX
 
@@ -63,9 +64,9 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
     episode = recording.episode
     meta = episode.meta
     after = np.vstack((episode.states[1:], episode.final_state))
-    measured = get_task(episode.task).interaction(after, episode.actions)
-    force = None if measured is None else np.abs(measured)
+    task = get_task(episode.task)
     row: dict[str, Any] = {
+        **task_entry(task),
         "participant": meta.pair_id,
         "trial": "",
         "block": 0,
@@ -73,14 +74,12 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
         "human": meta.controller_1,
         "source": meta.source,
         "map_id": meta.map_id,
-        "start_theta": episode.map_config.start[2],
-        "obstacles": len(episode.map_config.obstacles),
+        **task.studies.factors(episode.map_config),
         "success": meta.success,
         "reason": meta.termination_reason,
         "steps": len(episode.actions),
-        "time_s": len(episode.actions) / RECORD_HZ,
-        "interaction_mean": None if force is None else float(force.mean()),
-        "interaction_p95": None if force is None else float(np.quantile(force, 0.95)),
+        "time_s": len(episode.actions) / task.spec.record_hz,
+        **interaction_columns(task.interaction(after, episode.actions)),
         "planning_ms": _planning_ms(recording),
         "quality_flags": meta.quality_flags,
         "recording": path.name,

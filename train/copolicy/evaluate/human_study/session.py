@@ -14,8 +14,6 @@ from copolicy.train.checkpoint import Checkpoint
 from .plan import StudyPlan, weights_digest
 from .schedule import BlindPolicy, StudySchedule, StudySettings
 
-_PLACEHOLDER = PilotSpec("scripted", "S01")  # sits at the robot's seat until the robots of the plan take over
-
 
 def run_session(
     plan: StudyPlan, participant: str, human: PilotSpec, out: Path, device: str = "cpu", **play: Any
@@ -37,21 +35,24 @@ def run_session(
     if human.kind not in ("joystick", "keyboard", "scripted"):
         raise InvalidValueError("--human", "joystick, keyboard or scripted[:PAIR]", f"{human.kind}:{human.detail}")
     trials = plan.of(participant)
+    # Sits at the robot's seat until the robots of the plan take over.
+    placeholder = PilotSpec.parse("scripted", plan.task_name)
     settings = StudySettings(
         pair=participant,
         out=out,
-        pilots=(_PLACEHOLDER, human),
+        pilots=(placeholder, human),
         episodes=len(trials),
         seed=plan.seed,
         swap_seats=False,
         plan=plan,
+        task=plan.task_name,
         **play,
     )
     robots: dict[str, Checkpoint] = {}
     load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
     with prepared(settings, load) as application, ExitStack() as stack:
         policy: Any = BlindPolicy(robots, plan.actions_per_plan)
-        agent = PolicyAgent(policy, real_time=True)
+        agent = PolicyAgent(policy, plan.task, real_time=True)
         stack.callback(agent.close)
         game = application.game
         game.play_by(StudySchedule(plan, participant, policy, agent), agent)

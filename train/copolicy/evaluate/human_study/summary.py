@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import RunError
+from copolicy.dataset.task import TABLE, get_task
 
 from ..comparison.paired import between_runs
-from ..summary import success_rate
+from ..summary import not_measured, success_rate
 from .questionnaire import questions
 from .repeated_measures import anova, rank_test, tukey
 
@@ -16,9 +17,8 @@ LABELS = {
     "human": "human-in-the-loop study: people at the human seat",
     "simulated": "SIMULATED: a scripted player sat at the human seat, no person took part; a trial of the procedure",
 }
-DEFINITIONS = {
-    "robots": "mean over participants of a participant's mean, standard error between participants; time of successes "
-    "only; interaction force |(u_robot - u_human) . e| / 2, full forces",
+_ROBOTS = "mean over participants of a participant's mean, standard error between participants; time of successes only"
+_DEFINITIONS = {
     "anova": "one-way repeated measures over the participants who have a value with every robot; "
     "p_greenhouse_geisser allows for unequal variances of the differences",
     "tukey": "honestly significant differences on the error term of the ANOVA",
@@ -32,15 +32,19 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     """The content of the study's result, without its episodes.
 
     Raises:
-        RunError: people and simulated players among the rows.
+        RunError: people and simulated players among the rows, or several tasks.
     """
-    sources = sorted({row["source"] for row in rows})
-    if len(sources) > 1:
-        raise RunError(f"recordings: expected one source, found {' and '.join(sources)}: summarise them apart")
+    sources, tasks = sorted({row["source"] for row in rows}), sorted({row.get("task", TABLE) for row in rows})
+    for what, found in (("source", sources), ("task", tasks)):
+        if len(found) > 1:
+            raise RunError(f"recordings: expected one {what}, found {' and '.join(found)}: summarise them apart")
+    task, force = get_task(tasks[0]), {"interaction_force": None}
+    if any(row["interaction_mean"] is not None for row in rows):
+        force = {}
     robots = list(dict.fromkeys(sorted(row["robot"] for row in rows)))
     people = list(dict.fromkeys(sorted(row["participant"] for row in rows)))
     tests = {}
-    for measure in _TESTED:
+    for measure in _TESTED[: 2 if force else 3]:
         complete = _complete(people, robots, lambda p, r, measure=measure: _mean(rows, measure, p, r))
         tests[measure] = {"anova": anova(complete), "pairs": tukey(complete, robots) if len(complete) else []}
     result: dict[str, Any] = {
@@ -62,7 +66,9 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     }
     if ratings:
         result["ratings"] = _ratings(ratings)
-    return {**result, "definitions": DEFINITIONS}
+    words = task.studies.definitions.get("human_interaction_force", "as the task measures it")
+    robots_text = _ROBOTS if force else f"{_ROBOTS}; interaction force {words}"
+    return {**result, **not_measured(task, force), "definitions": {"robots": robots_text, **_DEFINITIONS}}
 
 
 def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -4,8 +4,9 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from copolicy.collect.agents.scripted import simulated_players
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
@@ -14,20 +15,19 @@ from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import get_task
 
 from ..result_file import write_json
-from ..study_flags import add_study_flags, policy_of, protocol_of, study_needs, study_settings
+from ..study_flags import add_study_flags, learned_task, policy_of, protocol_of, study_needs, study_settings
+from ..summary import not_measured, percent
+from .configurations import USUAL, all_starts, study_configurations
 
 if TYPE_CHECKING:
     from .robots import Robot
 
-LABEL = (
-    "human-in-the-loop protocol with SIMULATED partners: scripted pilots with a will of their own sit at the human "
-    "seat, no person took part; they know every way of the map, which flatters any robot"
-)
+_LABEL = "human-in-the-loop protocol with SIMULATED partners: "
+_PARTNERS = "scripted players sit at the human seat, no person took part"
 
 
 def add_partner_command(commands: argparse._SubParsersAction) -> None:
     """Adds `partner` to the commands of `copolicy-eval`."""
-    kinds = _profiles()
     command = add_command(
         commands,
         "partner",
@@ -40,21 +40,22 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--baseline",
         nargs="+",
-        default=["passive", "never-yields"],
         metavar="[NAME=]CKPT",
         help="other checkpoints, passive (zero force), never-yields (scripted, endless patience) or scripted (a usual "
-        "simulated pilot), on the same starts with the same partners (default: passive never-yields)",
+        "simulated pilot), on the same starts with the same partners (default: passive, and the first scripted robot "
+        "of the task, for the table never-yields)",
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
     add_maps_flag(command, "unseen")
     command.add_argument(
         "--configurations",
         type=whole_number("--configurations", None),
-        default=60,
-        help="starts: a quarter as many maps, spread over the set, each in four orientations (default: 60)",
+        help="starts: a quarter as many maps, spread over the set, each in four orientations; of a task without "
+        f"orientations as many maps (default: {USUAL}, or all of a smaller set)",
     )
+    kinds = ", ".join(simulated_players(get_task()).partners)
     command.add_argument(
-        "--partners", nargs="+", default=list(kinds), metavar="KIND", help=f"of {', '.join(kinds)} (default: all)"
+        "--partners", nargs="+", metavar="KIND", help=f"kinds that the task has, the table {kinds} (default: all)"
     )
     command.add_argument(
         "--repeats",
@@ -77,20 +78,24 @@ def _partner(arguments: argparse.Namespace) -> dict:
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
-    partners = list(dict.fromkeys(arguments.partners))
-    profiles = _profiles()
+    _, path = split_name(arguments.policy)
+    task = learned_task(path)
+    profiles = simulated_players(task).partners
+    partners = list(dict.fromkeys(profiles if arguments.partners is None else arguments.partners))
     for kind in partners:
         if kind not in profiles:
             raise UnknownNameError("kind of partner", kind, profiles)
-    chosen = get_task().scenario_set(arguments.maps)
+    chosen = task.scenario_set(arguments.maps)
     # Deferred: `--help` and a wrong call should not wait for torch.
-    from .configurations import study_configurations
     from .figure import save_partner_figure
+    from .robots import scripted_robots
     from .study import carry_with_partners
-    from .summary import DEFINITIONS, differences, summarise_with_partners
+    from .summary import definitions, differences, summarise_with_partners
 
     maps = study_configurations(chosen, arguments.configurations)
-    robots = [make_robot(text, arguments) for text in (arguments.policy, *arguments.baseline)]
+    scripted = scripted_robots(task)
+    baseline = list(scripted)[:2] if arguments.baseline is None else arguments.baseline
+    robots = [make_robot(text, arguments, scripted) for text in (arguments.policy, *baseline)]
     names = [robot.name for robot in robots]
     if len(set(names)) < len(names):
         raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
@@ -109,6 +114,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
                 maps,
                 partners,
                 protocol.physics,
+                task=task,
                 repeats=arguments.repeats,
                 fps=fps,
                 seed=arguments.seed,
@@ -129,21 +135,22 @@ def _partner(arguments: argparse.Namespace) -> dict:
     paired = {robot.name: differences(found[0], other) for robot, other in zip(robots[1:], found[1:], strict=True)}
     result = {
         "study": "partner",
-        "label": LABEL,
+        "label": _LABEL + task.studies.definitions.get("partners", _PARTNERS),
         **described[0],
         "settings": {
             "maps": chosen.label,
             "map_set": chosen.describe(),
             "configurations": len(maps),
             "map_count": len(maps),
-            "complete_set": len(maps) == len({config.digest for config in get_task().turned(chosen).scenarios}),
-            "orientations": True,
+            "complete_set": len(maps) == len({config.digest for config in all_starts(chosen)}),
+            "orientations": task.orientations > 1,
             "partners": {kind: asdict(profiles[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
-            **study_settings(arguments, protocol),
+            **study_settings(arguments, protocol, maps),
         },
-        "definitions": DEFINITIONS,
+        **not_measured(task, summaries[0]),
+        "definitions": definitions(task, summaries[0]),
         "baselines": described[1:],
         "differences": paired,
     }
@@ -161,29 +168,24 @@ def _partner(arguments: argparse.Namespace) -> dict:
         },
         "result": str(arguments.out),
         "picture": str(picture),
+        **not_measured(task, summaries[0]),
     }
 
 
-def make_robot(text: str, arguments: argparse.Namespace) -> "Robot":
+def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "Robot"]) -> "Robot":
     """The robot behind `[NAME=]CKPT` or one of the scripted names.
 
     Raises:
         FileFormatError: no such checkpoint.
         InvalidValueError: it plans fewer actions than are to be executed.
     """
-    from .robots import policy_robot, scripted_robots
+    from .robots import policy_robot
 
-    scripted = scripted_robots(get_task())
     if text in scripted:
         return scripted[text]
     name, path = split_name(text)
     policy = policy_of(path, arguments)
     return policy_robot(name or policy.name, policy)
-
-
-def _profiles() -> Mapping[str, Any]:
-    agents = get_task().agents
-    return {} if agents is None else agents.partners
 
 
 def split_name(text: str) -> tuple[str, str]:
@@ -193,17 +195,18 @@ def split_name(text: str) -> tuple[str, str]:
 
 
 def _line(summary: dict) -> dict:
-    success, time = summary["success"], summary["time_to_completion_s"]["mean"]
-    line = {
-        "success": f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %",
-        "time_s": None if time is None else round(time, 2),
-        "interaction_force": round(summary["interaction_force"]["mean"], 4),
-        "robot_share": round(summary["robot_share"], 3),
-        "deadlock_time_share": round(summary["deadlock"]["time_share"], 4),
+    time, force, deadlock = (summary[name] for name in ("time_to_completion_s", "interaction_force", "deadlock"))
+    measures = {
+        "interaction_force": None if force is None else round(force["mean"], 4),
+        "robot_share": None if summary["robot_share"] is None else round(summary["robot_share"], 3),
+        "deadlock_time_share": None if deadlock is None else round(deadlock["time_share"], 4),
     }
-    for kind, part in summary["by_partner"].items():
-        line[kind] = f"{100 * part['success']['mean']:.1f} %"
-    return line
+    return {
+        "success": percent(summary["success"]),
+        "time_s": None if time["mean"] is None else round(time["mean"], 2),
+        **{name: value for name, value in measures.items() if value is not None},
+        **{kind: f"{100 * part['success']['mean']:.1f} %" for kind, part in summary["by_partner"].items()},
+    }
 
 
 def _difference(one: dict) -> str:

@@ -1,6 +1,6 @@
 """The picture of a study with partners: one panel a measure, the kinds of partner side by side, robots by colour."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,30 +8,31 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from copolicy.dataset.files.staging import replacement
+from copolicy.dataset.outline_figure import SERIES
 
-# Okabe and Ito's palette: told apart with every kind of colour vision. Markers differ as well.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_MARKERS = "osD^vPX"
+_MARKERS = "osD^vPX"  # beside the colours
+
+_Point = tuple[float, float, float]
+"""Value, length of the bar below and above."""
 
 
 def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, title: str) -> None:
-    """Draws robots' summaries by name into a PNG."""
-    figure = Figure(figsize=(13, 3.6), dpi=110, layout="constrained")
+    """Draws robots' summaries by name into a PNG; a measure that the task lacks has no panel."""
+    first = next(iter(summaries.values()))
+    kinds = list(first["by_partner"])
+    panels = {label: point for label, (measure, point) in _PANELS.items() if first[measure] is not None}
+    figure = Figure(figsize=(3.25 * len(panels), 3.6), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, 4)
-    kinds = list(next(iter(summaries.values()))["by_partner"])
+    axes = list(figure.subplots(1, len(panels), squeeze=False).flat)
     width = 0.7 / max(1, len(summaries))
     for place, (name, summary) in enumerate(summaries.items()):
         offset = (place - (len(summaries) - 1) / 2) * width
-        points = [_points(summary["by_partner"][kind]) for kind in kinds]
-        for panel, axis in enumerate(axes):
-            values, below, above = zip(*(point[panel] for point in points), strict=True)
-            where = [k + offset for k in range(len(kinds))]
-            style = {"color": _COLOURS[place % len(_COLOURS)], "marker": _MARKERS[place % len(_MARKERS)]}
+        where = [k + offset for k in range(len(kinds))]
+        style = {"color": SERIES[place % len(SERIES)], "marker": _MARKERS[place % len(_MARKERS)]}
+        for axis, point in zip(axes, panels.values(), strict=True):
+            values, below, above = zip(*(point(summary["by_partner"][kind]) for kind in kinds), strict=True)
             axis.errorbar(where, values, yerr=(below, above), linestyle="", capsize=2, label=name, **style)
-    labels = ("success, % (Wilson 95 %)", "time of successes, s (± s.e.)", "interaction force (dot mean, bar to p95)",
-              "time in deadlock, %")  # fmt: skip
-    for axis, label in zip(axes, labels, strict=True):
+    for axis, label in zip(axes, panels, strict=True):
         axis.set_xticks(range(len(kinds)), kinds)
         axis.set_ylabel(label)
         axis.margins(x=0.1)
@@ -43,17 +44,29 @@ def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, 
         figure.savefig(partial, format="png")
 
 
-def _points(summary: Mapping[str, Any]) -> list[tuple[float, float, float]]:
-    """Value, length of the bar below and above, of each panel."""
-    success, force = summary["success"], summary["interaction_force"]
-    low, high = success["wilson_95"]
-    mean = success["mean"]
+def _success(summary: Mapping[str, Any]) -> _Point:
+    (low, high), mean = summary["success"]["wilson_95"], summary["success"]["mean"]
+    return 100 * mean, 100 * max(0.0, mean - low), 100 * max(0.0, high - mean)
+
+
+def _seconds(summary: Mapping[str, Any]) -> _Point:
     time = summary["time_to_completion_s"]
-    seconds = float("nan") if time["mean"] is None else time["mean"]
     error = time["standard_error"] or 0.0
-    return [
-        (100 * mean, 100 * max(0.0, mean - low), 100 * max(0.0, high - mean)),
-        (seconds, error, error),
-        (force["mean"], 0.0, max(0.0, force["p95"] - force["mean"])),
-        (100 * summary["deadlock"]["time_share"], 0.0, 0.0),
-    ]
+    return float("nan") if time["mean"] is None else time["mean"], error, error
+
+
+def _force(summary: Mapping[str, Any]) -> _Point:
+    force = summary["interaction_force"]
+    return force["mean"], 0.0, max(0.0, force["p95"] - force["mean"])
+
+
+def _deadlock(summary: Mapping[str, Any]) -> _Point:
+    return 100 * summary["deadlock"]["time_share"], 0.0, 0.0
+
+
+_PANELS: dict[str, tuple[str, Callable[[Mapping[str, Any]], _Point]]] = {
+    "success, % (Wilson 95 %)": ("success", _success),
+    "time of successes, s (± s.e.)": ("time_to_completion_s", _seconds),
+    "interaction force (dot mean, bar to p95)": ("interaction_force", _force),
+    "time in deadlock, %": ("deadlock", _deadlock),
+}

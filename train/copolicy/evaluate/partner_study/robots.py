@@ -36,7 +36,8 @@ class Robot:
 
 def policy_robot(name: str, policy: "Checkpoint") -> Robot:
     """The robot's half of a policy's joint action chunks."""
-    return Robot(name, lambda seed, fps: PolicyAgent(policy, get_task(), fps=fps, seed=seed), policy.describe, policy)
+    task = get_task(policy.task)
+    return Robot(name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy)
 
 
 def scripted_robots(task: PairTask) -> dict[str, Robot]:

@@ -8,11 +8,11 @@ import numpy as np
 
 from copolicy.collect.agents import ScriptedAgent
 from copolicy.collect.agents.scripted import simulated_players
-from copolicy.collect.rollout import Rollout, Trace
-from copolicy.dataset.task import get_task
+from copolicy.collect.rollout import Rollout
+from copolicy.dataset.task import PairTask, get_task
 
-from ..coplan.rollouts import measured
-from .outcome import PartnerOutcome, stands
+from ..coplan.rollouts import measured, traced_to_the_end
+from .outcome import PartnerOutcome
 from .robots import Robot
 
 
@@ -22,19 +22,21 @@ def carry_with_partners(
     partners: Sequence[str],
     physics: Any,
     *,
+    task: PairTask | None = None,
     repeats: int = 1,
     fps: int = 10,
     seed: int = 0,
     partner_seed: int = 0,
     on_step: Callable[[int], object] = lambda finished: None,
 ) -> list[PartnerOutcome]:
-    """Lets a robot carry the table with every kind of partner from every start.
+    """Lets a robot carry the table (or whatever the task is) with every kind of partner from every start.
 
     Protocol (paper, section V-B): the robot plans at every frame, from the last frames' observations, of which the
-    newest is the present one; it holds the first action for 30 / fps steps. The partner acts at every step. The
+    newest is the present one; it holds the first action for record_hz / fps steps. The partner acts at every step. The
     world waits for a plan, which on a real clock would come a little later.
 
     Args:
+        task: the table if None.
         repeats: partners of each kind on each start, with different random numbers.
         fps: rate of the data set that the policy was trained on.
         seed: of the robot's random numbers.
@@ -44,7 +46,7 @@ def carry_with_partners(
     Returns:
         One outcome for each map, kind and repeat, in that order.
     """
-    task = get_task()
+    task = task or get_task()
     players = simulated_players(task)
     episodes = [
         (index, config, kind, repeat)
@@ -60,10 +62,7 @@ def carry_with_partners(
     # Neither the robot nor the order of episodes is in it: every robot meets the same partner on the same start.
     seeds = [_seed(partner_seed, config, repeat) for _, config, _, repeat in episodes]
     rollout = Rollout(task, scenarios, (agent, partner), seeds=seeds, settings=physics)
-    trace = Trace(rollout)
-    while len(rollout.running):
-        rollout.step()
-        on_step(len(episodes) - len(rollout.running))
+    trace = traced_to_the_end(rollout, on_step)
     return [
         PartnerOutcome(
             index,
@@ -72,8 +71,10 @@ def carry_with_partners(
             *measured(rollout, trace, agent, place),
             kind,
             trace.actions(place),
-            stands(trace.states(place)[1:]),
+            task.studies.at_rest(trace.states(place)[1:]),
             partner.players[place].changes,
+            task=task,
+            end=rollout.ends[place],
         )
         for place, (index, config, kind, repeat) in enumerate(episodes)
     ]

@@ -6,43 +6,50 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.dataset.task_spec import RECORD_HZ
+from copolicy.dataset.task import PairTask
 
 from ..comparison.paired import BOOTSTRAP, episode_values, paired_differences
 from ..summary import summarise
-from .outcome import DEADLOCK_S, STILL_SPEED, STILL_SPIN, PartnerOutcome
+from .outcome import DEADLOCK_S, PartnerOutcome
 
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
-DEFINITIONS = {
-    "success": "share of episodes that touch the goal; standard error binomial, over episodes of one training",
-    "time_to_completion_s": "of successes only",
-    "interaction_force": "|(u_robot - u_partner) . e| / 2 along the table, full forces, over all steps",
-    "robot_share": "robot's share of the positive work of both on the table's centre, mean over episodes; 0.5 is even",
-    "deadlock": f"standing (below {STILL_SPEED:g} px/s and {STILL_SPIN:g} rad/s) for {DEADLOCK_S:g} s or more on end: "
-    "share of all time, and of the episodes in which it happens",
-    "partner_changes": "how often the partner changed its mind about the route, mean over episodes",
-    "differences": f"first robot minus the other on the same starts with the same partners; 95 %: {BOOTSTRAP}; time "
-    "only where both succeed",
-}
+
+def definitions(task: PairTask, summary: dict[str, Any]) -> dict[str, str]:
+    """What the measures of a summary mean; those that are null are left out."""
+    words = task.studies.definitions
+    ends = words.get("success", f"end with {' or '.join(task.spec.successes)}")
+    texts = {
+        "success": f"share of episodes that {ends}; standard error binomial, over episodes of one training",
+        "time_to_completion_s": "of successes only",
+        "interaction_force": f"{words.get('interaction_force', 'magnitude of what the task measures')}, over all steps",
+        "robot_share": "robot's share of the positive work of both on "
+        f"{words.get('work', 'the point that the task follows')}, mean over episodes; 0.5 is even",
+        "deadlock": f"standing ({words.get('at_rest', 'as the task defines it')}) for {DEADLOCK_S:g} s or more on end: "
+        "share of all time, and of the episodes in which it happens",
+        "partner_changes": f"how often the partner changed {words.get('change', 'its mind')}, mean over episodes",
+        "differences": f"first robot minus the other on the same starts with the same partners; 95 %: {BOOTSTRAP}; "
+        "time only where both succeed",
+    }
+    return {name: text for name, text in texts.items() if summary.get(name, "") is not None}
 
 
 def summarise_with_partners(outcomes: Sequence[PartnerOutcome], policy: "Checkpoint | None") -> dict[str, Any]:
     """The summary of `eval.json`: that of co-planning, and what concerns the partner, in all and for each kind."""
     by_partner: dict[str, list[PartnerOutcome]] = {}
-    by_orientation: dict[int, list[PartnerOutcome]] = {}
+    by_orientation: dict[int, list[bool]] = {}
     for outcome in outcomes:
         by_partner.setdefault(outcome.partner, []).append(outcome)
-        by_orientation.setdefault(round(math.degrees(outcome.map_config.start[2])) % 360, []).append(outcome)
+        theta = outcome.task.studies.factors(outcome.map_config).get("start_theta")
+        if theta is not None:
+            by_orientation.setdefault(round(math.degrees(theta)) % 360, []).append(outcome.success)
+    turned = {str(degrees): sum(part) / len(part) for degrees, part in sorted(by_orientation.items())}
     return {
         **summarise(outcomes, policy),
         **_with_partner(outcomes),
         "by_partner": {kind: _short(part) for kind, part in by_partner.items()},
-        "by_orientation_deg": {
-            str(degrees): sum(one.success for one in part) / len(part)
-            for degrees, part in sorted(by_orientation.items())
-        },
+        **({"by_orientation_deg": turned} if turned else {}),
     }
 
 
@@ -65,13 +72,12 @@ def _short(outcomes: Sequence[PartnerOutcome]) -> dict[str, Any]:
 
 
 def _with_partner(outcomes: Sequence[PartnerOutcome]) -> dict[str, Any]:
-    steps = sum(outcome.steps for outcome in outcomes)
-    stuck = [outcome.deadlock_s for outcome in outcomes]
+    steps, record_hz = sum(outcome.steps for outcome in outcomes), outcomes[0].task.spec.record_hz
+    shares = [share for outcome in outcomes if (share := outcome.robot_share) is not None]
+    stuck = [stood for outcome in outcomes if (stood := outcome.deadlock_s) is not None]
+    in_deadlock = sum(seconds > 0 for seconds in stuck) / len(outcomes)
     return {
-        "robot_share": float(np.mean([outcome.robot_share for outcome in outcomes])),
-        "deadlock": {
-            "time_share": sum(stuck) * RECORD_HZ / steps,
-            "episode_share": sum(seconds > 0 for seconds in stuck) / len(stuck),
-        },
+        "robot_share": float(np.mean(shares)) if shares else None,
+        "deadlock": {"time_share": sum(stuck) * record_hz / steps, "episode_share": in_deadlock} if stuck else None,
         "partner_changes": float(np.mean([outcome.partner_changes for outcome in outcomes])),
     }

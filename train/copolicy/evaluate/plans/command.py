@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,8 @@ from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.task import get_task
-from copolicy.dataset.task_spec import RECORD_HZ
 
-from ..study_flags import add_study_flags, policy_of, protocol_of, study_needs
+from ..study_flags import LIMIT, add_study_flags, learned_task, policy_of, protocol_of, study_needs
 
 if TYPE_CHECKING:
     from .sampling import Decision
@@ -54,7 +52,8 @@ def _plans(arguments: argparse.Namespace) -> dict:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
-    chosen = get_task().scenario_set(arguments.maps)
+    task = learned_task(arguments.policy)
+    chosen = task.scenario_set(arguments.maps)
     maps = chosen.scenarios
     if not 0 <= arguments.map < len(maps):
         raise InvalidValueError("--map", f"0 to {len(maps) - 1}", arguments.map)
@@ -75,14 +74,14 @@ def _plans(arguments: argparse.Namespace) -> dict:
         fps=protocol.fps,
         seed=arguments.seed,
     )
-    map_id = get_task().identify(decision.map_config)[0]
-    seconds = (len(decision.way) - 1) / RECORD_HZ
+    map_id = task.identify(decision.map_config)[0]
+    seconds = (len(decision.way) - 1) / task.spec.record_hz
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     save_plans(
         decision,
         arguments.out,
         f"{len(decision.samples)} plans of one policy for both players from one state: "
-        f"map {map_id}, {seconds:g} s after the start, in simulation",
+        f"{task.words.scenario} {map_id}, {seconds:g} s after the start, in simulation",
     )
     return {
         "map": map_id,
@@ -90,7 +89,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         "seconds": seconds,
         "samples": len(decision.samples),
         "fps": protocol.fps,
-        "angular_acceleration_limit": protocol.physics.angular_acceleration_limit,
+        **({LIMIT: limit} if (limit := getattr(protocol.physics, LIMIT, None)) is not None else {}),
         **({"told_otherwise": list(protocol.told_otherwise)} if protocol.told_otherwise else {}),
         **_counts(decision),
         "picture": str(arguments.out),
@@ -99,10 +98,17 @@ def _plans(arguments: argparse.Namespace) -> dict:
 
 def _counts(decision: "Decision") -> dict:
     """Of each route: how often, and the mean first force of each player. Of all: how the episodes ended."""
-    routes: dict[str, dict] = {}
-    for word in sorted({sample.route for sample in decision.samples if sample.route is not None}):
-        first = [sample.plan[0] for sample in decision.samples if sample.route == word]
+    groups: dict[str, list] = defaultdict(list)
+    for sample in decision.samples:
+        if sample.route is not None:
+            groups[sample.route].append(sample.plan[0])
+    routes = {}
+    for word, first in sorted(groups.items()):
         mean = [round(float(sum(force) / len(first)), 3) for force in zip(*first, strict=True)]
-        routes[word] = {"plans": len(first), "robot_first_force": mean[:2], "human_first_force": mean[2:]}
+        half = len(mean) // 2
+        routes[word] = {"plans": len(first), "robot_first_force": mean[:half], "human_first_force": mean[half:]}
     reasons = Counter(sample.outcome.reason for sample in decision.samples)
-    return {"routes": routes, "ended_by": dict(sorted(reasons.items()))}
+    labelled = {"routes": routes}
+    if not decision.task.has_strategy:
+        labelled = {"succeeded": routes.get("", {"plans": 0}), "routes": decision.task.missing("strategy labels")}
+    return {**labelled, "ended_by": dict(sorted(reasons.items()))}

@@ -9,10 +9,9 @@ import numpy as np
 from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
-from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.task import World, get_task
-from copolicy.dataset.task_spec import RECORD_HZ
-from copolicy.tasks.table.routes import route_class
+from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.outline import Outline, Pose
+from copolicy.dataset.task import PairTask, World, get_task
 
 from ..coplan.rollouts import Outcome, measured, together
 
@@ -22,19 +21,17 @@ class PlanSample:
     """One plan, and where it led.
 
     Attributes:
-        plan: `(frames, 4)` joint actions, robot xy, human xy.
-        planned_path: `(n, 2)` the table's centre while the whole plan is executed, and nothing else, px.
-        outcome: the episode from the map's start to its end; after the plan's first actions the policy planned on.
+        plan: `(frames, m)` joint actions, robot first.
+        planned_path: `(n, 2)` of the body while the whole plan is executed, and nothing else, in the outline's unit.
+        outcome: the episode from its start to its end; after the plan's first actions the policy planned on.
+        route: the strategy label of its path, empty of a task without any; None where it did not succeed, since that
+            label is not decided.
     """
 
     plan: np.ndarray
     planned_path: np.ndarray
     outcome: Outcome
-
-    @property
-    def route(self) -> str | None:
-        """The side word of its path; None where it did not reach the goal, since that route is not decided."""
-        return route_class(self.outcome.path, self.outcome.map_config) if self.outcome.success else None
+    route: str | None
 
 
 @dataclass(frozen=True)
@@ -42,14 +39,32 @@ class Decision:
     """A state and the plans sampled in it.
 
     Attributes:
-        pose: (x, y, theta), px and rad.
-        way: `(steps + 1, 2)` how the table came there from the map's start, px.
+        pose: of the body.
+        way: `(steps + 1, 2)` how it came there from the start, in the unit of the outline.
+        task: that they are of.
     """
 
     map_config: Any
-    pose: tuple[float, float, float]
+    pose: Pose
     way: np.ndarray
     samples: tuple[PlanSample, ...]
+    task: PairTask
+
+    @property
+    def outline(self) -> Outline:
+        """Of the task."""
+        return outline_of(self.task)
+
+
+def outline_of(task: PairTask) -> Outline:
+    """The outline of a task, in which plans are drawn.
+
+    Raises:
+        InvalidValueError: it has none.
+    """
+    if task.outline is None:
+        raise InvalidValueError("--policy", "one of a task that can be drawn", task.missing("outline"))
+    return task.outline
 
 
 def sample_plans(
@@ -71,44 +86,52 @@ def sample_plans(
         fps: rate at which its actions are held; that of the data set that it was trained on if None.
 
     Raises:
+        InvalidValueError: the policy's task has no outline.
         RunError: the episode ended before `seconds`, or the policy cannot go on from there in several ways.
     """
     rate = fps or policy.fps
-    hold = clock.stride(rate)
-    agent = PolicyAgent(policy, get_task(), fps=rate, seed=seed)
+    task = get_task(policy.task)
+    outline, record_hz = outline_of(task), task.spec.record_hz
+    hold = clock.stride(rate, record_hz)
+    agent = PolicyAgent(policy, task, fps=rate, seed=seed)
     rollout = together(agent, [config], physics)
     trace = Trace(rollout)
     rollout.run(round(seconds * rate) * hold)
     if rollout.outcomes[0].done:
-        raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / RECORD_HZ:.1f} s")
+        raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / record_hz:.1f} s")
     if seconds and policy.keeps_history:
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
     here, configs = rollout.worlds[0], [config] * samples
     agent = agent.branch(samples)
-    branch = _branched(here, (agent, agent.other_half()), configs, physics, begin=False)
+    branch = _branched(task, here, (agent, agent.other_half()), configs, physics, begin=False)
     whole = Trace(branch, trace)
     policy.wanted, wanted = None, policy.wanted
     branch.step()
     policy.wanted = wanted
     plans = list(agent.predicted)
-    # The table's centre while each plan is executed and nothing else.
-    held = [clock.zero_order_hold(plan, rate) for plan in plans]
-    alone = _branched(here, (RecordedAgent(held), RecordedAgent(held)), configs, physics, begin=True)
+    # The body while each plan is executed and nothing else.
+    held = [np.repeat(plan, hold, axis=0) for plan in plans]
+    alone = _branched(task, here, (RecordedAgent(held), RecordedAgent(held)), configs, physics, begin=True)
     paths = Trace(alone)
     alone.run(len(held[0]))
     branch.run()
-    x, y, theta, *_ = here.recorded
-    drawn = [
-        PlanSample(plan, paths.states(k)[:, :2], Outcome(0, config, k, *measured(branch, whole, agent, k)))
-        for k, plan in enumerate(plans)
-    ]
-    return Decision(config, (x, y, theta), trace.states(0)[:, :2], tuple(drawn))
+
+    def path(recorded: np.ndarray) -> np.ndarray:
+        return outline.poses(task.states_of(recorded))[:, :2]
+
+    drawn = []
+    for k, plan in enumerate(plans):
+        outcome = Outcome(0, config, k, *measured(branch, whole, agent, k), task=task, end=branch.ends[k])
+        label = task.strategy(config, task.states_of(whole.states(k))) if outcome.success else None
+        drawn.append(PlanSample(plan, path(paths.states(k)), outcome, label))
+    (pose,) = outline.poses(here.observation[None]).tolist()
+    return Decision(config, tuple(pose), path(trace.states(0)), tuple(drawn), task)
 
 
-def _branched(here: World, agents: Any, configs: Sequence[Any], physics: Any, begin: bool) -> Rollout:
-    """A rollout that goes on from a world, in as many copies as there are maps."""
-    worlds = [get_task().make_world(config, physics) for config in configs]
+def _branched(task: PairTask, here: World, agents: Any, configs: Sequence[Any], physics: Any, begin: bool) -> Rollout:
+    """A rollout that goes on from a world, in as many copies as there are scenarios."""
+    worlds = [task.make_world(config, physics) for config in configs]
     for world in worlds:
         world.restore(here.recorded)
         world.step_count = here.step_count
-    return Rollout(get_task(), configs, agents, worlds=worlds, begin=begin)
+    return Rollout(task, configs, agents, worlds=worlds, begin=begin)

@@ -4,26 +4,11 @@ from collections.abc import Mapping
 
 from .mapping import GamepadMapping
 
-_XBOX = {
-    "a": "A",
-    "b": "B",
-    "x": "X",
-    "y": "Y",
-    "back": "View",
-    "start": "Menu",
-    "leftshoulder": "LB",
-    "rightshoulder": "RB",
-}
-_PLAYSTATION = {
-    "a": "Cross",
-    "b": "Circle",
-    "x": "Square",
-    "y": "Triangle",
-    "back": "Share",
-    "start": "Options",
-    "leftshoulder": "L1",
-    "rightshoulder": "R1",
-}
+_CONTROLS = ("a", "b", "x", "y", "back", "start", "leftshoulder", "rightshoulder")
+_XBOX = dict(zip(_CONTROLS, ("A", "B", "X", "Y", "View", "Menu", "LB", "RB"), strict=True))
+_PLAYSTATION = dict(
+    zip(_CONTROLS, ("Cross", "Circle", "Square", "Triangle", "Share", "Options", "L1", "R1"), strict=True)
+)
 _PLAYSTATION_OLD = _PLAYSTATION | {"back": "Select", "start": "Start"}
 _DUALSENSE = _PLAYSTATION | {"back": "Create"}
 _NINTENDO = _XBOX | {"back": "-", "start": "+", "leftshoulder": "L", "rightshoulder": "R"}

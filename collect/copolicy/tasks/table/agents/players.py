@@ -76,5 +76,7 @@ def _pilot(player: int, map_config: MapConfig, habits: Habits, seed: int) -> "Sc
     return ScriptedPilot(player, map_config, habits, seed)
 
 
-PLAYERS = SimulatedPlayers(PAIRS, PARTNERS, ROBOTS, simulated_pair, simulated_partner, scripted_robot)
+PLAYERS = SimulatedPlayers(
+    PAIRS, PARTNERS, ROBOTS, simulated_pair, simulated_partner, scripted_robot, options=("clearance",)
+)
 """The task's part `agents`."""

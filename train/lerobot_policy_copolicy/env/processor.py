@@ -6,22 +6,22 @@ from typing import Any
 from lerobot.configs import PipelineFeatureType, PolicyFeature
 from lerobot.processor import ActionProcessorStep, ProcessorStepRegistry
 
-_ROBOT = 2  # robot_fx, robot_fy
-
 
 @dataclass
 @ProcessorStepRegistry.register(name="table_carrying_robot_half")
 class RobotHalfProcessorStep(ActionProcessorStep):
-    """Takes the robot's half, `(..., 2)`, of an action of both players, `(..., 4)`."""
+    """Takes the robot's half, `(..., size)`, of an action of both players, `(..., 2 size)`."""
+
+    size: int = 2  # numbers of one player's action
 
     def action(self, action: Any) -> Any:
-        """The first two numbers of an action."""
-        return action[..., :_ROBOT]
+        """The first numbers of an action."""
+        return action[..., : self.size]
 
     def transform_features(
         self, features: dict[PipelineFeatureType, dict[str, PolicyFeature]]
     ) -> dict[PipelineFeatureType, dict[str, PolicyFeature]]:
-        """The features with two numbers in each action."""
+        """The features with half as many numbers in each action."""
         actions = features.get(PipelineFeatureType.ACTION, {})
-        halves = {name: PolicyFeature(feature.type, (_ROBOT,)) for name, feature in actions.items()}
+        halves = {name: PolicyFeature(feature.type, (self.size,)) for name, feature in actions.items()}
         return {**features, PipelineFeatureType.ACTION: halves}

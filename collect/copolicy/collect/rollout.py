@@ -1,13 +1,57 @@
-"""The loop: any number of worlds side by side, two agents, and observers."""
+"""Worlds that two agents act in, step by step: what play, simulation, studies and the check of a recording share."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import RUNNING, Outcome, PairTask, World
 
-from .agent import Agent, Start
+
+class Start(NamedTuple):
+    """What an agent is told before an episode.
+
+    Attributes:
+        scenario: of the task.
+        seed: of whatever the agent draws at random.
+        state: `(n,)` that the world starts in.
+    """
+
+    scenario: Any
+    seed: int
+    state: np.ndarray
+
+
+class Agent(ABC):
+    """Acts for one seat in many worlds at once.
+
+    A rollout calls `begin` once, then in every step `act` and, once the joint action has acted, `acted`. `worlds` are
+    the indices `(B,)` of the worlds that still run, and `states` are theirs. m is the size of one player's action.
+
+    Attributes:
+        name: what the recording's column `controller_0` or `controller_1` says.
+        is_person: a person acts, so there is a device to lose and a consent to ask for.
+        input: what there is to record about where the present action came from, for the agent of a single world.
+    """
+
+    name: str
+    is_person: bool = False
+    input: PlayerInput | None = None
+
+    def begin(self, seat: int, starts: Sequence[Start]) -> None:  # noqa: B027 (nothing to prepare is the usual case)
+        """Episodes begin side by side, one in each world; seat 0 is the robot's."""
+
+    @abstractmethod
+    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Actions `(B, m)` in the states `(B, n)` of a step."""
+
+    def acted(self, actions: np.ndarray, worlds: np.ndarray) -> None:  # noqa: B027
+        """The joint actions `(B, 2 m)` that acted in this step."""
+
+    def close(self) -> None:  # noqa: B027
+        """The agent is needed no more."""
 
 
 class Observer(Protocol):
@@ -24,6 +68,7 @@ class Rollout:
     In every step both agents see the same states, and their actions are clipped to the task's bounds.
 
     Attributes:
+        task: of the worlds.
         worlds: all of them.
         outcomes: how each stands.
         ends: steps after which each ended.
@@ -54,6 +99,7 @@ class Rollout:
             begin: tell the agents that episodes begin; False where they know what was before.
             beyond_end: worlds go on after their end, of which the first counts.
         """
+        self.task = task
         self.worlds = list(worlds) or [task.make_world(scenario, settings) for scenario in scenarios]
         self.agents = agents
         self.outcomes: list[Outcome] = [RUNNING] * len(self.worlds)
@@ -96,3 +142,30 @@ class Rollout:
         while len(self.running) and steps != 0:
             self.step()
             steps = None if steps is None else steps - 1
+
+
+class Trace:
+    """Keeps the states and joint actions of a rollout's worlds from now on."""
+
+    def __init__(self, rollout: Rollout, before: "Trace | None" = None):
+        """
+        Args:
+            before: of the one world whose present state all of these start in.
+        """
+        self._states = [[*before._states[0]] if before else [world.recorded] for world in rollout.worlds]
+        self._actions = [[*before._actions[0]] if before else [] for _ in rollout.worlds]
+        rollout.observers.append(self)
+
+    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+        """See `Observer`."""
+        for index, action in zip(worlds.tolist(), actions, strict=True):
+            self._states[index].append(rollout.worlds[index].recorded)
+            self._actions[index].append(action)
+
+    def states(self, world: int) -> np.ndarray:
+        """`(T + 1, k)` recorded states, the first before the first step."""
+        return np.array(self._states[world])
+
+    def actions(self, world: int) -> np.ndarray:
+        """`(T, 2 m)` joint actions as they acted."""
+        return np.array(self._actions[world])

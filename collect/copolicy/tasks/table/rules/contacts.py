@@ -4,36 +4,35 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from copolicy.tasks.table.features import sizes_of
-from copolicy.tasks.table.map_config import MAX_OBSTACLES, WINDOW
-from copolicy.tasks.table.physics import GOAL_SIZE
+from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.finding import Finding
+from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
+from copolicy.dataset.task_parts import Rule
 
-from ..features import ENVIRONMENT_STATE, STATE
-from ..task_spec import RECORD_HZ
-from .episode_table import EpisodeTable
-from .finding import Finding
+from ..features import sizes_of
+from ..map_config import MAX_OBSTACLES, WINDOW
+from ..physics import GOAL_SIZE
+from ..spec import SPEC
 from .geometry import INNER, OUTER, final_poses, separation
-from .limits import limit
-from .rule import Rule, each
 
 _SIZES = (45, 50)  # of obstacles, where the data do not say which
 
 
 def _goal(table: EpisodeTable) -> Iterator[Finding]:
-    margin = limit("contact_margin")
+    margin = table.limit("contact_margin")
     maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     success = table.of_framed("success")
     gap, error = _final_gap(table, maps[:, 3:5], GOAL_SIZE / 2)
     bound = margin + error
     message = "a success, but the table ended this many px from the goal of its map"
-    yield from each(table, success & ~(gap <= bound), "goal_contact", gap, bound, "error", message, table.framed)
+    yield from table.found("goal_contact", success & ~(gap <= bound), gap, bound, message)
     depth = _deepest(table, np.repeat(maps[:, 3:5], table.counts, axis=0), GOAL_SIZE / 2)
     message = "no success, but the table was this many px inside the goal of its map"
-    yield from each(table, ~success & (depth > margin), "goal_contact", depth, margin, "error", message, table.framed)
+    yield from table.found("goal_contact", ~success & (depth > margin), depth, margin, message)
 
 
 def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
-    margin = limit("contact_margin")
+    margin = table.limit("contact_margin")
     maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     smallest, largest = _obstacle_sides(table)
     deepest = np.full(len(table.starts), -np.inf)
@@ -48,13 +47,11 @@ def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
         deepest = np.where(there, np.maximum(deepest, depth), deepest)
         nearest = np.where(there, np.minimum(nearest, gap), nearest)
     message = "the table went this many px into an obstacle of its map before the episode ended"
-    yield from each(table, deepest > margin, "obstacle_contact", deepest, margin, "error", message, table.framed)
+    yield from table.found("obstacle_contact", deepest > margin, deepest, margin, message)
     collided = table.of_framed("termination_reason") == "collision_obstacle"
     bound = margin + error
     message = "ended by a collision, but this many px from every obstacle of its map"
-    yield from each(
-        table, collided & ~(nearest <= bound), "obstacle_contact", nearest, bound, "error", message, table.framed
-    )
+    yield from table.found("obstacle_contact", collided & ~(nearest <= bound), nearest, bound, message)
 
 
 def _obstacle_sides(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
@@ -77,24 +74,24 @@ def _wall(table: EpisodeTable) -> Iterator[Finding]:
     cos, sin = np.abs(np.cos(thetas)), np.abs(np.sin(thetas))
     half = np.stack((OUTER[1] * cos + OUTER[2] * sin, OUTER[1] * sin + OUTER[2] * cos), axis=-1)
     room = np.minimum(positions - half, np.array(WINDOW, float) - positions - half).min(axis=(0, 2))
-    bound = limit("contact_margin") + error
+    bound = table.limit("contact_margin") + error
     ended = table.of_framed("termination_reason") == "collision_wall"
     message = "ended at the wall, but this many px from it"
-    yield from each(table, ended & ~(room <= bound), "wall_contact", room, bound, "error", message, table.framed)
+    yield from table.found("wall_contact", ended & ~(room <= bound), room, bound, message)
 
 
 def _deepest(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
     """`(F,)` how deep the inner rectangle was in a square in any frame, px."""
     states = table.frames[STATE].astype(float)
     thetas = np.arctan2(states[:, 3], states[:, 2])
-    return np.maximum.reduceat(-separation(states[:, :2], thetas, INNER, centres, half), table.starts)
+    return table.largest(-separation(states[:, :2], thetas, INNER, centres, half))
 
 
 def _final(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray, float]:
     if table.final_states is not None:
         final = table.final_states
         return final[None, :, :2], np.arctan2(final[:, 3], final[:, 2])[None], 0.0
-    return final_poses(table.frames[STATE][table.ends].astype(float), table.fps, RECORD_HZ)
+    return final_poses(table.frames[STATE][table.ends].astype(float), table.fps, SPEC.record_hz)
 
 
 def _final_gap(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:

@@ -1,0 +1,58 @@
+"""A sheet with every scenario of a set."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from copolicy.dataset.scenarios import ScenarioSet
+from copolicy.dataset.task import PairTask
+
+from .replay.pictures import write_png
+from .screen.canvas import Canvas
+from .screen.outline_view import outline_of, scene_view
+from .screen.palette import MUTED, TEXT
+from .sdl import pygame
+
+_GAP, _HEAD, _CAPTION = 12, 64, 26
+_SHEET = 1200
+_MOST_PX = 16_000  # of the height, which drawing libraries and viewers still take
+
+
+def write_map_sheet(task: PairTask, chosen: ScenarioSet, path: Path, width: int) -> tuple[int, int]:
+    """Draws the scenarios with the body at its start and writes them as PNG; returns width and height, px.
+
+    Raises:
+        CopolicyError: the task has no outline.
+        OutputExistsError: the file exists.
+    """
+    surface = draw_map_sheet(task, chosen, width)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_png(surface, path)
+    return surface.get_size()
+
+
+def draw_map_sheet(task: PairTask, chosen: ScenarioSet, width: int) -> pygame.Surface:
+    """The sheet: rows of scenarios, each with its name, and its weight where it is not 1."""
+    count, outline = len(chosen.scenarios), outline_of(task)
+    starts = task.states_of(np.array([task.start_of(scenario) for scenario in chosen.scenarios]))
+    columns = max(1, math.ceil(math.sqrt(count * 0.6)))
+    cell = (_SHEET - (columns + 1) * _GAP) / columns
+    height = cell * outline.size[1] / outline.size[0]
+    size = (_SHEET, math.ceil(_HEAD + math.ceil(count / columns) * (height + _CAPTION + _GAP)))
+    width = min(width, _MOST_PX * size[0] // size[1])
+    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
+    surface = pygame.Surface((width, math.ceil(width * size[1] / size[0])), depth=32)
+    canvas = Canvas(surface, size)
+    canvas.clear()
+    about = f"version {chosen.version}, {count} maps, digest {chosen.digest}"
+    canvas.text(chosen.label, (_GAP + 4, 8), 34, TEXT, max_width=1100)
+    canvas.text(about, (_GAP + 4, 40), 20, MUTED, max_width=1100)
+    rows = zip(chosen.scenarios, outline.poses(starts).tolist(), chosen.weights, strict=True)
+    for index, (scenario, (x0, y0, theta), weight) in enumerate(rows):
+        row, column = divmod(index, columns)
+        x, y = _GAP + column * (cell + _GAP), _HEAD + row * (height + _CAPTION + _GAP)
+        scene_view(task, scenario).draw(surface, canvas.rect(x, y, cell, height), (x0, y0, theta))
+        caption = task.identify(scenario)[0] + (f"  x{weight}" if weight > 1 else "")
+        canvas.text(caption, (x + 2, y + height + 4), 20, TEXT, max_width=cell)
+    return surface

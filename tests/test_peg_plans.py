@@ -1,0 +1,62 @@
+"""Figures of studies on a second task: from its outline, in one group where it has no strategy labels."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
+from copolicy.evaluate.coplan.figure import save_trajectories
+from copolicy.evaluate.coplan.rollouts import coplan
+from copolicy.evaluate.plans.command import _counts
+from copolicy.evaluate.plans.figure import save_plans
+from copolicy.evaluate.plans.sampling import sample_plans
+
+
+class Pusher:
+    """A policy that pushes to the mark and brakes."""
+
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "pusher", "peg", 2, 2, 10, False, None
+
+    def reset(self, seed: int) -> None:
+        """Nothing here is random."""
+
+    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+        (place, speed), mark = observations[STATE][:, -1].T, observations[ENVIRONMENT_STATE][:, -1, 1]
+        push = np.clip(2 * (mark - place) - 1.5 * speed, -1, 1)
+        return np.repeat(np.stack((push, push), axis=-1)[:, None], 4, axis=1)[:, : self.wanted]
+
+
+def decide(peg: Any, settings: Any = None):
+    return sample_plans(Pusher(), peg.scenario_sets["right"][1], settings or peg.settings_type(), samples=3)
+
+
+def test_plans_are_one_group(peg, tmp_path):
+    decision = decide(peg)
+    assert [sample.route for sample in decision.samples] == [""] * 3
+    assert decision.pose == pytest.approx((0.5, 0.2, 0.0))
+    assert decision.samples[0].planned_path.shape == (9, 2)
+    counts = _counts(decision)
+    assert counts["succeeded"] == {"plans": 3, "robot_first_force": [1.0], "human_first_force": [1.0]}
+    assert counts["routes"] == "left out: the task 'peg' has no strategy labels"
+    assert counts["ended_by"] == {"mark": 3}
+    save_plans(decision, tmp_path / "plans.png", "plans")
+    assert image.imread(tmp_path / "plans.png").shape[2] >= 3
+
+
+def test_failures_are_drawn_too(peg, tmp_path):
+    decision = decide(peg, peg.settings_type(step_limit=10))
+    assert {sample.route for sample in decision.samples} == {None}
+    assert _counts(decision)["succeeded"] == {"plans": 0}
+    save_plans(decision, tmp_path / "plans.png", "plans")
+    outcomes = coplan(Pusher(), peg.scenario_sets["right"], peg.settings_type())
+    save_trajectories(outcomes, tmp_path / "paths.png", "paths")
+    assert (tmp_path / "paths.png").stat().st_size > 1000
+
+
+def test_what_cannot_be_drawn_is_refused(peg, monkeypatch):
+    monkeypatch.setattr(type(peg), "outline", None)
+    with pytest.raises(InvalidValueError, match="left out: the task 'peg' has no outline"):
+        decide(peg)

@@ -1,0 +1,218 @@
+"""The gymnasium environment of any task for two players."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+
+from copolicy.collect.agents import HeldAgent, ScriptedAgent
+from copolicy.collect.agents.scripted import pair_name
+from copolicy.collect.rollout import Rollout, Trace
+from copolicy.dataset.clock import frames, stride
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.features import OBSERVATION_KEYS, SCENE_SIZE, bounds_of
+from copolicy.dataset.task import PairTask, get_task
+
+from .configuration import require_image_size, scenarios_of, settings_of
+
+_WIDTH = 600  # px of the picture of `render`
+
+
+class PairEnv(gymnasium.Env):
+    """Two players at a task, by its name.
+
+    ## Action space
+    A `Box` of both players' actions, robot first, in the units and bounds of the task, held for record_hz / fps steps
+    of the world. With a simulated `partner` it is the robot's half: the partner acts for the human, at every step.
+
+    ## Observation space
+    A `Dict` of float32 in the units of the task, under the names that LeRobot knows: `agent_pos` (its column
+    `observation.state`), `environment_state` (the vector of the scenario), `human_action` (what the human did in the
+    previous frame, zero at the first), and with `pixels=True` {"scene": (height, width, 3) uint8} as `pixels`.
+
+    ## Reward
+    Of the state that the frame ends in.
+
+    ## Success and end
+    `info["is_success"]` tells at every step; `info["termination_reason"]` is one of the task's reasons, which may come
+    within a frame. Truncated after `step_limit` steps of the world, for the reason `timeout`; that is the frame
+    `ceil(step_limit * fps / record_hz)`. A `max_episode_steps` of `gymnasium.make` comes on top and gives no reason.
+
+    ## Starting state
+    The start of a scenario. `reset(seed=s)` takes scenario `s % scenarios`, `reset(options={"map_index": i})` scenario
+    i, and a bare `reset()` the next one.
+
+    Args:
+        task: its name.
+        fps: actions a second, a divisor of the task's rate.
+        map_set: name of a set of scenarios, a file, or one of its splits as `FILE#split`; the first set if empty.
+        orientations: start each scenario in all its orientations.
+        step_limit: steps of the world after which an episode is truncated; the task's own if None.
+        partner: simulated pair whose human plays the human half; empty for none.
+        pixels: observe the image of the scene too, as `copolicy-convert mcap --video` draws it.
+        observation_width: of the image, px.
+        observation_height: of the image, px.
+        settings: of the world, by name, where they are not the usual ones.
+        render_mode: "rgb_array" or None.
+
+    Raises:
+        UnknownNameError: no such task, set of scenarios or pair.
+        InvalidValueError: a rate, setting or size that cannot be, or something that the task does not offer.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (as gymnasium declares it)
+
+    def __init__(
+        self,
+        task: str,
+        fps: int = 10,
+        map_set: str = "",
+        orientations: bool = False,
+        step_limit: int | None = None,
+        partner: str = "",
+        pixels: bool = False,
+        observation_width: int = SCENE_SIZE[0],
+        observation_height: int = SCENE_SIZE[1],
+        settings: Mapping[str, float] | None = None,
+        render_mode: str | None = "rgb_array",
+    ):
+        self.metadata = {**type(self).metadata, "render_fps": fps}
+        self.render_mode = render_mode
+        self.pair_task: PairTask = get_task(task)
+        spec = self.pair_task.spec
+        self.task, self.task_description = spec.name, spec.sentence
+        self.maps = scenarios_of(self.pair_task, map_set, orientations)
+        self.physics = settings_of(self.pair_task, step_limit, settings or {})
+        self.partner = partner and pair_name(self.pair_task, partner)
+        self._spec: EnvSpec | None = None
+        self._stride = stride(fps, spec.record_hz)
+        self._next_map = 0
+        self._max_episode_steps = frames(self.physics.step_limit, fps, spec.record_hz)  # LeRobot asks by this name
+        self._size = len(spec.action)
+        self._bounds = spec.joint_action.bounds[:, : self._size if partner else None]
+        low, high = self._bounds.astype(np.float32)
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
+        bounds = bounds_of(spec)
+        spaces: dict[str, gymnasium.Space] = {key: _box(bounds[column]) for key, column in OBSERVATION_KEYS.items()}
+        shape = require_image_size(self.pair_task, pixels, observation_width, observation_height)
+        self._image_size = (observation_width, observation_height) if pixels else None
+        if pixels:
+            spaces["pixels"] = gymnasium.spaces.Dict({"scene": gymnasium.spaces.Box(0, 255, shape, np.uint8)})
+        self.observation_space = gymnasium.spaces.Dict(spaces)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The registered specification, with the frames after which this environment truncates."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        if spec is not None and spec.max_episode_steps is None:
+            spec = replace(spec, max_episode_steps=self._max_episode_steps)
+        self._spec = spec
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[dict, dict]:
+        """Puts the world at the start of a scenario.
+
+        Raises:
+            InvalidValueError: `options["map_index"]` is not the index of a scenario.
+        """
+        super().reset(seed=seed)
+        index = (options or {}).get("map_index", self._next_map if seed is None else seed % len(self.maps))
+        if not isinstance(index, (int, np.integer)) or not 0 <= index < len(self.maps):
+            raise InvalidValueError("map_index", f"0 to {len(self.maps) - 1}", index)
+        self._next_map = (index + 1) % len(self.maps)
+        self.map_index, scenario = int(index), self.maps[index]
+        self._environment = self.pair_task.scenario_vector(scenario).astype(np.float32)
+        self._given = HeldAgent(np.zeros(self._size)), HeldAgent(np.zeros(self._size))
+        agents, seed = self._given, 0
+        if self.partner:
+            partner = ScriptedAgent.of_pair(self.partner, self.pair_task)
+            agents, seed = (self._given[0], partner), int(self.np_random.integers(2**31))
+        self._rollout = Rollout(
+            self.pair_task, [scenario], agents, seeds=[seed], settings=self.physics, beyond_end=True
+        )
+        self.world: Any = self._rollout.worlds[0]
+        self._action = np.zeros(2 * self._size)
+        return self._observation(), self._info("", False, self._interaction(None))
+
+    def step(self, action: np.ndarray) -> tuple[dict, float, bool, bool, dict]:
+        """Holds an action of both players, or with a partner of the robot, for a frame.
+
+        Raises:
+            ShapeError: an action of another shape.
+        """
+        given = np.asarray(action, dtype=float)
+        if given.shape != self.action_space.shape:
+            raise ShapeError("action", self._bounds.shape[1:], given.shape)
+        given = np.clip(given, *self._bounds)
+        for agent, half in zip(self._given, (given[: self._size], given[self._size :]), strict=True):
+            agent.action = half
+        self._rollout.observers.clear()
+        trace = Trace(self._rollout)
+        for _ in range(self._stride):
+            self._rollout.step()
+            if self._rollout.outcomes[0].done:
+                break
+        (outcome,) = self._rollout.outcomes
+        # The past human action is that of the frame: of several held steps their mean, as in a data set.
+        self._action = np.mean(trace.actions(0), axis=0)
+        truncated = outcome.reason == "timeout"
+        info = self._info(outcome.reason, outcome.success, self._interaction(trace))
+        return self._observation(), self.world.reward(), outcome.done and not truncated, truncated, info
+
+    def render(self) -> np.ndarray | None:
+        """A picture of the world, `(height, 600, 3)` uint8 (of the table 300 high); None without a render mode.
+
+        Raises:
+            CopolicyError: the task is not drawn.
+        """
+        if not self.render_mode:
+            return None
+        # Here, because training without videos needs no pygame.
+        from copolicy.collect.screen.outline_view import outline_of, scene_view
+        from copolicy.collect.sdl import pygame
+
+        outline = outline_of(self.pair_task)
+        size = _WIDTH, round(_WIDTH * outline.size[1] / outline.size[0])
+        surface = pygame.Surface(size, depth=24)
+        (pose,), (forces,) = outline.poses(self.world.observation[None]), outline.forces(self._action[None])
+        view = scene_view(self.pair_task, self.maps[self.map_index])
+        view.draw(surface, surface.get_rect(), tuple(pose.tolist()), forces.tolist())
+        return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(*size[::-1], 3)
+
+    def _observation(self) -> dict[str, Any]:
+        state = self.world.observation
+        human = self._action[self._size :].astype(np.float32)
+        values = state.astype(np.float32), self._environment.copy(), human
+        observation: dict[str, Any] = dict(zip(OBSERVATION_KEYS, values, strict=True))
+        if self._image_size is not None:
+            images = self.pair_task.images(self.maps[self.map_index], state[None], self._image_size)
+            observation["pixels"] = {"scene": next(iter(images or ()))}
+        return observation
+
+    def _interaction(self, trace: Trace | None) -> dict[str, float]:
+        """The mean magnitude over the frame, zero before the first; none where the task does not measure it."""
+        actions = np.zeros((1, 2 * self._size)) if trace is None else trace.actions(0)
+        recorded = np.array([self.world.recorded]) if trace is None else trace.states(0)[1:]
+        measured = self.pair_task.interaction_recorded(recorded, actions)
+        return {} if measured is None else {"interaction_force": float(np.abs(measured).mean())}
+
+    def _info(self, reason: str, success: bool, interaction: dict[str, float]) -> dict[str, Any]:
+        return {
+            "is_success": success,
+            "termination_reason": reason,
+            **interaction,
+            "map_index": self.map_index,
+            "action": self._action.copy(),  # (2 m,) what was executed, the partner's half included
+        }
+
+
+def _box(bounds: np.ndarray) -> gymnasium.spaces.Box:
+    """Twice the range of the task's bounds, since a world may slip a little beyond them in its last step."""
+    low, high = bounds
+    margin = (high - low) / 2
+    return gymnasium.spaces.Box((low - margin).astype(np.float32), (high + margin).astype(np.float32))
