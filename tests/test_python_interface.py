@@ -78,11 +78,11 @@ def test_iterating_and_indexing_give_the_same(made):
 
 
 def test_a_data_set_that_is_none_is_one_line(made, tmp_path):
-    with pytest.raises(FileFormatError, match="did you mean .*/set"):
+    with pytest.raises(FileFormatError, match=r"did you mean .*/set"):
         load_dataset(made / "sett")
     with pytest.raises(FileFormatError):
         load_dataset(made / "raw")
-    with pytest.raises(InvalidValueError, match="revision: expected None, since .* is a folder, found 'main'"):
+    with pytest.raises(InvalidValueError, match=r"revision: expected None, since .* is a folder, found 'main'"):
         load_dataset(made / "set", "main")
 
 

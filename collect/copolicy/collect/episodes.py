@@ -61,8 +61,7 @@ def run_episodes(
     trace = Trace(rollout)
     rollout.run()
     return [
-        _episode(rollout, trace, index, *entry, settings)
-        for index, entry in enumerate(zip(scenarios, seeds, strict=True))
+        _episode(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
     ]
 
 
