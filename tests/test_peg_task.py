@@ -164,7 +164,7 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
     from copolicy.dataset.cli import main as dataset
 
-    recordings, root, out = tmp_path / "recordings", tmp_path / "set", tmp_path / "out"
+    recordings, root = tmp_path / "recordings", tmp_path / "set"
     recordings.mkdir()
     recording = recordings / "one.mcap"
     record(peg, recording)
