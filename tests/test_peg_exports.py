@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import h5py
@@ -64,7 +65,8 @@ def test_the_layout_of_the_original_is_for_its_own_task(peg_set, tmp_path, capsy
 def test_robomimic_names_the_environment_of_the_task(peg_set, tmp_path, capsys):
     out = tmp_path / "peg.hdf5"
     run(capsys, "export", peg_set, "--format", "robomimic", "--out", out, "--valid", 0.3, "--valid-by", "episodes")
-    with h5py.File(out) as file:
+    with h5py.File(out) as opened:
+        file: Any = opened
         demo = file["data/demo_0"]
         count = demo.attrs["num_samples"]
         assert demo["obs/agent_pos"].shape == demo["next_obs/agent_pos"].shape == (count, 2)
@@ -83,7 +85,8 @@ def test_minari_recovers_the_environment_of_the_task(peg_set, tmp_path, capsys):
     environment = gymnasium.make(EnvSpec.from_json(metadata["env_spec"]))
     assert environment.spec is not None
     assert environment.spec.max_episode_steps == 100
-    with h5py.File(out / "data/main_data.hdf5") as file:
+    with h5py.File(out / "data/main_data.hdf5") as opened:
+        file: Any = opened
         group = file["episode_0"]
         observation = {name: values[0] for name, values in group["observations"].items()}
         assert environment.observation_space.contains(observation)

@@ -20,8 +20,8 @@ class HumanDistance:
         bits: 0 the same, 1 nothing in common; None where `note` says why not.
         interval: 95 percent.
         chance: low, mean and high of what two draws from one distribution would give.
-        routes: `word`, `ours` and `human` of each, how many episodes and human demonstrations took it, in the reading of
-            the human labels that is nearer.
+        routes: `word`, `ours` and `human` of each, how many episodes and human demonstrations took it, in the reading
+            of the human labels that is nearer.
         reading: `as labelled`, or `mirrored` where the human L and R were exchanged.
     """
 

@@ -67,7 +67,7 @@ class TrainingData:
     @classmethod
     def from_recipe(cls, recipe: dict[str, Any]) -> "TrainingData":
         """From the `dataset` of `recipe.json`."""
-        counts = {name: recipe.get(key) or {} for name, key in _COUNTS.items()}
-        stated = {name: recipe.get(name) for name in ("episodes", "frames", "fps", "version", "content_hash")}
+        stated: dict[str, Any] = {name: recipe.get(key) or {} for name, key in _COUNTS.items()}
+        stated |= {name: recipe.get(name) for name in ("episodes", "frames", "fps", "version", "content_hash")}
         name, revision = str(recipe.get("repo_id") or ""), recipe.get("revision")
-        return cls(name, revision, recipe.get("episodes_used"), **stated, **counts)
+        return cls(name, revision, recipe.get("episodes_used"), **stated)

@@ -50,13 +50,14 @@ class VideoFiles(NumberedFiles):
                 self._next()
             if self._writer is None:
                 self._open(stream)
+            container: Any = self._writer
             assert stream.time_base is not None
             moved = round(self._frames / self._fps / stream.time_base)
             for packet in packets:
                 packet.pts = (packet.pts or 0) + moved
                 packet.dts = (packet.dts or 0) + moved
                 packet.stream = self._stream
-                self._writer.mux(packet)
+                container.mux(packet)
         start, self._frames = self._frames, self._frames + frames
         self._bytes += len(mp4)
         return {
