@@ -43,8 +43,6 @@ NOT_YET_MOVED = (
     "collect/copolicy/collect/simulate/command.py",
     "convert/copolicy/convert/export/minari.py",
     "convert/copolicy/convert/export/replay_buffer.py",
-    "dataset/copolicy/dataset/statistics/route_entropy.py",
-    "dataset/copolicy/dataset/statistics/visitation.py",
     "train/copolicy/evaluate/coplan/figure.py",
     "train/copolicy/evaluate/coplan/rollouts.py",
     "train/copolicy/evaluate/human_study/plan.py",

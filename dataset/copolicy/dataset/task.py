@@ -34,6 +34,7 @@ from .task_parts import (
     Settings,
     SimulatedPlayers,
     TaskRules,
+    TaskStatistics,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -60,6 +61,7 @@ __all__ = [
     "SimulatedPlayers",
     "TaskRules",
     "TaskSpec",
+    "TaskStatistics",
     "Vector",
     "World",
     "get_task",
@@ -206,6 +208,11 @@ class PairTask(ABC):
         return None
 
     @property
+    def statistics(self) -> TaskStatistics:
+        """Words of statistics, and statistics beside the generic ones."""
+        return TaskStatistics()
+
+    @property
     def rules(self) -> TaskRules:
         """Rules of `check` and their limits beside the generic ones."""
         return TaskRules()
@@ -264,6 +271,10 @@ class PairTask(ABC):
             InvalidValueError: the task has none.
         """
         raise InvalidValueError("--orientations", "no such flag", self.missing("start orientations"))
+
+    def offers(self, part: str) -> bool:
+        """Whether the task brings a part of its own, such as `strategy` or `interaction`."""
+        return getattr(type(self), part) is not getattr(PairTask, part)
 
     def missing(self, part: str) -> str:
         """The sentence with which a command leaves out what needs a part that the task does not offer."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -144,6 +144,13 @@ class TableTask(PairTask):
         from .rules import RULES
 
         return RULES
+
+    @property
+    def statistics(self) -> TaskStatistics:
+        """Sides of obstacles, people's routes, the dip of the steering."""
+        from .statistics import STATISTICS  # scipy, diptest
+
+        return STATISTICS
 
     @property
     def features(self) -> PolicyFeatures:
