@@ -159,12 +159,11 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["check", "check recordings", "stats", "card", "report", "zarr", "robomimic", "minari", "verify", "gif", "sheet"],
+    ["card", "report", "zarr", "robomimic", "minari", "verify", "gif", "sheet"],
 )
 def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
     from copolicy.cards.cli import main as cards
     from copolicy.collect.cli import main as collect
-    from copolicy.dataset.cli import main as dataset
 
     recordings, root, out = tmp_path / "recordings", tmp_path / "set", tmp_path / "out"
     recordings.mkdir()
@@ -174,9 +173,6 @@ def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, com
     before = sorted(path for path in tmp_path.rglob("*"))
     capsys.readouterr()
     program, *arguments = {
-        "check": (dataset, "check", root),
-        "check recordings": (dataset, "check", recordings),
-        "stats": (dataset, "stats", root),
         "card": (cards, "dataset", root, "--repo-id", "lab/peg", "--overwrite"),
         "report": (cards, "report", root, "--out", out.with_suffix(".html")),
         "zarr": (main, "export", root, "--format", "zarr", "--out", out.with_suffix(".zarr")),
