@@ -10,7 +10,7 @@ import numpy as np
 
 from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -199,6 +199,13 @@ class TableTask(PairTask):
         from .rules import RULES
 
         return RULES
+
+    @property
+    def statistics(self) -> TaskStatistics:
+        """Sides of obstacles, people's routes, the dip of the steering."""
+        from .statistics import STATISTICS  # scipy, diptest
+
+        return STATISTICS
 
     @property
     def features(self) -> PolicyFeatures:
