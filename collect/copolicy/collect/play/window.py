@@ -11,7 +11,7 @@ _OF_DESKTOP = 0.86  # of the desktop's smaller side that a window takes by itsel
 class Window:
     """A window of any size."""
 
-    def __init__(self, size: tuple[int, int] | None, fullscreen: bool, title: str):
+    def __init__(self, size: tuple[int, int] | None, fullscreen: bool, title: str = "two players"):
         """
         Args:
             size: px; by default what suits the desktop.
