@@ -244,7 +244,10 @@ def test_the_command_plays_another_task(peg, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["kept"] == 1
     assert main([*call, "--angular-limit", "pi/8"]) == 2
     assert "--angular-limit: expected no such flag" in capsys.readouterr().err
-    call[call.index("scripted:lazy")] = "scripted:S01"
+    call[call.index("scripted:lazy")] = "policy:pretrained"
+    assert main(call) == 2
+    assert "expected a policy that has learned the task 'peg', found 'one of another task'" in capsys.readouterr().err
+    call[call.index("policy:pretrained")] = "scripted:S01"
     assert main(call) == 2
     assert "unknown simulated pair 'S01'; available: even, lazy" in capsys.readouterr().err
 
@@ -365,8 +368,7 @@ def test_the_loop_is_measured_at_the_rate_of_the_task():
 
 
 def test_a_policy_is_filmed_with_a_simulated_partner(peg):
-    from copolicy.collect.demonstration.episode import demonstrate
-    from copolicy.collect.demonstration.pictures import SIZE, pictures
+    from copolicy.collect.demonstration.film import SIZE, demonstrate, pictures
 
     class Pushing:
         """Both push to the right, gently."""

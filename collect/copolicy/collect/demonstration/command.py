@@ -70,8 +70,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..replay.film import save_gif
     from ..replay.pictures import picture_count
     from ..screen.outline_view import outline_of
-    from .episode import demonstrate
-    from .pictures import SIZE, pictures
+    from .film import SIZE, demonstrate, pictures
 
     outline_of(task)
     partner = pair_name(task, arguments.partner)
