@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,8 +46,6 @@ class TableTask(PairTask):
     orientations = 4
     invitation = "carry the table together"
     instruction = "Carry the table to the green goal together. Nobody knows which way the other will go."
-    drift_limits: Mapping[str, float] = MappingProxyType({"px": 0.01, "rad": 1e-4})
-    """Sums of a double stay below 1e-9."""
 
     @property
     def agents(self) -> SimulatedPlayers:
@@ -169,6 +166,11 @@ class TableTask(PairTask):
         from .artist.table_view import TableView  # pygame
 
         return TableView(scenario)
+
+    @property
+    def drift_limits(self) -> Mapping[str, float]:
+        """Of position and orientation; sums of a double stay below 1e-9."""
+        return {"px": 0.01, "rad": 1e-4}
 
     def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Of the position and of the orientation, the shorter way round."""
