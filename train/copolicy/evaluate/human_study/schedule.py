@@ -80,7 +80,7 @@ class StudySchedule(Balance):
         self._trials = plan.of(participant)
         self._policy = policy
         self._agent = agent
-        super().__init__(plan.configurations, len(self._trials), plan.seed, participant, swap=False)
+        super().__init__(plan.configurations, len(self._trials), plan.seed, participant, swap=False, task=plan.task)
 
     def next(self, counts: Counts) -> tuple[Any, int]:
         """Start and seats of the next trial; puts its robot in charge."""
