@@ -6,7 +6,7 @@ from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.files.staging import require_new
 
 from .comparison import add_compare_command
@@ -15,6 +15,8 @@ from .partner_study import add_partner_command
 from .plans.command import add_plans_command
 from .result_file import write_json
 from .study_flags import add_study_flags, learned_task, policy_of, protocol_of, study_needs, study_settings
+
+_MAPS = "holdout"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         study_needs,
     )
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    add_maps_flag(coplan, "holdout")
+    add_maps_flag(coplan, _MAPS, given=False)
     coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     coplan.add_argument(
         "--repeats", type=whole_number("--repeats", 1, 10_000), default=1, help="episodes a map (default: 1)"
@@ -50,7 +52,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
     task = learned_task(arguments.policy)
-    chosen = task.scenario_set(arguments.maps)
+    chosen = task.scenario_set(set_name(task, arguments.maps, _MAPS))
     if arguments.orientations:
         chosen = task.turned(chosen)
     maps = chosen.scenarios[: arguments.limit]

@@ -8,13 +8,14 @@ from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.publication.licences import checked_licence
 
+from ..partner_study.configurations import MAPS, study_configurations
 from ..result_file import write_json
 from ..study_flags import (
     add_protocol_flags,
@@ -59,7 +60,7 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
         default=5,
         help="how many people (default: 5, the paper's)",
     )
-    add_maps_flag(command, "unseen")
+    add_maps_flag(command, MAPS, given=False)
     command.add_argument(
         "--configurations",
         type=whole_number("--configurations", None),
@@ -127,7 +128,6 @@ def _add_summarise(steps: argparse._SubParsersAction) -> None:
 
 def _plan(arguments: argparse.Namespace) -> dict:
     from ..partner_study.command import split_name
-    from ..partner_study.configurations import study_configurations
     from .plan import Robot, make_plan, williams_square
 
     require_new(arguments.out, overwrite=arguments.overwrite)
@@ -139,7 +139,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
         robots.append(Robot.of(name, path))
     folders = [(robot.name, checkpoint_folder(robot.checkpoint)) for robot in robots]
     protocol = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders])
-    chosen = protocol.task.scenario_set(arguments.maps)
+    chosen = protocol.task.scenario_set(set_name(protocol.task, arguments.maps, MAPS))
     starts = study_configurations(chosen, arguments.configurations)
     asked, (stated, unusual) = arguments.episodes_per_robot, stated_settings(protocol.task, protocol.physics)
     plan = make_plan(

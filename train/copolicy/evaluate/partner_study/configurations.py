@@ -8,8 +8,8 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import get_task
 
-USUAL = 60
-"""As many as the paper has."""
+MAPS, USUAL = "unseen", 60
+"""The set of maps that studies with a partner take, and how many starts: as many as the paper has."""
 
 _STRIDE = 37
 
