@@ -18,9 +18,9 @@ from copolicy.cards.cli import main
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
-from copolicy.dataset.statistics.human_routes import human_distance
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics
+from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REPORT = "report.html"
@@ -54,7 +54,8 @@ def route_document(words: list[str], episodes: int) -> dict[str, Any]:
     """Stored statistics of routes past two obstacles, as those of a data set with so many simulated episodes."""
     rng = np.random.default_rng(0)
     data = carried_set(words, TWO, rng)
-    estimates = route_statistics(data, Bootstrap(data.pairs, 200, rng), rng) | human_distance(data, rng)
+    bootstrap = Bootstrap(data.pairs, 200, rng)
+    estimates = route_statistics(data, bootstrap, rng) | routes_of_tables(data, bootstrap, rng)
     return {
         "definition_version": "2.0.0",
         "dataset": {"episodes": episodes, "left_out": {}, "sources": {"simulated": episodes}},

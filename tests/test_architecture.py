@@ -24,12 +24,6 @@ ROOTS = tuple(folder.split("/", 1)[1].replace("/", ".") for folder in ARROWS)
 
 TABLE = "copolicy.tasks.table"
 
-NOT_YET_MOVED = (
-    "dataset/copolicy/dataset/statistics/route_entropy.py",
-    "dataset/copolicy/dataset/statistics/visitation.py",
-)
-"""Modules that know the table and should ask `get_task` instead; the list may only become shorter."""
-
 HEAVY = {"torch", "torchvision", "lerobot", "datasets", "matplotlib", "pandas", "diffusers", "gymnasium"}
 
 
@@ -71,7 +65,7 @@ def test_nothing_imports_the_table_but_itself_and_the_importer_of_the_original_p
     by_name = {package: [path for path in _files(package) if _imports_the_table(path)] for package in ARROWS}
     found = {path.relative_to(ROOT).as_posix() for paths in by_name.values() for path in paths}
     allowed = ("collect/copolicy/tasks/table/", "convert/copolicy/convert/upstream/")
-    assert {path for path in found if not path.startswith(allowed)} == set(NOT_YET_MOVED)
+    assert [path for path in found if not path.startswith(allowed)] == []
 
 
 @functools.cache
@@ -140,9 +134,7 @@ def test_no_sub_packages_import_each_other():
     modules = _modules()
     edges: dict[str, set[str]] = {}
     for name, targets in _edges().items():
-        # Who may not know the table is a test of its own.
-        to_go = modules[name].relative_to(ROOT).as_posix() in NOT_YET_MOVED
-        found = {_sub_package(target) for target in targets if not (to_go and target.startswith(TABLE))}
+        found = {_sub_package(target) for target in targets}
         edges.setdefault(_sub_package(name), set()).update(found - {_sub_package(name), *ROOTS})
     packages = {_sub_package(name) for name, path in modules.items() if path.name == "__init__.py"}
     assert [knot & packages for knot in _cycles(edges) if len(knot & packages) > 1] == []

@@ -1,5 +1,6 @@
 """`copolicy-convert mcap --video`: the right picture for every frame, wherever its episode went."""
 
+import io
 import json
 import logging
 import shutil
@@ -18,7 +19,8 @@ from video_difference import video_difference
 from copolicy.convert.cli import main
 from copolicy.convert.lerobot.prepare import Conversion, prepare_episode
 from copolicy.convert.lerobot.writer import write_dataset
-from copolicy.convert.video.scene_video import SCENE, parse_size, scene_clip
+from copolicy.convert.video import scene_video
+from copolicy.convert.video.scene_video import SCENE, parse_size, scene_clip, scene_encoder
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import STATE
@@ -26,6 +28,7 @@ from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episode
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.versions.content import read_content
 from copolicy.tasks.table import TableTask
+from copolicy.tasks.table.artist.scene_image import SceneImage
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.train.cli import main as train
 
@@ -260,3 +263,30 @@ def test_a_difference_of_videos_is_told(made):
     told = video_difference(made / "a", made / "b").splitlines()
     assert [line.split(":")[0] for line in told] == [f"episode {number}, {SCENE}" for number in range(2)]
     assert "images by up to" in told[0]
+
+
+def test_the_bytes_do_not_depend_on_the_instructions_of_the_processor(monkeypatch):
+    image = SceneImage(MAP_SETS["training"][30], SIZE)
+    pictures = [image.draw((150.0 + 7 * step, 300.0 - 3 * step, 0.1 * step)) for step in range(30)]
+
+    def encoded(instructions: str) -> bytes:
+        encoder = scene_encoder(10)
+        encoder.extra_options["x264-params"] += f":asm={instructions}"
+        monkeypatch.setattr(scene_video, "scene_encoder", lambda fps: encoder)
+        return scene_clip(pictures, 10, SIZE).mp4
+
+    plain = encoded("0")
+    assert encoded("sse2") == encoded("ssse3") == encoded("avx2") == plain
+
+
+@pytest.mark.parametrize(
+    ("colour", "ycc"),
+    [((0, 0, 0), (16, 128, 128)), ((255, 255, 255), (235, 128, 128)), ((255, 0, 0), (81, 90, 240)),
+     ((0, 255, 0), (145, 54, 34)), ((0, 0, 255), (41, 240, 110))],
+)  # fmt: skip
+def test_colours_are_those_of_bt_601(colour, ycc):
+    mp4 = scene_clip([np.full((80, 160, 3), colour, np.uint8)] * 2, 10, SIZE).mp4
+    with av.open(io.BytesIO(mp4)) as film:
+        frame = next(film.decode(video=0)).to_ndarray(format="yuv420p")
+    planes = frame[:80], frame[80:100], frame[100:]
+    assert tuple(int(np.median(plane)) for plane in planes) == pytest.approx(ycc, abs=1)

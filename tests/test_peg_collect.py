@@ -244,7 +244,10 @@ def test_the_command_plays_another_task(peg, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["kept"] == 1
     assert main([*call, "--angular-limit", "pi/8"]) == 2
     assert "--angular-limit: expected no such flag" in capsys.readouterr().err
-    call[call.index("scripted:lazy")] = "scripted:S01"
+    call[call.index("scripted:lazy")] = "policy:pretrained"
+    assert main(call) == 2
+    assert "expected a policy that has learned the task 'peg', found 'one of another task'" in capsys.readouterr().err
+    call[call.index("policy:pretrained")] = "scripted:S01"
     assert main(call) == 2
     assert "unknown simulated pair 'S01'; available: even, lazy" in capsys.readouterr().err
 
@@ -362,3 +365,27 @@ def test_the_loop_is_measured_at_the_rate_of_the_task():
     for k in range(40):
         quick.add(Tick(k * dt, k * dt, 0))
     assert quick.slow
+
+
+def test_a_policy_is_filmed_with_a_simulated_partner(peg):
+    from copolicy.collect.demonstration.film import SIZE, demonstrate, pictures
+
+    class Pushing:
+        """Both push to the right, gently."""
+
+        name, task, n_obs_steps, n_action_steps, fps, keeps_history = "policy:pushing", "peg", 1, 4, 10, False
+
+        def reset(self, seed):
+            pass
+
+        def predict_action_chunk(self, observations):
+            return np.full((1, 8, 2), 0.2)
+
+    track = demonstrate(Pushing(), peg.scenario_sets["right"][0], "lazy", task=peg)
+    assert (track.task, track.episode.meta.controller_1) == (peg, "scripted:lazy")
+    assert verify(track)["max_drift_position"] == 0.0
+    frames = sum(1 for _ in pictures(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
+    assert frames == len(sampled(track, 4, 2.0)) + 4
+    Pushing.task = "table"
+    with pytest.raises(InvalidValueError, match="expected a policy that has learned the task 'peg', found 'table'"):
+        demonstrate(Pushing(), peg.scenario_sets["right"][0], "lazy", task=peg)

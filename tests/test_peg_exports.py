@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import h5py
@@ -64,7 +65,8 @@ def test_the_layout_of_the_original_is_for_its_own_task(peg_set, tmp_path, capsy
 def test_robomimic_names_the_environment_of_the_task(peg_set, tmp_path, capsys):
     out = tmp_path / "peg.hdf5"
     run(capsys, "export", peg_set, "--format", "robomimic", "--out", out, "--valid", 0.3, "--valid-by", "episodes")
-    with h5py.File(out) as file:
+    with h5py.File(out) as opened:
+        file: Any = opened
         demo = file["data/demo_0"]
         count = demo.attrs["num_samples"]
         assert demo["obs/agent_pos"].shape == demo["next_obs/agent_pos"].shape == (count, 2)
@@ -83,7 +85,8 @@ def test_minari_recovers_the_environment_of_the_task(peg_set, tmp_path, capsys):
     environment = gymnasium.make(EnvSpec.from_json(metadata["env_spec"]))
     assert environment.spec is not None
     assert environment.spec.max_episode_steps == 100
-    with h5py.File(out / "data/main_data.hdf5") as file:
+    with h5py.File(out / "data/main_data.hdf5") as opened:
+        file: Any = opened
         group = file["episode_0"]
         observation = {name: values[0] for name, values in group["observations"].items()}
         assert environment.observation_space.contains(observation)
@@ -100,11 +103,19 @@ def test_settings_that_all_episodes_share_go_to_the_environment(peg):
 
 def test_sets_grow_and_join(recordings, peg_set, tmp_path, capsys):
     more = record_pegs(tmp_path / "more", 2, 7, "left")
-    added = run(capsys, "mcap", more, "--root", peg_set, "--repo-id", "lab/peg", "--append")
+    added = run(capsys, "mcap", more, "--root", peg_set, "--repo-id", "lab/peg", "--append", "--license", "cc0-1.0")
     assert (added["episodes_added"], added["episodes"]) == (2, 6)
     first, second = convert_pegs(recordings, tmp_path / "a"), convert_pegs(more, tmp_path / "b")
     merged = run(capsys, "merge", first, second, "--root", tmp_path / "whole", "--repo-id", "lab/whole")
     assert (merged["episodes"], merged["content_hash"]) == (6, read_content(peg_set).hash)
+
+
+def test_shards_give_the_set_of_one_conversion(recordings, peg_set, tmp_path, capsys):
+    whole = tmp_path / "whole"
+    call = ("mcap", recordings, "--root", whole, "--repo-id", "lab/peg", "--license", "cc0-1.0", "--shard-episodes", 3)
+    summary = run(capsys, *call)
+    assert (summary["shards"], summary["episodes"]) == (2, 4)
+    assert read_content(whole).hash == read_content(peg_set).hash
 
 
 def test_rates_are_held_against_the_rate_of_the_recordings(recordings, tmp_path, capsys):

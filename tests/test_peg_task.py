@@ -155,28 +155,3 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
     assert main(["mcap", str(tmp_path), "--root", str(tmp_path / "set"), "--repo-id", "lab/both", "--fps", "10"]) == 1
     assert "expected an episode of the task 'peg', found one of 'table'" in capsys.readouterr().err
     assert not (tmp_path / "set").exists()
-
-
-@pytest.mark.parametrize(
-    "command",
-    ["stats"],
-)
-def test_a_command_that_knows_the_table_alone_says_so(peg, tmp_path, capsys, command):
-    from copolicy.dataset.cli import main as dataset
-
-    recordings, root, out = tmp_path / "recordings", tmp_path / "set", tmp_path / "out"
-    recordings.mkdir()
-    recording = recordings / "one.mcap"
-    record(peg, recording)
-    assert main(["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/peg"]) == 0
-    before = sorted(path for path in tmp_path.rglob("*"))
-    capsys.readouterr()
-    program, *arguments = {
-        "check": (dataset, "check", root),
-        "check recordings": (dataset, "check", recordings),
-        "stats": (dataset, "stats", root),
-    }[command]
-    assert program([str(argument) for argument in arguments]) == 2
-    line = capsys.readouterr().err.splitlines()[-1]
-    assert "expected data of the task 'table', the only one that this command knows so far, found data of 'peg'" in line
-    assert sorted(path for path in tmp_path.rglob("*")) == before

@@ -12,14 +12,14 @@ from copolicy.collect.play import loading as loading_module
 from copolicy.collect.play.loading import Loading
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.play.window import Window
+from copolicy.collect.screen.window import Window
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import RunError
 
 FIRST_WINDOW = """
 import sys
 from copolicy.collect.cli import main
-from copolicy.collect.play import window
+from copolicy.collect.screen import window
 
 def opened(self, *size):
     heavy = {"torch", "lerobot", "pymunk", "scipy", "mcap", "google.protobuf", "tqdm.auto", "datasets", "pandas"}

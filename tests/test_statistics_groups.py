@@ -5,7 +5,8 @@ from constructed_pairs import FREE, ONE, carried, row, still, trajectories
 from copolicy.dataset.statistics.energy_distance import energy_coefficient, energy_statistics, episode_distances
 from copolicy.dataset.statistics.pair_share import explained, pair_share_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap, circular_shift, exchangeable, permuted_within
-from copolicy.dataset.statistics.visitation import free_cells, visitation_statistics
+from copolicy.dataset.statistics.visitation import Grid, visitation_statistics
+from copolicy.tasks.table.scene_outline import TableOutline
 
 
 def _bootstrap(data):
@@ -64,7 +65,8 @@ def test_visitation_of_eight_cells_alike_is_three_bits():
 
 
 def test_cells_in_an_obstacle_are_not_free():
-    assert free_cells(ONE.squares).sum() == 48 * 24 - 4
+    outline = TableOutline()
+    assert Grid.over(outline).free(outline.fixed(ONE)[2:]).sum() == 48 * 24 - 4
 
 
 def test_pairs_on_separate_cells_diverge_by_a_bit_and_alike_by_none():

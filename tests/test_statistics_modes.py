@@ -6,7 +6,7 @@ from diptest import diptest
 from copolicy.dataset.statistics.neighbours import neighbour_statistics
 from copolicy.dataset.statistics.path_modes import count_modes, path_mode_statistics, resample_path
 from copolicy.dataset.statistics.resampling import Bootstrap
-from copolicy.dataset.statistics.steering_dip import decision_zone, dip_statistics, dip_tests, steering
+from copolicy.tasks.table.statistics.steering_dip import decision_zone, dip_statistics, dip_tests, steering
 
 
 def _bootstrap(data):
@@ -34,7 +34,7 @@ def test_modes_are_those_that_were_constructed(words, episodes):
 
 def test_paths_nearer_than_the_resolution_are_one_mode():
     paths = np.array([resample_path(carried("L", ONE, amplitude=100 + 8 * (n % 2))[:, :2]) for n in range(30)])
-    assert count_modes(paths, seed=0)[0] == 1
+    assert count_modes(paths, seed=0, resolution=10.0)[0] == 1
 
 
 def test_few_episodes_have_no_modes():

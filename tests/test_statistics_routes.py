@@ -6,14 +6,16 @@ import pytest
 from constructed_pairs import FREE, ONE, TWO, carried, carried_set, row, trajectories
 
 from copolicy.dataset.statistics.entropy import entropy, jensen_shannon, miller_madow, simpson
-from copolicy.dataset.statistics.human_routes import human_distance, human_route_entropy, human_routes
 from copolicy.dataset.statistics.resampling import Bootstrap
-from copolicy.dataset.statistics.route_entropy import route_statistics, routes_taken, word_entropy
+from copolicy.dataset.statistics.route_entropy import route_statistics, word_entropy
+from copolicy.tasks.table.statistics.human_routes import human_distance, human_route_entropy, human_routes
+from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
 
 
 def _routes(data):
     bootstrap = Bootstrap(data.pairs, 300, np.random.default_rng(0))
-    return route_statistics(data, bootstrap, np.random.default_rng(1))
+    rng = np.random.default_rng(1)
+    return route_statistics(data, bootstrap, rng) | routes_of_tables(data, bootstrap, rng)
 
 
 def test_entropy_of_known_counts():
@@ -87,8 +89,8 @@ def test_routes_are_those_that_were_constructed_and_unfinished_ones_do_not_count
     words = ["LL", "LR", "RL", "RR"]
     rows = [row(TWO)] * 3 + [row(TWO, success=False)]
     data = trajectories([(carried(word, TWO), None) for word in words], rows)
-    assert routes_taken(data) == ["LL", "LR", "RL", None]
-    assert routes_taken(trajectories([(carried("", FREE), None)], [row(FREE)])) == [None]
+    assert data.labels == ["LL", "LR", "RL", None]
+    assert trajectories([(carried("", FREE), None)], [row(FREE)]).labels == [None]
 
 
 def test_a_column_that_disagrees_is_counted():

@@ -25,7 +25,6 @@ from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.statistics.estimate import Estimate
-from copolicy.dataset.statistics.human_routes import human_distance
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import EpisodeRow, Trajectories
@@ -33,6 +32,7 @@ from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.agents.clearance import square_clearance
 from copolicy.tasks.table.features import theta_of
+from copolicy.tasks.table.statistics.human_routes import human_distance
 
 FPS = 10
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75)

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,9 @@ class Checkpoint:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
             UnknownNameError: its task is not installed.
         """
-        folder = _folder(path)
+        folder = find_policy_folder(path)
+        if folder is None:
+            raise FileFormatError(path, f"a checkpoint folder with config.json and {WEIGHTS}", "none")
         config = read_optional_json(folder / "config.json", dict, "a policy's configuration") or {}
         if "type" not in config:
             raise FileFormatError(folder / "config.json", "a policy's configuration with its type", "none")
@@ -78,7 +80,7 @@ class Checkpoint:
         elif recipe.get("dataset"):
             data = TrainingData.from_recipe(recipe["dataset"])
         else:
-            data = replace(TrainingData.from_settings(settings), fps=config.get("fps"))
+            data = TrainingData.from_settings(settings, config.get("fps"))
         with (folder / WEIGHTS).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         training = training or recipe.get("training") or {}
@@ -106,15 +108,11 @@ class Checkpoint:
             return [self._checked(kept, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InvalidValueError("--eval", "each file once", [str(path) for path in paths])
-        return [self._evaluation(path) for path in paths]
+        return [self._checked(path, read_optional_json(path, dict, _RESULT)) for path in paths]
 
-    def _evaluation(self, path: Path) -> dict[str, Any]:
-        result = read_optional_json(path, dict, _RESULT)
+    def _checked(self, path: Path, result: dict[str, Any] | None) -> dict[str, Any]:
         if result is None:
             raise FileFormatError(path, _RESULT, "no such file")
-        return self._checked(path, result)
-
-    def _checked(self, path: Path, result: dict[str, Any]) -> dict[str, Any]:
         require_type(result, EvaluationDocument, _RESULT, path)
         weights = result["policy"].get("weights_sha256")
         # An exported policy makes the same plans as the checkpoint that it came from, and so has the same results.
@@ -127,10 +125,3 @@ class Checkpoint:
 def _training_root(settings: dict[str, Any]) -> Path | None:
     root = settings.get("root")
     return Path(root) if root and (Path(root) / INFO_FILE).is_file() else None
-
-
-def _folder(path: Path) -> Path:
-    folder = find_policy_folder(path)
-    if folder is not None:
-        return folder
-    raise FileFormatError(path, f"a checkpoint folder with config.json and {WEIGHTS}", "none")

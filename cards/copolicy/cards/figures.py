@@ -3,14 +3,16 @@
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from copolicy.dataset.files.staging import replacement
-from copolicy.dataset.outline import Outline
+from copolicy.dataset.outline import Outline, Shape
 from copolicy.dataset.outline_figure import (
     BLUE,
     FAILURE,
@@ -18,18 +20,35 @@ from copolicy.dataset.outline_figure import (
     NO_LABEL,
     draw_fixed,
     label_colours,
+    obstacles_of,
     panels,
+    places_text,
     show_whole,
 )
 
 from .facts import DatasetFacts
-from .frames import DrawnEpisode, read_frames
+from .frames import read_frames
 from .human_figure import human_figure
 
 FOLDER = Path("figures")
 
 _OBSTACLE = "#3A3E48"
 _MOST_PANELS = 12
+
+
+class DrawnEpisode(NamedTuple):
+    """An episode as its task's outline draws it.
+
+    Attributes:
+        row: its columns of meta/episodes.
+        path: `(T, 2)` where the body is, in the unit of the outline.
+        fixed: what stands still.
+    """
+
+    row: dict[str, Any]
+    path: np.ndarray
+    fixed: tuple[Shape, ...]
+
 
 Group = tuple[str, list[DrawnEpisode]]
 """Where the obstacles are, and the episodes among them."""
@@ -74,10 +93,10 @@ def _by_obstacles(facts: DatasetFacts, outline: Outline) -> tuple[int, list[Grou
     groups: dict[tuple, list[DrawnEpisode]] = defaultdict(list)
     for row, frames in zip(facts.episodes, read_frames(facts), strict=True):
         episode = DrawnEpisode(row, outline.poses(frames.states)[:, :2], outline.fixed(frames.scenario))
-        groups[episode.obstacles].append(episode)
+        groups[obstacles_of(episode.fixed)].append(episode)
     largest = sorted(groups, key=lambda key: -len(groups[key]))[:_MOST_PANELS]
     return len(groups), [
-        (groups[key][0].obstacle_places(outline) or "no obstacle", groups[key])
+        (places_text(key, outline) or "no obstacle", groups[key])
         for key in sorted(largest, key=lambda key: (len(key), max((size for _, size in key), default=0), key))
     ]
 
@@ -88,7 +107,7 @@ def _trajectories(
     figure = Figure(dpi=110, layout="constrained")
     for (title, members), axes in zip(groups, panels(figure, outline, len(groups), 3, 0.4), strict=True):
         _panel(axes, title, members, outline, colours, labelled)
-    around = any(members[0].obstacles for _, members in groups)
+    around = any(obstacles_of(members[0].fixed) for _, members in groups)
     handles = [
         Rectangle((0, 0), 1, 1, fill=False, edgecolor=GOAL, label="goal"),
         *([Rectangle((0, 0), 1, 1, color=_OBSTACLE, label="obstacle")] if around else []),
@@ -114,7 +133,7 @@ def _panel(
         ]
         axes.legend(handles=handles, loc="lower left", ncols=4, fontsize=7, frameon=False, handlelength=1)
     show_whole(axes, outline)
-    where = f"obstacles {title}" if members[0].obstacles else title
+    where = f"obstacles {title}" if obstacles_of(members[0].fixed) else title
     axes.set_title(f"{where}: {len(members)} episodes", fontsize=8)
 
 

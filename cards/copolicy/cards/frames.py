@@ -1,6 +1,5 @@
 """The frames of a data set, episode by episode: what figures and the report are drawn from."""
 
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -9,8 +8,6 @@ import numpy as np
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, features_of
-from copolicy.dataset.outline import Outline, Shape
-from copolicy.dataset.outline_figure import decimals, obstacles_of
 from copolicy.dataset.task import PairTask
 
 from .facts import DatasetFacts
@@ -40,31 +37,6 @@ class EpisodeFrames:
         its own.
         """
         return self.task.interaction(np.vstack((self.states[1:], self.states[-1:])), self.actions)
-
-
-@dataclass(frozen=True)
-class DrawnEpisode:
-    """An episode as its task's outline draws it.
-
-    Attributes:
-        row: its columns of meta/episodes.
-        path: `(T, 2)` where the body is, in the unit of the outline.
-        fixed: what stands still.
-    """
-
-    row: dict[str, Any]
-    path: np.ndarray
-    fixed: tuple[Shape, ...]
-
-    @functools.cached_property
-    def obstacles(self) -> tuple:
-        """See `obstacles_of`."""
-        return obstacles_of(self.fixed)
-
-    def obstacle_places(self, outline: Outline) -> str:
-        """`(400, 200) (800, 350)`."""
-        digits = decimals(outline)
-        return " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in self.obstacles)
 
 
 def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:

@@ -67,13 +67,13 @@ def _draw(routes: RouteStatistics) -> Figure:
 def _shares(axis: Axes, distance: HumanDistance) -> None:
     for row, route in enumerate(distance.routes):
         for offset, count, total, paint in (
-            (-_HEIGHT / 2, route.ours, distance.episodes, _OURS),
-            (_HEIGHT / 2, route.human, distance.demonstrations, _PEOPLE),
+            (-_HEIGHT / 2, route["ours"], distance.episodes, _OURS),
+            (_HEIGHT / 2, route["human"], distance.demonstrations, _PEOPLE),
         ):
             part = count / max(1, total)
             axis.barh(row + offset, part, height=_HEIGHT, color=paint)
             axis.text(part + 0.01, row + offset, str(count), va="center", fontsize=7)
-    axis.set_yticks(range(len(distance.routes)), [route.word for route in distance.routes], fontsize=8)
+    axis.set_yticks(range(len(distance.routes)), [route["word"] for route in distance.routes], fontsize=8)
     axis.set(xlim=(0, 1), ylim=(len(distance.routes) - 0.4, -0.6), xlabel="share of episodes")
     mirrored = ", human L and R exchanged" if distance.reading == "mirrored" else ""
     title = f"{_obstacles(distance.obstacles)}{mirrored}\n{distance.episodes} episodes, {distance.demonstrations} human"

@@ -18,16 +18,10 @@ def multimodality(facts: DatasetFacts) -> str:
         return f"{heading}\n\nNot computed: `copolicy-dataset stats` was not run on this data set."
     entries = estimates(stored)
     rows = [
-        (
-            entry["name"],
-            number(entry["value"]),
-            entry["unit"],
-            _interval(entry.get("interval")),
-            _null(entry.get("null")),
-            number(entry.get("episodes")),
-        )
+        (entry["name"], number(entry["value"]), entry["unit"], _interval(entry.get("interval")),
+         _null(entry.get("null")), number(entry.get("episodes")))
         for entry in entries
-    ]
+    ]  # fmt: skip
     definitions = "\n".join(
         f"- **{entry['name']}**: {entry['definition']}{_note(entry)}" for entry in entries if entry.get("definition")
     )
@@ -56,27 +50,14 @@ def _routes(routes: RouteStatistics | None) -> list[str]:
     """Entropy of each configuration, folded away: there may be dozens."""
     if routes is None or not routes.configurations:
         return []
+    between = "95 % interval"
+    heads = ("configuration", "episodes", "routes", "entropy, bits", between, "effective modes", between)
     rows = [
-        (
-            entry["name"],
-            entry["episodes"],
-            ", ".join(f"{word} {count}" for word, count in entry["counts"].items()),
-            number(entry.get("entropy_bits")),
-            _interval(entry.get("interval")),
-            number(entry.get("effective_modes")),
-            _interval(entry.get("effective_modes_interval")),
-        )
+        (entry["name"], entry["episodes"], ", ".join(f"{word} {count}" for word, count in entry["counts"].items()),
+         number(entry.get("entropy_bits")), _interval(entry.get("interval")),
+         number(entry.get("effective_modes")), _interval(entry.get("effective_modes_interval")))
         for entry in routes.configurations
-    ]
-    heads = (
-        "configuration",
-        "episodes",
-        "routes",
-        "entropy, bits",
-        "95 % interval",
-        "effective modes",
-        "95 % interval",
-    )
+    ]  # fmt: skip
     title = f"Routes of {routes.played_by} in each of {len(rows)} configurations"
     return [f"<details><summary>{title}</summary>\n\n{table(heads, rows)}\n\n</details>"]
 

@@ -13,15 +13,6 @@ _PLAYED = {"human": "people", "simulated": "simulated pairs", "upstream": "pairs
 
 
 @dataclass(frozen=True)
-class RouteShare:
-    """How many of this data set's episodes and of the human demonstrations took one route."""
-
-    word: str
-    ours: int
-    human: int
-
-
-@dataclass(frozen=True)
 class HumanDistance:
     """Jensen-Shannon divergence from the human routes, for one number of obstacles.
 
@@ -29,7 +20,8 @@ class HumanDistance:
         bits: 0 the same, 1 nothing in common; None where `note` says why not.
         interval: 95 percent.
         chance: low, mean and high of what two draws from one distribution would give.
-        routes: both distributions, in the reading of the human labels that is nearer.
+        routes: `word`, `ours` and `human` of each, how many episodes and human demonstrations took it, in the reading
+            of the human labels that is nearer.
         reading: `as labelled`, or `mirrored` where the human L and R were exchanged.
     """
 
@@ -40,7 +32,7 @@ class HumanDistance:
     p: float | None
     episodes: int
     demonstrations: int
-    routes: tuple[RouteShare, ...]
+    routes: tuple[dict[str, Any], ...]
     reading: str
     definition: str
     note: str
@@ -129,7 +121,9 @@ def _distance(obstacles: int, entry: dict[str, Any]) -> HumanDistance:
         null["p"] if null else None,
         entry.get("episodes", sum(ours.values())),
         sum(human.values()),
-        tuple(RouteShare(word, ours.get(word, 0), human.get(word, 0)) for word in sorted({*ours, *human})),
+        tuple(
+            {"word": word, "ours": ours.get(word, 0), "human": human.get(word, 0)} for word in sorted({*ours, *human})
+        ),
         reading,
         entry.get("definition", ""),
         entry.get("note", ""),

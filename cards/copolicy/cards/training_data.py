@@ -1,12 +1,15 @@
 """What a policy was trained on, from the data set's own metadata or from the recipe of an exported policy."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from copolicy.dataset.scenarios import set_label
 
 from .facts import DatasetFacts
+
+_COUNTS = {"sources": "source", "map_sets": "map_set", "licences": "license", "pairs": "pair_id"}
+"""Episodes by a column, and where a recipe has them."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,11 @@ class TrainingData:
     @classmethod
     def from_data_set(cls, facts: DatasetFacts, settings: dict[str, Any]) -> "TrainingData":
         """From the data set's folder, and what the training says about it."""
-        chosen = settings.get("episodes")
         sets = Counter(set_label(episode) for episode in facts.episodes)
-        return cls(
-            repo_id=str(settings.get("repo_id") or ""),
-            revision=settings.get("revision"),
-            used=len(facts.episodes) if chosen is None else len(chosen),
+        stated = cls.from_settings(settings)
+        return replace(
+            stated,
+            used=len(facts.episodes) if stated.used is None else stated.used,
             episodes=len(facts.episodes),
             frames=facts.info["total_frames"],
             fps=facts.info["fps"],
@@ -56,27 +58,16 @@ class TrainingData:
         )
 
     @classmethod
-    def from_settings(cls, settings: dict[str, Any]) -> "TrainingData":
+    def from_settings(cls, settings: dict[str, Any], fps: float | None = None) -> "TrainingData":
         """From what the training says alone; its data set is not at hand."""
         chosen = settings.get("episodes")
-        return cls(
-            str(settings.get("repo_id") or ""), settings.get("revision"), None if chosen is None else len(chosen)
-        )
+        used = None if chosen is None else len(chosen)
+        return cls(str(settings.get("repo_id") or ""), settings.get("revision"), used, fps=fps)
 
     @classmethod
     def from_recipe(cls, recipe: dict[str, Any]) -> "TrainingData":
         """From the `dataset` of `recipe.json`."""
-        return cls(
-            repo_id=str(recipe.get("repo_id") or ""),
-            revision=recipe.get("revision"),
-            used=recipe.get("episodes_used"),
-            episodes=recipe.get("episodes"),
-            frames=recipe.get("frames"),
-            fps=recipe.get("fps"),
-            version=recipe.get("version"),
-            content_hash=recipe.get("content_hash"),
-            sources=recipe.get("source") or {},
-            map_sets=recipe.get("map_set") or {},
-            licences=recipe.get("license") or {},
-            pairs=recipe.get("pair_id") or {},
-        )
+        stated: dict[str, Any] = {name: recipe.get(key) or {} for name, key in _COUNTS.items()}
+        stated |= {name: recipe.get(name) for name in ("episodes", "frames", "fps", "version", "content_hash")}
+        name, revision = str(recipe.get("repo_id") or ""), recipe.get("revision")
+        return cls(name, revision, recipe.get("episodes_used"), **stated)

@@ -9,7 +9,7 @@ from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import PairTask
 
 from .replay.pictures import write_png
-from .screen.canvas import Canvas
+from .screen.canvas import Canvas, new_surface
 from .screen.outline_view import outline_of, scene_view
 from .screen.palette import MUTED, TEXT
 from .sdl import pygame
@@ -41,8 +41,7 @@ def draw_map_sheet(task: PairTask, chosen: ScenarioSet, width: int) -> pygame.Su
     height = cell * outline.size[1] / outline.size[0]
     size = (_SHEET, math.ceil(_HEAD + math.ceil(count / columns) * (height + _CAPTION + _GAP)))
     width = min(width, _MOST_PX * size[0] // size[1])
-    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
-    surface = pygame.Surface((width, math.ceil(width * size[1] / size[0])), depth=32)
+    surface = new_surface((width, math.ceil(width * size[1] / size[0])))
     canvas = Canvas(surface, size)
     canvas.clear()
     about = f"version {chosen.version}, {count} maps, digest {chosen.digest}"

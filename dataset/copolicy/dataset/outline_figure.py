@@ -92,6 +92,12 @@ def obstacles_of(shapes: Iterable[Shape]) -> tuple[tuple[Point, tuple[float, flo
     return tuple(sorted(found))
 
 
+def places_text(obstacles: Iterable[tuple[Point, Any]], outline: Outline) -> str:
+    """Where obstacles are, as `(400, 200) (800, 350)`."""
+    digits = decimals(outline)
+    return " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in obstacles)
+
+
 def decimals(outline: Outline) -> int:
     """Digits after the point of a place in the scene that tell places a thousandth of its width apart."""
     return max(0, -int(f"{outline.size[0] / 1000:e}".partition("e")[2]))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
+from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 from .features import PAIR_GYM_ID
 from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
@@ -37,6 +37,7 @@ from .task_parts import (
     SimulatedPlayers,
     Studies,
     TaskRules,
+    TaskStatistics,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
@@ -66,12 +67,12 @@ __all__ = [
     "Studies",
     "TaskRules",
     "TaskSpec",
+    "TaskStatistics",
     "TaskWords",
     "Vector",
     "World",
     "get_task",
     "installed_tasks",
-    "require_table",
 ]
 
 TABLE = "table"
@@ -277,6 +278,11 @@ class PairTask(ABC):
         return ()
 
     @property
+    def statistics(self) -> TaskStatistics:
+        """Words of statistics, and statistics beside the generic ones."""
+        return TaskStatistics()
+
+    @property
     def rules(self) -> TaskRules:
         """Rules of `check` and their limits beside the generic ones."""
         return TaskRules()
@@ -336,23 +342,13 @@ class PairTask(ABC):
         """
         raise InvalidValueError("--orientations", "no such flag", self.missing("start orientations"))
 
+    def offers(self, part: str) -> bool:
+        """Whether the task brings a part of its own, such as `strategy` or `interaction`."""
+        return getattr(type(self), part) is not getattr(PairTask, part)
+
     def missing(self, part: str) -> str:
         """The sentence with which a command leaves out what needs a part that the task does not offer."""
         return f"left out: the task {self.spec.name!r} has no {part}"
-
-
-def require_table(task: PairTask, where: Path | str) -> None:
-    """Refuses data of another task, in commands that do not go through the contract yet.
-
-    Args:
-        where: the data, for the message.
-
-    Raises:
-        FileFormatError: they are of another task than the table.
-    """
-    if task.spec.name != TABLE:
-        raise FileFormatError(where, f"data of the task {TABLE!r}, the only one that this command knows so far",
-                              f"data of {task.spec.name!r}")  # fmt: skip
 
 
 def installed_tasks() -> list[str]:

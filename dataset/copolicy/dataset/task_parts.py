@@ -195,6 +195,33 @@ class PolicyFeatures:
 
 
 @dataclass(frozen=True)
+class TaskStatistics:
+    """The part `statistics` of a task: words for the definitions of its statistics, and those that it alone has.
+
+    Attributes:
+        noun: what moves, in a word.
+        people: what a data set of people is.
+        velocity: places in the state of the velocity of what moves, an axis of a player's action each; empty where
+            there is none: no statistics of speed and of work.
+        interaction: definition of the interaction measure.
+        interaction_unit: of it.
+        label_bits: bits that a strategy label can tell at most; None where nobody knows.
+        families: by family, computes estimates from trajectories, bootstrap and generator: further ones of a family
+            of `compute_statistics`, some in the place of generic ones, or a family of its own.
+        reference: what people did elsewhere, as a part of the document, from a generator.
+    """
+
+    noun: str = "body"
+    people: str = "people took part"
+    velocity: tuple[int, ...] = ()
+    interaction: str = "Size of what passes between the players, as the task measures it."
+    interaction_unit: str = "1"
+    label_bits: Callable[[str], int] | None = None
+    families: Mapping[str, Callable[..., dict[str, Any]]] = field(default_factory=dict)
+    reference: Callable[[np.random.Generator], dict[str, Any]] | None = None
+
+
+@dataclass(frozen=True)
 class Limit:
     """A number and why it is that one; `{hz}` in its unit stands for the task's steps a second."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.outline import Point, Shape, square
-from copolicy.dataset.task import RUNNING, Outcome, PairTask
+from copolicy.dataset.task import RUNNING, Outcome, PairTask, SimulatedPlayers
 from copolicy.dataset.task_spec import TaskSpec, Vector
 
 from .players import PLAYERS
@@ -136,7 +136,11 @@ class PegTask(PairTask):
     )
     settings_type = Friction
     outline = PegOutline()
-    agents = PLAYERS
+
+    @property
+    def agents(self) -> SimulatedPlayers:
+        """A pair, partners and a robot."""
+        return PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[Line]]:

@@ -13,32 +13,18 @@ from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.meta_files import CHECK_FILE
-from copolicy.dataset.files.staging import replace_text
+from copolicy.dataset.files.staging import replace_text, require_new
 from copolicy.dataset.outline_figure import BLUE, GREEN, ORANGE, SKY
 
 from ..artefacts import KeptFindings, kept_findings, stored_statistics
 
 REPORT_NAME = "report.html"
 
-
 SCRIPTS = (
-    "elements.js",
-    "data.js",
-    "palette.js",
-    "scene.js",
-    "filters.js",
-    "overview.js",
-    "route_statistics.js",
-    "trajectories.js",
-    "heatmaps.js",
-    "pairs.js",
-    "timing.js",
-    "findings.js",
-    "statistics.js",
-    "episodes.js",
-    "player.js",
-    "main.js",
-)
+    "elements.js", "data.js", "palette.js", "scene.js", "filters.js", "overview.js",
+    "route_statistics.js", "trajectories.js", "heatmaps.js", "pairs.js", "timing.js",
+    "findings.js", "statistics.js", "episodes.js", "player.js", "main.js",
+)  # fmt: skip
 """In the order in which they run; they share one scope."""
 
 _PALETTE = " ".join(
@@ -68,8 +54,6 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> dict:
-    from copolicy.dataset.files.staging import require_new
-
     from ..facts import DatasetFacts
     from .payload import build_payload
 

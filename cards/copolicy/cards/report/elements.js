@@ -29,6 +29,16 @@ function paintKey(text, paint) {
   return key;
 }
 
+/** Head and body of a table, from the texts of its columns and its rows. */
+const tableParts = (heads, rows) => [
+  make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
+  make("tbody", {}, ...rows),
+];
+
+/** A table that scrolls by itself. */
+const scrolling = (label, kind, attributes, heads, rows) =>
+  make("div", { class: kind, tabindex: "0", role: "region", "aria-label": label }, make("table", attributes, ...tableParts(heads, rows)));
+
 /** A canvas of `width` x `height` CSS px with sharp pixels on any screen; returns its context in CSS px. */
 function sharpContext(canvas, width, height) {
   const ratio = window.devicePixelRatio || 1;

@@ -27,10 +27,7 @@ function showPairs(chosen) {
   });
   const heads = ["Pair", "Source", "Episodes", "Success", "Duration, s"];
   heads.push(...offered([["interaction", capital(WORDS.interaction)], ["labels", data.sides ? "Sides passed (L, R)" : capital(WORDS.label)]]));
-  byId("pair-table").replaceChildren(
-    make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
-    make("tbody", {}, ...rows),
-  );
+  byId("pair-table").replaceChildren(...tableParts(heads, rows));
 }
 
 const PLOT = [130, 18];

@@ -21,6 +21,7 @@ from copolicy.dataset.outline_figure import (
     decimals,
     label_colours,
     obstacles_of,
+    places_text,
 )
 
 from ..artefacts import KeptFindings, estimates, statistics_doubt
@@ -138,7 +139,7 @@ def _polygon(outline: Outline, shape: Shape) -> dict[str, Any]:
 
 def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[str, Any]]:
     """What stands still, and where its obstacles are in words, with their sizes where these differ."""
-    found, digits = [(shapes, obstacles_of(shapes)) for shapes in scenes], decimals(outline)
+    found = [(shapes, obstacles_of(shapes)) for shapes in scenes]
     several = len({size for _, obstacles in found for _, size in obstacles}) > 1
     listed = []
     for shapes, obstacles in found:
@@ -147,8 +148,8 @@ def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[
             sizes = [f"{width:g}" if width == height else f"{width:g} x {height:g}" for _, (width, height) in obstacles]
             own = sizes if len(set(sizes)) > 1 else sizes[:1]
             wide = f" of {', '.join(own)} {outline.unit}" if several else ""
-            places = " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in obstacles)
-            name = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}{wide} at {places}"
+            some = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}"
+            name = f"{some}{wide} at {places_text(obstacles, outline)}"
         polygons = [_polygon(outline, shape) for shape in shapes]
         listed.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
     return listed

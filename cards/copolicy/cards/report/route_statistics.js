@@ -99,10 +99,7 @@ function entropyByConfiguration(routes) {
     make("p", {}, make("strong", {}, entropy.value === null ? "No entropy" : `${formatNumber(entropy.value)} bits${spanText(entropy.interval)}${modes}`),
       ` over ${rows.length} configurations of ${routes.played_by}${entropy.value === null ? `: ${entropy.note}` : ""}. The most mixed come first; few episodes make a wide interval.`),
     definition(entropy.definition ?? ""),
-    make("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Entropy of the routes in each configuration" },
-      make("table", { id: "configuration-table" },
-        make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
-        make("tbody", {}, ...rows))),
+    scrolling("Entropy of the routes in each configuration", "scroll tall", { id: "configuration-table" }, heads, rows),
   ];
 }
 

@@ -27,9 +27,7 @@ function showStatistics() {
   place.replaceChildren(
     ...statisticsDoubt(),
     make("p", {}, `All episodes of the data set, whatever is chosen above. ${entries.length} statistics.`),
-    make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Statistics" },
-      make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
-        make("tbody", {}, ...rows))),
+    scrolling("Statistics", "scroll", {}, heads, rows),
   );
 }
 

@@ -25,7 +25,7 @@ __all__ = [
     "load_policy",
 ]
 
-__getattr__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         **dict.fromkeys(("HeldAgent", "RecordedAgent", "ReplayAgent"), "replay"),

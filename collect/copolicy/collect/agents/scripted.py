@@ -5,34 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.exceptions import CopolicyError, UnknownNameError
-from copolicy.dataset.task import PairTask, Player, SimulatedPlayers, get_task
+from copolicy.dataset.task import PairTask, Player, get_task
 
 from ..rollout import Agent, Start
-
-
-def simulated_players(task: PairTask) -> SimulatedPlayers:
-    """The task's part `agents`.
-
-    Raises:
-        CopolicyError: it has none.
-    """
-    if task.agents is None:
-        raise CopolicyError(task.missing("agents"))
-    return task.agents
-
-
-def pair_name(task: PairTask, name: str | None, kind: str = "simulated pair") -> str:
-    """The name of a simulated pair, or that of the task's first one.
-
-    Raises:
-        UnknownNameError: no such pair.
-        CopolicyError: the task has no simulated players.
-    """
-    pairs = simulated_players(task).pairs
-    if name and name not in pairs:
-        raise UnknownNameError(kind, name, pairs)
-    return name or next(iter(pairs))
+from .simulated import simulated_players
 
 
 class ScriptedAgent(Agent):

@@ -66,12 +66,11 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.
     from ..agents import load_policy
-    from ..agents.scripted import pair_name
+    from ..agents.simulated import pair_name
     from ..replay.film import save_gif
     from ..replay.pictures import picture_count
     from ..screen.outline_view import outline_of
-    from .episode import demonstrate
-    from .pictures import SIZE, pictures
+    from .film import SIZE, demonstrate, pictures
 
     outline_of(task)
     partner = pair_name(task, arguments.partner)

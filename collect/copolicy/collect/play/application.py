@@ -5,6 +5,7 @@ from collections import Counter, deque
 from ..inputs import Command, CommandReader, Press
 from ..screen import Canvas
 from ..screen.dialogs import draw_help, draw_toast
+from ..screen.window import Window
 from ..sdl import pygame
 from ..ticker import Tick
 from .finished import Failure, Finished
@@ -15,7 +16,6 @@ from .phase import Phase, To
 from .ready import Countdown, Ready
 from .result import Result
 from .running import Running
-from .window import Window
 
 _PHASES: dict[To, type[Phase]] = {
     To.LOBBY: Lobby,

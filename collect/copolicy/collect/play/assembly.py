@@ -8,6 +8,7 @@ from copolicy.dataset.task import get_task
 
 from ..inputs import HALVES, CalibrationStore, MappingStore, Pads, user_config_folder
 from ..recording.recover import recover
+from ..screen.window import Window
 from ..session import CollectionLock, SessionFolder
 from ..ticker import MonotonicClock
 from .application import Application
@@ -18,7 +19,6 @@ from .player import Player, default_pilots, make_players, say_other_physics
 from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
-from .window import Window
 
 
 def assemble(

@@ -128,7 +128,8 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
         if pilot.kind == "policy":
             conditions = training_conditions(checkpoint_folder(pilot.detail))
             if not isinstance(conditions.physics, task.settings_type):
-                raise InvalidValueError(f"--task {task.spec.name}", "the task of the policies", pilot.detail)
+                expected = f"a policy that has learned the task {task.spec.name!r}"
+                raise InvalidValueError(f"policy:{pilot.detail}", expected, "one of another task")
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
             rest = conditions.physics

@@ -9,8 +9,8 @@ from copolicy.dataset.exceptions import RunError
 
 from ..screen import SIZE, Canvas
 from ..screen.palette import MUTED, SKY, TEXT
+from ..screen.window import Window
 from ..sdl import pygame
-from .window import Window
 
 _PICTURE_S = 0.05
 _LINES = 5  # of what is done already

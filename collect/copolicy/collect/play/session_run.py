@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.dataset.task import get_task
 
+from ..screen.window import Window
 from ..sdl import init_events, pygame
 from .loading import Loading
 from .settings import PlaySettings
-from .window import Window
 
 if TYPE_CHECKING:
     from ..ticker import MonotonicClock
@@ -62,6 +62,7 @@ def prepared(
             init_events(window=True)
         else:
             window = Window(settings.window, settings.fullscreen, task.invitation or task.spec.title)
+            pygame.mouse.set_visible(False)
         stack.callback(_close_pygame)
         loading = Loading(window)
         # By name and not at the top: people look at the window while world, recorder and routes are imported.

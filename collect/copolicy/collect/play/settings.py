@@ -11,7 +11,7 @@ from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import TABLE, get_task
 
-from ..agents.scripted import pair_name
+from ..agents.simulated import pair_name
 from ..angular_limit import angular_limit_of, limited
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")

@@ -4,6 +4,7 @@ import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
 
 
+@dataclass(eq=False)
 class Trial:
     """One episode, from its first step to its verdict.
 
@@ -44,30 +46,22 @@ class Trial:
         paused: how often it was paused.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        task: PairTask,
-        map_config: Any,
-        seating: int,
-        agents: tuple[Agent, Agent],
-        meta: EpisodeMeta,
-        anchor: WallClockAnchor,
-        physics: Any,
-        practice: bool,
-        clock: Callable[[], int] = time.monotonic_ns,
-    ):
-        self.path = path
-        self.task = task
-        self.map_config = map_config
-        self.seating = seating
-        self.agents = agents
-        self.meta = meta
-        self.practice = practice
-        self._rollout = Rollout(task, [map_config], agents, seeds=[meta.seed], settings=physics)
+    path: Path
+    task: PairTask
+    map_config: Any
+    seating: int
+    agents: tuple[Agent, Agent]
+    meta: EpisodeMeta
+    anchor: WallClockAnchor
+    physics: Any
+    practice: bool
+    clock: Callable[[], int] = time.monotonic_ns
+
+    def __post_init__(self):
+        task, physics = self.task, self.physics
+        self._rollout = Rollout(task, [self.map_config], self.agents, seeds=[self.meta.seed], settings=physics)
         self.world: Any = self._rollout.worlds[0]
         self.step_limit = physics.step_limit
-        self._settings = physics
         self.outcome: Outcome = RUNNING
         self._outline = outline_of(task)
         self.pose: Pose = self._seen_pose()
@@ -79,10 +73,8 @@ class Trial:
         self.loop = LoopStatistics(task.spec.record_hz)
         self.notes: list[str] = []
         self.paused = 0
-        self.step_ns = clock()
+        self.step_ns = self.clock()
         self._off_centre: set[int] = set()
-        self._anchor = anchor
-        self._clock = clock
         self._stack = ExitStack()
         self._recorder: EpisodeRecorder | None = None
 
@@ -111,11 +103,11 @@ class Trial:
             self.path,
             self.map_config,
             self.meta,
-            self._anchor,
+            self.anchor,
             task=self.task.spec.name,
-            monotonic_ns=self._clock(),
+            monotonic_ns=self.clock(),
             devices=devices,
-            settings=self._settings,
+            settings=self.physics,
         )
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:
@@ -138,7 +130,7 @@ class Trial:
             scheduled_ns=tick.scheduled_ns,
             start_ns=tick.start_ns,
             late_ns=tick.late_ns,
-            work_ns=self._clock() - tick.start_ns,
+            work_ns=self.clock() - tick.start_ns,
             skipped_ticks=tick.skipped if self.loop.ticks > 1 else 0,
         )
         self._open.step(
@@ -176,7 +168,7 @@ class Trial:
     def event(self, kind: str, detail: str = "") -> None:
         """Records an event, if the recording has begun."""
         if self._recorder is not None:
-            self._recorder.event(kind, detail, self._clock())
+            self._recorder.event(kind, detail, self.clock())
 
     def pause(self, reason: str) -> None:
         """The steps stop."""

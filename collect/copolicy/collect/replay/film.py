@@ -46,10 +46,7 @@ def write_video(
         CopolicyError: neither PyAV nor ffmpeg is there.
         RunError: the encoder failed.
     """
-    width, fps = width or VIDEO_WIDTH, fps or VIDEO_FPS
-    _check(path, tuple(_CONTAINERS), speed, fps)
-    size = picture_size(width)
-    frames = _shown_progress(track, size, fps, speed)
+    size, fps, frames = _film(track, path, tuple(_CONTAINERS), speed, width or VIDEO_WIDTH, fps or VIDEO_FPS)
     encode = video_encoder()
     with new_file(path) as unfinished:
         try:
@@ -68,10 +65,8 @@ def write_gif(
     Raises:
         MissingExtraError: Pillow is not there.
     """
-    width, fps = width or GIF_WIDTH, fps or GIF_FPS
-    _check(path, (".gif",), speed, fps)
-    size = picture_size(width)
-    save_gif(_shown_progress(track, size, fps, speed), path, size, fps)
+    size, fps, frames = _film(track, path, (".gif",), speed, width or GIF_WIDTH, fps or GIF_FPS)
+    save_gif(frames, path, size, fps)
     return _summary(path, track, size, fps, speed)
 
 
@@ -107,7 +102,10 @@ def save_gif(frames: Iterable[pygame.Surface], path: Path, size: tuple[int, int]
         )
 
 
-def _check(path: Path, endings: tuple[str, ...], speed: float, fps: int) -> None:
+def _film(
+    track: Track, path: Path, endings: tuple[str, ...], speed: float, width: int, fps: int
+) -> tuple[tuple[int, int], int, Iterable[pygame.Surface]]:
+    """Size, rate and pictures of a film that can be written to a path."""
     if path.suffix.lower() not in endings:
         raise InvalidValueError(str(path), f"a name that ends with {' or '.join(endings)}", path.suffix)
     if path.exists():
@@ -116,10 +114,8 @@ def _check(path: Path, endings: tuple[str, ...], speed: float, fps: int) -> None
         raise InvalidValueError("speed", "0.05 to 100", speed)
     if not 1 <= fps <= 120:
         raise InvalidValueError("fps", "1 to 120", fps)
-
-
-def _shown_progress(track: Track, size: tuple[int, int], fps: int, speed: float) -> Iterable[pygame.Surface]:
-    return progress(pictures(track, size, fps, speed), picture_count(track, fps, speed), "pictures")
+    size = picture_size(width)
+    return size, fps, progress(pictures(track, size, fps, speed), picture_count(track, fps, speed), "pictures")
 
 
 def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: float) -> dict[str, Any]:

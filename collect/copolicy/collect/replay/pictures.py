@@ -7,6 +7,7 @@ from pathlib import Path
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import new_file
 
+from ..screen.canvas import new_surface
 from ..sdl import pygame
 from .playback import Playback
 from .track import Track, sampled
@@ -34,8 +35,7 @@ def picture_count(track: Track, frames_per_second: float, speed: float) -> int:
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: float, speed: float) -> Iterator[pygame.Surface]:
     """The pictures in order; the same surface each time, drawn anew."""
-    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
-    surface = pygame.Surface(size, depth=32)
+    surface = new_surface(size)
     view = ReplayView(track)
     shown = Shown(hint=False)
     playback = Playback(track.steps, speed=speed, hz=track.hz)

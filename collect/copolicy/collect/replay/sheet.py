@@ -7,7 +7,7 @@ from typing import Any
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.task_spec import PLAYERS
 
-from ..screen.canvas import Canvas
+from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
 from ..screen.outline_view import outline_of
 from ..screen.palette import INK, MUTED, TEXT
@@ -62,8 +62,7 @@ def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, l
     cell_height = cell * scene_height / scene_width
     graph_height = _LINE if track.interaction is None else _GRAPH
     size = (1200, math.ceil(_HEAD + rows * (cell_height + _GAP) + graph_height + _GAP))
-    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
-    surface = pygame.Surface((width, math.ceil(width * size[1] / size[0])), depth=32)
+    surface = new_surface((width, math.ceil(width * size[1] / size[0])))
     canvas = Canvas(surface, size)
     canvas.clear()
     view = ReplayView(track)

@@ -4,16 +4,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from copolicy.dataset.exceptions import RunError
-
-from ..sdl import NoDisplayError, open_display, pygame
+from ..screen.window import Window
+from ..sdl import pygame
 from .pictures import write_png
 from .playback import Playback
 from .track import Track
 from .view import SIZE, ReplayView, Shown
 
 _PICTURES_HZ = 60
-_OF_DESKTOP = 0.86  # of the desktop's smaller side that the window takes
 _MESSAGE_S = 2.5
 
 
@@ -41,16 +39,8 @@ class Viewer:
         self._dragging = False
         self._was_playing = False
         self._message_until = 0.0
-        self._full_screen = False
-        try:
-            open_display()
-            desktop = pygame.display.get_desktop_sizes()[0]
-            scale = max(0.4, _OF_DESKTOP * min(desktop[0] / SIZE[0], desktop[1] / SIZE[1]))
-            self._size = (round(SIZE[0] * scale), round(SIZE[1] * scale))
-            pygame.display.set_caption(f"copolicy: {track.path.name}")
-            pygame.display.set_mode(self._size, pygame.RESIZABLE)
-        except (pygame.error, NoDisplayError) as error:
-            raise RunError(f"expected a display (or --video, --gif, --png), found none: {error}") from None
+        self._window = Window(None, False, track.path.name, SIZE, "--video, --gif, --png")
+        self._window.loaded()
         pygame.key.set_repeat(350, 40)
 
     def run(self) -> None:
@@ -76,8 +66,8 @@ class Viewer:
 
     def draw(self) -> None:
         """Draws and shows the picture."""
-        self._view.draw(pygame.display.get_surface(), self.playback, self.shown)
-        pygame.display.flip()
+        self._view.draw(self._window.surface, self.playback, self.shown)
+        self._window.show()
 
     def handle(self, event: pygame.event.Event) -> None:
         """Does what a key, the mouse or the window's frame asks for."""
@@ -120,10 +110,10 @@ class Viewer:
         elif key == pygame.K_s:
             self._save()
         elif key == pygame.K_F11:
-            self._toggle_full_screen()
+            self._window.toggle_fullscreen()
 
     def _press(self, point: tuple[int, int]) -> None:
-        position = self._view.position_at(pygame.display.get_surface(), point)
+        position = self._view.position_at(self._window.surface, point)
         if position is None:
             self.playback.toggle()
             return
@@ -131,12 +121,12 @@ class Viewer:
         self.playback.seek(position)
 
     def _drag(self, point: tuple[int, int]) -> None:
-        position = self._view.position_at(pygame.display.get_surface(), point, held=True)
+        position = self._view.position_at(self._window.surface, point, held=True)
         if position is not None:
             self.playback.seek(position)
 
     def _save(self) -> None:
-        surface = pygame.display.get_surface().copy()
+        surface = self._window.surface.copy()
         self._view.draw(surface, self.playback, Shown(self.shown.trails, self.shown.forces, hint=False))
         path = _free(self._track.path.with_name(f"{self._track.path.stem}_step_{int(self.playback.position):04d}.png"))
         try:
@@ -148,15 +138,6 @@ class Viewer:
     def _say(self, message: str) -> None:
         self.shown.message = message
         self._message_until = self._clock() + _MESSAGE_S
-
-    def _toggle_full_screen(self) -> None:
-        if not self._full_screen:
-            self._size = pygame.display.get_surface().get_size()
-        self._full_screen = not self._full_screen
-        if self._full_screen:
-            pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
-        else:
-            pygame.display.set_mode(self._size, pygame.RESIZABLE)
 
 
 def _free(path: Path) -> Path:

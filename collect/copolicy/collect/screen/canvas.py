@@ -10,6 +10,11 @@ WORLD = (0, 60, 1200, 600)
 """Left, top, width, height of the world."""
 
 
+def new_surface(size: tuple[int, int]) -> pygame.Surface:
+    """What to draw a picture on: pygame 2.6 crashes where it draws smooth lines near the edge of 24 bits."""
+    return pygame.Surface(size, depth=32)
+
+
 class Canvas:
     """Draws in units that fill the middle of a surface, whatever its size."""
 

@@ -45,6 +45,7 @@ def recordings(folder: Path) -> Iterator[Recorded]:
         if not link.match("*.mcap"):
             logging.warning("not counted: %s: a link that leads nowhere", link)
     for path in distinct_files(folder, "*.mcap"):
+        task = TABLE
         try:
             records = read_metadata(path)
             info = records.get("dataset_info", {})

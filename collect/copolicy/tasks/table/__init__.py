@@ -28,7 +28,7 @@ __all__ = [
     "map_set",
 ]
 
-__getattr__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         **dict.fromkeys(("MAX_OBSTACLES", "WINDOW", "MapConfig"), "map_config"),

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
-from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules
+from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
 
 from .dynamics import integrate
 from .features import environment_state, map_of, sizes_text, states_7, theta_of
@@ -47,8 +46,6 @@ class TableTask(PairTask):
     orientations = 4
     invitation = "carry the table together"
     instruction = "Carry the table to the green goal together. Nobody knows which way the other will go."
-    drift_limits: Mapping[str, float] = MappingProxyType({"px": 0.01, "rad": 1e-4})
-    """Sums of a double stay below 1e-9."""
 
     @property
     def agents(self) -> SimulatedPlayers:
@@ -170,6 +167,11 @@ class TableTask(PairTask):
 
         return TableView(scenario)
 
+    @property
+    def drift_limits(self) -> Mapping[str, float]:
+        """Of position and orientation; sums of a double stay below 1e-9."""
+        return {"px": 0.01, "rad": 1e-4}
+
     def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Of the position and of the orientation, the shorter way round."""
         turn = recorded[:, 2] - other[:, 2]
@@ -199,6 +201,13 @@ class TableTask(PairTask):
         from .rules import RULES
 
         return RULES
+
+    @property
+    def statistics(self) -> TaskStatistics:
+        """Sides of obstacles, people's routes, the dip of the steering."""
+        from .statistics import STATISTICS  # scipy, diptest
+
+        return STATISTICS
 
     @property
     def features(self) -> PolicyFeatures:

@@ -13,13 +13,12 @@ from pathlib import Path
 import h5py
 
 
-class NotedRefusals(io.RawIOBase):
+class NotedRefusals(io.FileIO):
     """The file below an HDF5 file; what the disk refuses is kept in `refusal` and not raised."""
 
     def __init__(self, path: Path):
-        super().__init__()
         self.refusal: OSError | None = None
-        self._file = path.open("w+b", buffering=0)
+        super().__init__(path, "w+b")
 
     def check(self) -> None:
         """
@@ -35,45 +34,25 @@ class NotedRefusals(io.RawIOBase):
             try:
                 written = 0
                 while written < len(view):
-                    written += self._file.write(view[written:]) or 0
+                    written += super().write(view[written:]) or 0
             except OSError as error:
                 self.refusal = error
         return len(view)
 
     def readinto(self, buffer) -> int:
         view = memoryview(buffer).cast("B")
-        read = self._file.readinto(view) or 0
+        read = super().readinto(view) or 0
         view[read:] = bytes(len(view) - read)  # what was refused
         return len(view)
 
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
     def truncate(self, size: int | None = None) -> int:
-        size = self._file.tell() if size is None else size
+        size = self.tell() if size is None else size
         if self.refusal is None:
             try:
-                self._file.truncate(size)
+                super().truncate(size)
             except OSError as error:
                 self.refusal = error
         return size
-
-    def readable(self) -> bool:
-        return True
-
-    def writable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def close(self) -> None:
-        if not self.closed:
-            self._file.close()
-        super().close()
 
 
 @contextmanager

@@ -166,17 +166,14 @@ class ExportSource:
         features = features_of(self.task.spec)
         for index, part in self._folder.frames({name: features[name]["shape"] for name in names}):
             if index in wanted:
-                yield _episode(index, part, wanted[index], self.fps, self.task)
+                row = wanted[index]
+                physics = physics_of(row["physics"], self.task) or self.task.settings_type()
+                yield ExportEpisode(
+                    index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION],
+                    part["next.reward"], {name: row[name] for name in EPISODE_COLUMNS}, self.fps, physics, self.task,
+                )  # fmt: skip
 
     @property
     def task(self) -> PairTask:
         """The task of the data set."""
         return self._folder.task
-
-
-def _episode(index: int, part: dict[str, np.ndarray], row: dict[str, Any], fps: int, task: PairTask) -> ExportEpisode:
-    meta = {name: row[name] for name in EPISODE_COLUMNS}
-    return ExportEpisode(
-        index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION], part["next.reward"], meta,
-        fps, physics_of(row["physics"], task) or task.settings_type(), task,
-    )  # fmt: skip

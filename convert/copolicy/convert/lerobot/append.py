@@ -3,14 +3,12 @@
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.clock import Hold
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
-from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
@@ -25,9 +23,9 @@ from copolicy.dataset.recording.log import read_metadata
 from ..recordings import convert_recordings, find_recordings
 from ..video.scene_video import SCENE
 from .linked_copy import add_later_columns, copy_as_links
-from .mixtures import Mixtures, converter_versions
+from .mixtures import Mixtures
 from .prepare import Conversion
-from .shifted_tables import Shift, write_like
+from .shifted_tables import Shift, episode_rows, write_like
 from .stored_rewards import foreign_rewards
 
 try:
@@ -141,16 +139,10 @@ def append_recordings(
 
 
 def _mixtures(whole: Path, rewards: list[str]) -> Mixtures:
-    tables = [read_parquet(path) for path in numbered_files(whole / EPISODES_FOLDER).values()]
-    named = [[name for name in EPISODE_COLUMNS if name in table.column_names] for table in tables]
-    rows = [row for table, names in zip(tables, named, strict=True) for row in table.select(names).to_pylist()]
     record = stored_record(whole)
-    versions = converter_versions([record, *record.get("appended", [])])
-    try:
-        mixtures = Mixtures.of(rows, task_of(read_info(whole)))
-    except InvalidValueError as error:
-        raise FileFormatError(whole, "episodes that say their physics", str(error)) from None
-    return replace(mixtures, mixed=[*mixtures.mixed, *versions, *rewards])
+    return Mixtures.of(
+        episode_rows(whole), task_of(read_info(whole)), whole, [record, *record.get("appended", [])], rewards
+    )
 
 
 def _join(whole: Path, added: Path) -> dict[str, Any]:
@@ -198,10 +190,8 @@ def _renew_minimal_card(root: Path) -> None:
     path = root / CARD_FILE
     if path.exists() and not is_minimal_card(path):
         return
-    tables = [read_parquet(file) for file in numbered_files(root / EPISODES_FOLDER).values()]
     path.unlink(missing_ok=True)  # a link
-    licences = {text or "" for table in tables for text in table.column("license").to_pylist()}
-    path.write_text(minimal_card(licences), encoding="utf-8")
+    path.write_text(minimal_card({row["license"] or "" for row in episode_rows(root)}), encoding="utf-8")
 
 
 def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:

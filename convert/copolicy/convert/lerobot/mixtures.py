@@ -4,8 +4,10 @@ import logging
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.task import PairTask
 
@@ -25,14 +27,30 @@ class Mixtures:
     mixed: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, rows: Iterable[Mapping[str, Any]], task: PairTask | None = None) -> "Mixtures":
+    def of(
+        cls,
+        rows: Iterable[Mapping[str, Any]],
+        task: PairTask | None = None,
+        where: Path | str = "",
+        records: Iterable[Mapping[str, Any]] = (),
+        rewards: Iterable[str] = (),
+    ) -> "Mixtures":
         """From the episode columns of each episode of a task, the table by default.
 
+        Args:
+            where: the data set, for the message.
+            records: of its conversions, `meta/copolicy.json`; several versions of the converter are a mixture.
+            rewards: lines about rewards of another definition.
+
         Raises:
-            InvalidValueError: the column `physics` of an episode cannot be read.
+            FileFormatError: the column `physics` of an episode cannot be read.
         """
         rows = list(rows)
-        counts: dict[str, Mapping[str, int]] = {"physics": physics_counts((row.get("physics") for row in rows), task)}
+        try:
+            physics = physics_counts((row.get("physics") for row in rows), task)
+        except InvalidValueError as error:
+            raise FileFormatError(where, "episodes that say their physics", str(error)) from None
+        counts: dict[str, Mapping[str, int]] = {"physics": physics}
         for name in _COLUMNS:
             counts[name] = Counter(str(row.get(name) or "none") for row in rows)
         sizes: dict[str, Counter[str]] = {}
@@ -42,7 +60,9 @@ class Mixtures:
                 sizes.setdefault(str(row.get("map_set") or "none"), Counter())[f"{size} px"] += 1
         counts |= {f"obstacles of map set {name}": found for name, found in sizes.items()}
         lines = [f"{name}: {_listed(found)}" for name, found in counts.items() if len(found) > 1]
-        return cls(dict(counts["physics"]), lines)
+        versions = {str(record["version"]) for record in records if "version" in record}
+        lines += [f"converted by versions {', '.join(sorted(versions))}"] if len(versions) > 1 else []
+        return cls(dict(physics), [*lines, *rewards])
 
     def summary(self) -> dict[str, Any]:
         """For the end of a command, which says on stderr, too, what changes the motion itself."""
@@ -50,12 +70,6 @@ class Mixtures:
             if line.startswith(("physics", "obstacles", "rewards")):
                 logging.warning("warning: this data set mixes %s", line)
         return {"physics": self.physics, **({"mixed": self.mixed} if self.mixed else {})}
-
-
-def converter_versions(records: Iterable[Mapping[str, Any]]) -> list[str]:
-    """A line where several versions of the converter made a data set, from its records `meta/copolicy.json`."""
-    counts = Counter(str(record["version"]) for record in records if "version" in record)
-    return [f"converted by versions {', '.join(sorted(counts))}"] if len(counts) > 1 else []
 
 
 def _listed(counts: Mapping[str, int]) -> str:

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.lerobot_folder.references import Place
+from copolicy.dataset.files.meta_files import EPISODES_FOLDER
+from copolicy.dataset.lerobot_folder.references import Place, numbered_files
+from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 try:
     import pyarrow as pa
@@ -70,7 +73,7 @@ class Shift:
             if name.startswith("stats/") and feature in self.columns and kind not in _COUNTED:
                 by = self.columns[feature]
                 rows = [[value + by for value in row] for row in table.column(name).to_pylist()]
-                table = _replaced(table, name, rows)
+                table = replaced(table, name, rows)
         return table
 
 
@@ -90,17 +93,30 @@ def write_like(table: "pa.Table", example: "Path | pa.Schema", path: Path) -> No
     pq.write_table(table.select(schema.names).cast(schema), path, compression="snappy", use_dictionary=True)
 
 
+def episode_rows(root: Path) -> list[dict[str, Any]]:
+    """The episode columns of each episode of a data set, as far as it has them."""
+    tables = [read_parquet(path) for path in numbered_files(root / EPISODES_FOLDER).values()]
+    return [
+        row
+        for table in tables
+        for row in table.select([name for name in EPISODE_COLUMNS if name in table.column_names]).to_pylist()
+    ]
+
+
 def _placed(table: "pa.Table", folder: str, places: list[Place]) -> "pa.Table":
     for part, name in enumerate(_PLACE):
-        table = _replaced(table, f"{folder}/{name}", [place[part] for place in places])
+        table = replaced(table, f"{folder}/{name}", [place[part] for place in places])
     return table
 
 
 def _added(table: "pa.Table", name: str, by: int) -> "pa.Table":
-    return _replaced(table, name, [value + by for value in table.column(name).to_pylist()])
+    return replaced(table, name, [value + by for value in table.column(name).to_pylist()])
 
 
-def _replaced(table: "pa.Table", name: str, values: list) -> "pa.Table":
+def replaced(table: "pa.Table", name: str, values: Any) -> "pa.Table":
+    """A table with other values in a column, of its type."""
     place = table.column_names.index(name)
     field = table.schema.field(place)
-    return table.set_column(place, field, pa.array(values, field.type))
+    return table.set_column(
+        place, field, values if isinstance(values, pa.ChunkedArray) else pa.array(values, field.type)
+    )

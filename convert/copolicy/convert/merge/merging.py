@@ -6,7 +6,6 @@ its type. The content of every episode is then compared with what it was.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from lerobot.datasets.feature_utils import get_hf_features_from_features
 
 from copolicy.dataset.edit.subset.stored_set import StoredSet, write_record
 from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
+from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info, task_of
@@ -28,7 +27,8 @@ from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.digests import Content
 
 from ..lerobot.joined_sets import join_data_sets
-from ..lerobot.mixtures import Mixtures, converter_versions
+from ..lerobot.mixtures import Mixtures
+from ..lerobot.shifted_tables import replaced
 from ..lerobot.stored_rewards import foreign_rewards
 from .source import LOCAL_NAMES, read_source, renamed, require_alike, require_prefixes, require_strangers
 
@@ -94,13 +94,9 @@ def merge_datasets(
 
 def _mixtures(episodes: pa.Table, sources: Sequence[StoredSet]) -> Mixtures:
     named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
-    try:
-        mixtures = Mixtures.of(episodes.select(named).to_pylist(), task_of(sources[0].info))
-    except InvalidValueError as error:
-        roots = ", ".join(str(source.root) for source in sources)
-        raise FileFormatError(roots, "episodes that say their physics", str(error)) from None
-    versions = converter_versions([source.record for source in sources])
-    return replace(mixtures, mixed=[*mixtures.mixed, *versions, *foreign_rewards([source.root for source in sources])])
+    roots, records = [source.root for source in sources], [source.record for source in sources]
+    where, rewards = ", ".join(map(str, roots)), foreign_rewards(roots)
+    return Mixtures.of(episodes.select(named).to_pylist(), task_of(sources[0].info), where, records, rewards)
 
 
 def _joined(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Table:
@@ -143,9 +139,7 @@ def _restore_episodes(root: Path, expected: pa.Table) -> None:
         rows = expected.slice(start, merged.num_rows)
         for name in rows.column_names:
             if name in _NUMBERS or name.startswith(_MOVED):
-                place = rows.column_names.index(name)
-                field = rows.schema.field(place)
-                rows = rows.set_column(place, field, merged.column(name).cast(field.type))
+                rows = replaced(rows, name, merged.column(name).cast(rows.schema.field(name).type))
         pq.write_table(rows, path, compression="snappy", use_dictionary=True)
         start += merged.num_rows
 

@@ -18,6 +18,8 @@ from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER, INFO_FILE
 
+from ..lerobot.shifted_tables import replaced
+
 LOCAL_NAMES = ("session_id", "pair_id", "player_0_id", "player_1_id", "consent_id")
 """The episode columns whose names a lab gives for itself."""
 _KINDS = {"pair_id": "pair", "player_0_id": "player", "player_1_id": "player", "consent_id": "consent"}
@@ -110,13 +112,11 @@ def renamed(episodes: pa.Table, prefix: str) -> pa.Table:
     """Rows of meta/episodes with `prefix-` before every name that the lab gave for itself."""
     simulated = episodes.column("source").to_pylist()
     for column in LOCAL_NAMES:
-        place = episodes.column_names.index(column)
         names = [
             f"{prefix}-{name}" if name and source != "simulated" else name
             for name, source in zip(episodes.column(column).to_pylist(), simulated, strict=True)
         ]
-        field = episodes.schema.field(place)
-        episodes = episodes.set_column(place, field, pa.array(names, field.type))
+        episodes = replaced(episodes, column, names)
     return episodes
 
 

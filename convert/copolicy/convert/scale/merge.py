@@ -10,7 +10,6 @@ from copolicy.dataset.checks.checking import check_table, of_data_sets
 from copolicy.dataset.checks.finding import SEVERITIES, Finding
 from copolicy.dataset.checks.read_lerobot import read_lerobot
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
-from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import (
     CARD_FILE,
@@ -29,7 +28,7 @@ from copolicy.dataset.publication.minimal_card import minimal_card
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
 from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
-from ..lerobot.shifted_tables import write_like
+from ..lerobot.shifted_tables import episode_rows, write_like
 from ..lerobot.writer import WrittenDataset
 from .plan import DATA_SET, ShardPlan, ShardRecord
 
@@ -65,8 +64,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
-        tables = [read_parquet(path) for path in numbered_files(partial / EPISODES_FOLDER).values()]
-        rows = [row for table in tables for row in table.select(list(EPISODE_COLUMNS)).to_pylist()]
+        rows = episode_rows(partial)
         card = minimal_card({row["license"] or "" for row in rows})
         (partial / CARD_FILE).write_text(card, encoding="utf-8")
     replace_json(plan.folder / FINDINGS_FILE, [finding.to_dict() for finding in findings], indent=1)

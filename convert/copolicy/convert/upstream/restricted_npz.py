@@ -10,13 +10,10 @@ import numpy as np
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.file_kinds import kind_of
 
-from .restricted_pickle import load_pickle
+from .restricted_pickle import first_line, load_pickle
 
 _LARGEST = 256 << 20  # bytes of all arrays of a file; an episode takes less than one hundredth of it
-_HEADERS = {
-    (1, 0): np.lib.format.read_array_header_1_0,
-    (2, 0): np.lib.format.read_array_header_2_0,
-}
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
 def load_npz(path: Path) -> dict[str, np.ndarray]:
@@ -40,7 +37,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
         raise FileFormatError(path, "a readable .npz file", error.strerror or str(error)) from None
     except (Exception, MemoryError) as error:  # zipfile, zlib, the header's parser: each has its own
         kind = kind_of(path)
-        found = f"a damaged one ({_line(error)})" if "NumPy" in kind or "zip" in kind else kind
+        found = f"a damaged one ({first_line(error)})" if "NumPy" in kind or "zip" in kind else kind
         raise FileFormatError(path, "an .npz file", found) from None
 
 
@@ -59,7 +56,3 @@ def _load_npy(data: bytes, path: Path) -> np.ndarray:
     if not isinstance(array, np.ndarray):
         raise ValueError(f"{type(array).__name__} where an object array should be")
     return array
-
-
-def _line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -28,8 +28,12 @@ def load_pickle(data: bytes, path: Path | str) -> object:
     try:
         return _settle(_Unpickler(io.BytesIO(data)).load())
     except (Exception, MemoryError) as error:  # damaged opcodes fail in as many ways as there are opcodes
-        found = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", found) from None
+        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", first_line(error)) from None
+
+
+def first_line(error: BaseException) -> str:
+    """What an error of any kind says, in one line."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]
 
 
 class _Dtype:
@@ -57,7 +61,7 @@ class _Dtype:
 class _Array:
     """Stands in for numpy.ndarray: keeps its state until the whole pickle is read."""
 
-    def __init__(self):
+    def __init__(self, *_):
         self.state: tuple | None = None
 
     def __setstate__(self, state):
@@ -75,10 +79,6 @@ class _Array:
         else:
             values = np.frombuffer(content, dtype.real())
         return values.reshape(shape, order=order).copy()
-
-
-def _reconstruct(*_) -> _Array:
-    return _Array()
 
 
 def _scalar(dtype: _Dtype, content: bytes = b""):
@@ -99,16 +99,12 @@ def _latin1(text: str, encoding: str) -> bytes:
     return text.encode("latin1")
 
 
-def _no_bytes() -> bytes:
-    return b""
-
-
 _NAMES = {
     "_codecs.encode": _latin1,  # how protocol 2 writes the bytes of an array
-    "builtins.bytes": _no_bytes,
+    "builtins.bytes": lambda: b"",
     "numpy.dtype": _Dtype,
     "numpy.ndarray": _Array,
-    "numpy.core.multiarray._reconstruct": _reconstruct,
+    "numpy.core.multiarray._reconstruct": _Array,
     "numpy.core.multiarray.scalar": _scalar,
     "numpy.core.numeric._frombuffer": _from_buffer,
 }

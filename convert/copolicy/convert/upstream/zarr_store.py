@@ -15,6 +15,8 @@ import numpy as np
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.file_kinds import kind_of
 
+from .restricted_pickle import first_line
+
 _LARGEST = 1 << 30  # of an array, of a chunk of it and of an unpacked archive, bytes
 _LARGEST_METADATA = 1 << 20
 _MOST_CHUNKS = 1 << 20
@@ -84,7 +86,7 @@ class ZarrArrays:
             finally:
                 store.close()
         except (Exception, MemoryError) as error:  # as many kinds as there are codecs
-            raise FileFormatError(place, "an array with intact chunks", _line(error)) from None
+            raise FileFormatError(place, "an array with intact chunks", first_line(error)) from None
 
     def _screened(self, array: str) -> int:
         """The version of an array whose metadata ask for nothing but numbers of a reasonable amount."""
@@ -95,7 +97,9 @@ class ZarrArrays:
             try:
                 require(json.loads(text))
             except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
-                raise FileFormatError(self.path / name, "the metadata of an array of numbers", _line(error)) from None
+                raise FileFormatError(
+                    self.path / name, "the metadata of an array of numbers", first_line(error)
+                ) from None
             return version
         raise FileFormatError(self.path / array, "a Zarr array (.zarray or zarr.json)", "none")
 
@@ -113,7 +117,7 @@ class ZarrArrays:
             with path.open("rb") as file:
                 return file.read(_LARGEST_METADATA)
         except Exception as error:  # zlib, CRC, encryption, permissions
-            raise FileFormatError(self.path / name, "readable metadata of an array", _line(error)) from None
+            raise FileFormatError(self.path / name, "readable metadata of an array", first_line(error)) from None
 
 
 def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
@@ -124,7 +128,7 @@ def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
         raise FileFormatError(path, "a readable zip file", error.strerror or str(error)) from None
     except Exception as error:
         found = kind_of(path)
-        found = f"a damaged one ({_line(error)})" if "zip" in found else found
+        found = f"a damaged one ({first_line(error)})" if "zip" in found else found
         raise FileFormatError(path, "a zipped Zarr store", found) from None
     for member in members:
         name = PurePosixPath(member.filename.replace("\\", "/"))
@@ -184,7 +188,3 @@ def _require_size(shape: list[int], chunks: list[int], itemsize: int) -> None:
     number = math.prod(-(-size // chunk) for size, chunk in zip(shape, chunks, strict=True))
     if max(math.prod(shape), math.prod(chunks)) * itemsize > _LARGEST or number > _MOST_CHUNKS:
         raise ValueError(f"shape {shape} in chunks {chunks}, more than {_LARGEST >> 20} MiB or {_MOST_CHUNKS} chunks")
-
-
-def _line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -1,7 +1,9 @@
 """The feature `observation.images.scene`: the table on its map as a film, one picture a frame of the data set.
 
 Each episode is encoded by itself, by one thread and without pictures that refer to later ones: its packets are the
-same whatever stands before or after it in a file, so that the content hash does not depend on the layout.
+same whatever stands before or after it in a file, so that the content hash does not depend on the layout. Nor does it
+depend on the processor: x264 and FFmpeg's conversion of colours choose their arithmetic by the instructions that the
+processor has, and round differently; x264 is told not to, and colours are converted here.
 """
 
 import io
@@ -33,6 +35,8 @@ VideoSize = tuple[int, int]
 
 _SAMPLED = 4  # every so many pixels of a row and of a column go into the statistics
 _LEVELS = 256
+# Parts of red, green and blue in Y, Cb and Cr, of 65,536, for values from 16 to 235 and to 240.
+_LUMA, _BLUE, _RED = (16829, 33039, 6416), (-9714, -19070, 28784), (28784, -24103, -4681)
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,8 @@ def scene_encoder(fps: int) -> RGBEncoderConfig:
     # LeRobot tells of the codec each time, which would be a line an episode.
     logging.getLogger(RGBEncoderConfig.__module__).setLevel(logging.WARNING)
     # What stands still costs next to nothing between key pictures; LeRobot's every second one triples the size.
-    return RGBEncoderConfig(vcodec="h264", g=fps, crf=23, preset="veryfast", extra_options={"bf": 0})
+    options = {"bf": 0, "x264-params": "cpu-independent=1"}
+    return RGBEncoderConfig(vcodec="h264", g=fps, crf=23, preset="veryfast", extra_options=options)
 
 
 def scene_feature(size: VideoSize) -> dict:
@@ -100,12 +105,28 @@ def scene_clip(pictures: Iterable[np.ndarray], fps: int, size: VideoSize) -> Sce
                 for channel, counts in enumerate(levels):
                     sampled = picture[::_SAMPLED, ::_SAMPLED, channel]
                     counts += np.bincount(sampled.reshape(-1), minlength=_LEVELS)
-                frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+                frame = av.VideoFrame.from_ndarray(_yuv420(picture), format=encoder.pix_fmt)
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
     except FFmpegError as error:
         raise RunError(f"--video: expected PyAV to encode the scene, found {error}") from None
     return SceneClip(film.getvalue(), size, _statistics(levels, count))
+
+
+def _yuv420(picture: np.ndarray) -> np.ndarray:
+    """`(height * 3 / 2, width)` the planes of a picture by BT.601, as players take it: chroma of 2 x 2 pixels each."""
+    height, width, _ = picture.shape
+    colours = np.ascontiguousarray(picture.transpose(2, 0, 1)).astype(np.int32)
+    rows = colours[:, ::2] + colours[:, 1::2]
+    blocks = rows[..., ::2] + rows[..., 1::2]
+    planes = [_mixed(colours, _LUMA, 16) + 16, _mixed(blocks, _BLUE, 18) + 128, _mixed(blocks, _RED, 18) + 128]
+    return np.concatenate([plane.ravel() for plane in planes]).astype(np.uint8).reshape(height * 3 // 2, width)
+
+
+def _mixed(colours: np.ndarray, parts: tuple[int, int, int], bits: int) -> np.ndarray:
+    """`(h, w)` the weighted sum of red, green and blue `(3, h, w)`, rounded after a division by `2 ** bits`."""
+    red, green, blue = (part * colour for part, colour in zip(parts, colours, strict=True))
+    return (red + green + blue + (1 << bits - 1)) >> bits
 
 
 def _statistics(levels: np.ndarray, frames: int) -> dict[str, np.ndarray]:

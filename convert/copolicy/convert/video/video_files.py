@@ -2,39 +2,31 @@
 
 import io
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 
+from ..numbered_files import NumberedFiles
+
 try:
     import av
-    from lerobot.datasets.utils import DEFAULT_VIDEO_PATH, update_chunk_file_indices
+    from lerobot.datasets.utils import DEFAULT_VIDEO_PATH
 except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
 
-class VideoFiles:
-    """The video files of one feature, written one after the other: `videos/KEY/chunk-000/file-000.mp4`, ...
+class VideoFiles(NumberedFiles):
+    """The video files of one feature: `videos/KEY/chunk-000/file-000.mp4`, ...
 
     LeRobot joins by writing the whole file anew at every episode. Here packets go to the end of the open file, with
     their times moved on; memory holds one episode and the index of the file.
     """
 
     def __init__(self, root: Path, key: str, fps: int, file_mb: float, chunks_size: int):
-        self._root, self._key, self._fps = root, key, fps
-        self._limit, self._chunks_size = file_mb * 2**20, chunks_size
-        self._chunk = self._file = self._frames = self._bytes = 0
-        self._container: Any = None
+        super().__init__(root, DEFAULT_VIDEO_PATH.replace("{video_key}", key), file_mb, chunks_size)
+        self._key, self._fps = key, fps
+        self._frames = self._bytes = 0
         self._stream: Any = None
-
-    def __enter__(self) -> "VideoFiles":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._close()
 
     def append(self, mp4: bytes, frames: int) -> dict[str, int | float]:
         """Adds an episode's film.
@@ -54,12 +46,11 @@ class VideoFiles:
             packets = [packet for packet in source.demux(stream) if packet.size]
             if len(packets) != frames:
                 raise RunError(f"{self._key}: expected {frames} pictures of an episode, found {len(packets)}")
-            if self._container is not None and self._bytes + len(mp4) >= self._limit:
-                self._close()
-                self._chunk, self._file = update_chunk_file_indices(self._chunk, self._file, self._chunks_size)
-            if self._container is None:
+            if self._writer is not None and self._bytes + len(mp4) >= self._limit:
+                self._next()
+            if self._writer is None:
                 self._open(stream)
-            container: Any = self._container
+            container: Any = self._writer
             assert stream.time_base is not None
             moved = round(self._frames / self._fps / stream.time_base)
             for packet in packets:
@@ -77,16 +68,7 @@ class VideoFiles:
         }
 
     def _open(self, example: Any) -> None:
-        path = self._root / DEFAULT_VIDEO_PATH.format(
-            video_key=self._key, chunk_index=self._chunk, file_index=self._file
-        )
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._container = av.open(str(path), "w", format="mp4")
-        self._stream = self._container.add_stream_from_template(example, opaque=True)
+        self._writer = av.open(str(self._new_path()), "w", format="mp4")
+        self._stream = self._writer.add_stream_from_template(example, opaque=True)
         self._stream.time_base = example.time_base
         self._frames = self._bytes = 0
-
-    def _close(self) -> None:
-        if self._container is not None:
-            self._container.close()
-            self._container = None

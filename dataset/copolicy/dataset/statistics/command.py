@@ -66,10 +66,10 @@ def summary(document: dict[str, Any]) -> dict[str, Any]:
             if name == "route_entropy_pooled" and "details" in entry:
                 lines[family].pop(name)
                 lines[family] |= {f"{name}_{size}": _entropy_line(part) for size, part in entry["details"].items()}
-    lines["people, for comparison"] = {
-        f"route_entropy_pooled_{size}": _entropy_line(part)
-        for size, part in document["human_reference"]["routes"].items()
-    }
+    if "human_reference" in document:
+        routes = document["human_reference"]["routes"]
+        pooled = {f"route_entropy_pooled_{size}": _entropy_line(part) for size, part in routes.items()}
+        lines["people, for comparison"] = pooled
     return lines
 
 

@@ -10,7 +10,6 @@ from ..command_line.commands import progress
 from .energy_distance import energy_statistics
 from .estimate import rounded
 from .forces import activity_statistics, force_statistics
-from .human_routes import human_distance, human_route_entropy
 from .leadership import leadership_statistics
 from .neighbours import neighbour_statistics
 from .pair_share import pair_share_statistics
@@ -18,7 +17,6 @@ from .path_modes import path_mode_statistics
 from .resampling import MIN_CLUSTERS, Bootstrap
 from .route_entropy import route_statistics
 from .smoothness import smoothness_statistics
-from .steering_dip import dip_statistics
 from .trajectories import Trajectories
 from .visitation import visitation_statistics
 
@@ -26,8 +24,7 @@ DEFINITION_VERSION = "2.0.0"
 """Of the statistics' definitions: major where a value is computed otherwise, minor where one is added."""
 
 REPLICATES = 1000
-_LABELS = {
-    "human": "people carried the table",
+_SOURCES = {
     "simulated": "scripted pairs, no person took part",
     "upstream": "files of the original program, which do not say who held the sticks",
 }
@@ -46,9 +43,9 @@ def compute_statistics(
     """
     bootstrap = Bootstrap(data.pairs, replicates, np.random.default_rng((seed, 0)))
     families = {
-        "routes": lambda rng: route_statistics(data, bootstrap, rng) | human_distance(data, rng),
+        "routes": lambda rng: route_statistics(data, bootstrap, rng),
         "paths": lambda rng: path_mode_statistics(data, seed),
-        "actions": lambda rng: neighbour_statistics(data, bootstrap, rng) | dip_statistics(data, bootstrap, rng),
+        "actions": lambda rng: neighbour_statistics(data, bootstrap, rng),
         "visitation": lambda rng: visitation_statistics(data, bootstrap, rng),
         "leadership": lambda rng: leadership_statistics(data, bootstrap, rng),
         "forces": lambda rng: force_statistics(data, bootstrap, rng),
@@ -57,10 +54,16 @@ def compute_statistics(
         "distances": lambda rng: energy_statistics(data, rng),
         "pairs": lambda rng: pair_share_statistics(data, bootstrap, rng),
     }
+    own = data.task.statistics
+    families |= {name: lambda rng: {} for name in own.families if name not in families}
     statistics = {}
     for number, (family, compute) in enumerate(progress(families.items(), len(families), "statistics"), start=1):
-        estimates = compute(np.random.default_rng((seed, number)))
+        rng = np.random.default_rng((seed, number))
+        estimates = compute(rng)
+        if family in own.families:
+            estimates |= own.families[family](data, bootstrap, rng)
         statistics[family] = {name: estimate.as_dict() for name, estimate in estimates.items()}
+    labels = {**_SOURCES, "human": own.people}
     sources = Counter(row.source for row in data.rows)
     document = {
         "definition_version": DEFINITION_VERSION,
@@ -80,13 +83,9 @@ def compute_statistics(
             "successes": sum(row.success for row in data.rows),
             "left_out": dict(left_out or {}),
             "sources": dict(sorted(sources.items())),
-            "source_labels": {name: _LABELS.get(name, "unknown") for name in sorted(sources)},
+            "source_labels": {name: labels.get(name, "unknown") for name in sorted(sources)},
         },
-        "human_reference": {
-            "source": "Yang and Mavrogiannis, HRI 2025: passing sides of 330 human-human demonstrations; "
-            "labels, not trajectories (BSD-3-Clause)",
-            "routes": human_route_entropy(np.random.default_rng((seed, len(families) + 1))),
-        },
+        **({"human_reference": own.reference(np.random.default_rng((seed, 11)))} if own.reference else {}),
         "statistics": statistics,
     }
     return rounded(document)

@@ -70,6 +70,15 @@ class Estimate:
         return rounded(entry)
 
 
+def left_out(reason: str, *names: str) -> dict[str, Estimate]:
+    """Statistics that a task lacks the part for.
+
+    Args:
+        reason: of `PairTask.missing`.
+    """
+    return {name: Estimate(None, "1", "Not defined for this task.", 0, note=reason) for name in names}
+
+
 def rounded(value: Any) -> Any:
     """The same with plain numbers of six digits, None for what is not finite, lists for tuples and arrays."""
     if isinstance(value, dict):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ..task_spec import PLAYERS
-from .estimate import Estimate, Null
+from .estimate import Estimate, Null, left_out
 from .resampling import Bootstrap, circular_shift, interval
 from .trajectories import Trajectories
 
@@ -11,48 +10,27 @@ PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
 MIN_EFFORT = 0.1
 """Force of a player below which it counts as none, in full forces."""
 
-MIN_SPEED = 5.0
-"""Speed of the table below which nobody is said to work with it or against it, px/s."""
+MIN_SPEED = 0.1
+"""Speed below which nobody is said to work with a motion or against it, share of the highest of an axis."""
 
-_SHIFTS = 39
-_MIN_SHIFT_S = 2.0
-_BIN = 0.01
-_FORCE = (
-    "Interaction force: half the difference of both players' forces along the table, in units of a player's full "
-    "force; positive pulls apart."
-)
-
+FULL_FORCES = "full forces"
+"""Unit of an interaction measure in a player's full force."""
 
 IDLE_BELOW = 0.1
 SATURATED_ABOVE = 0.98
+_SHIFTS = 39
+_MIN_SHIFT_S = 2.0
+_BIN = 0.01
 
 
 def force_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """Size of the interaction force, conflict, and asymmetry of effort."""
+    """Size of the interaction measure, conflict, and asymmetry of effort."""
     episodes = len(data.rows)
-    size = np.abs(data.force)
-    frames = data.lengths.astype(float)
-    mean, mean_bounds = bootstrap.ratio(data.per_episode(size), frames)
-    signed = dict(zip(map(str, PERCENTILES), np.percentile(data.force, PERCENTILES).tolist(), strict=True))
-    top, top_bounds = _percentile_95(data, size, bootstrap)
-    effort = np.column_stack(
-        [data.per_episode(np.linalg.norm(data.actions[:, side], axis=1)) for side in (slice(0, 2), slice(2, 4))]
-    )
-    asymmetry, asymmetry_bounds = bootstrap.ratio(effort[:, 0] - effort[:, 1], effort.sum(axis=1))
+    effort = [data.per_episode(np.linalg.norm(data.force_of(player), axis=1)) for player in (0, 1)]
+    asymmetry, asymmetry_bounds = bootstrap.ratio(effort[0] - effort[1], effort[0] + effort[1])
     return {
-        "interaction_force_mean": Estimate(
-            mean,
-            "full forces",
-            f"{_FORCE} Mean size; percentiles of the signed force in details.",
-            episodes,
-            mean_bounds,
-            bootstrap.resampled,
-            details={"signed_percentiles": signed},
-        ),
-        "interaction_force_p95": Estimate(
-            top, "full forces", f"{_FORCE} 95th percentile of its size.", episodes, top_bounds, bootstrap.resampled
-        ),
-        "conflict_fraction": _conflict(data, bootstrap, rng),
+        **_interaction(data, bootstrap),
+        **_conflict(data, bootstrap, rng),
         "effort_asymmetry": Estimate(
             asymmetry,
             "1",
@@ -66,51 +44,80 @@ def force_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Ge
     }
 
 
-def opposed_work(velocity: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames in which one player works with the table's motion and the other against it, and those that can tell.
+def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
+    names = ("interaction_force_mean", "interaction_force_p95")
+    if not data.task.offers("interaction"):
+        return left_out(data.task.missing("interaction measure"), *names)
+    size, episodes, words = np.abs(data.force), len(data.rows), data.words
+    mean, mean_bounds = bootstrap.ratio(data.per_episode(size), data.lengths.astype(float))
+    signed = dict(zip(map(str, PERCENTILES), np.percentile(data.force, PERCENTILES).tolist(), strict=True))
+    top, top_bounds = _percentile_95(data, size, bootstrap)
+    definitions = (
+        f"{words.interaction} Mean size; percentiles of the signed force in details.",
+        f"{words.interaction} 95th percentile of its size.",
+    )
+    return {
+        names[0]: Estimate(
+            mean, words.interaction_unit, definitions[0], episodes, mean_bounds, bootstrap.resampled,
+            details={"signed_percentiles": signed},
+        ),
+        names[1]: Estimate(top, words.interaction_unit, definitions[1], episodes, top_bounds, bootstrap.resampled),
+    }  # fmt: skip
+
+
+def opposed_work(
+    velocity: np.ndarray, forces: tuple[np.ndarray, np.ndarray], slow: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frames in which one player works with the motion and the other against it, and those that can tell.
 
     Args:
-        velocity: `(N, 2)` of the table, px/s.
-        actions: `(N, 4)` robot xy, human xy.
+        velocity: `(N, k)`.
+        forces: `(N, k)` of each player, along the same axes.
+        slow: speed up to which nothing moves.
 
     Returns:
-        `(N,)` opposed; `(N,)` the table moves and both players apply a force.
+        `(N,)` opposed; `(N,)` it moves and both players apply a force.
     """
-    power = [actions[:, x] * velocity[:, 0] + actions[:, x + 1] * velocity[:, 1] for x in (0, 2)]
-    efforts = [np.hypot(actions[:, x], actions[:, x + 1]) for x in (0, 2)]
-    tells = (np.hypot(velocity[:, 0], velocity[:, 1]) > MIN_SPEED) & (np.minimum(*efforts) >= MIN_EFFORT)
+    power = [(force * velocity).sum(axis=1) for force in forces]
+    efforts = [np.hypot.reduce(force, axis=1) for force in forces]
+    tells = (np.hypot.reduce(velocity, axis=1) > slow) & (np.minimum(*efforts) >= MIN_EFFORT)
     return tells & (power[0] * power[1] < 0), tells
 
 
-def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> Estimate:
+def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
+    name, noun, places, state = "conflict_fraction", data.words.noun, data.words.velocity, data.task.spec.state
+    if len(places) != len(data.task.spec.action):
+        return left_out(data.task.missing("velocity along the axes of an action"), name)
+    slow = MIN_SPEED * state.high[places[0]]
     definition = (
-        f"Share of frames in which one player's force works with the table's motion and the other's against it, of "
-        f"those with the table faster than {MIN_SPEED:g} px/s and both forces at least {MIN_EFFORT:g}."
+        f"Share of frames in which one player's force works with the {noun}'s motion and the other's against it, of "
+        f"those with the {noun} faster than {slow:g} {state.units[places[0]]} and both forces at least {MIN_EFFORT:g}."
     )
-    velocity = data.states[:, 4:6]
-    opposed, tells = opposed_work(velocity, data.actions)
+    velocity, one, other = data.velocity, data.force_of(0), data.force_of(1)
+    opposed, tells = opposed_work(velocity, (one, other), slow)
     value, bounds = bootstrap.ratio(data.per_episode(opposed), data.per_episode(tells))
     if value is None:
-        return Estimate(None, "1", definition, 0, note="no frame in which both players push a moving table")
+        return {name: Estimate(None, "1", definition, 0, note=f"no frame in which both players push a moving {noun}")}
     draws = []
     for _ in range(_SHIFTS):
         order = circular_shift(data.starts, data.lengths, round(_MIN_SHIFT_S * data.fps), rng)
-        turned = np.column_stack((data.actions[:, :2], data.actions[order, 2:]))
-        apart, told = opposed_work(velocity, turned)
+        apart, told = opposed_work(velocity, (one, other[order]), slow)
         draws.append(apart.sum() / max(told.sum(), 1))
     how = f"player 1 turned in time within each episode by at least {_MIN_SHIFT_S:g} s"
     null = Null.of(how, value, np.array(draws), two_sided=True)
     episodes = int((data.per_episode(tells) > 0).sum())
-    return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null)
+    return {name: Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null)}
 
 
 def _percentile_95(data: Trajectories, size: np.ndarray, bootstrap: Bootstrap) -> tuple[float, tuple[float, float]]:
     value = float(np.percentile(size, 95))
+    # Up to two full forces at a right angle, or in as many bins to the largest.
     bins = round(np.sqrt(2) / _BIN) + 1
-    place = np.minimum((size / _BIN).astype(int), bins - 1)
+    width = _BIN if data.words.interaction_unit == FULL_FORCES else float(size.max()) / bins or 1.0
+    place = np.minimum((size / width).astype(int), bins - 1)
     counts = np.bincount(data.episode * bins + place, minlength=len(data.rows) * bins).reshape(-1, bins)
     below = np.cumsum(bootstrap.weights @ counts.astype(np.float32), axis=1)
-    drawn = (below < 0.95 * below[:, -1:]).sum(axis=1) * _BIN
+    drawn = (below < 0.95 * below[:, -1:]).sum(axis=1) * width
     return value, interval(value, drawn, 0.0)
 
 
@@ -118,8 +125,8 @@ def activity_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, E
     """Idle and saturated share of each player's frames."""
     estimates = {}
     frames = data.lengths.astype(float)
-    for player, seat in enumerate(PLAYERS):
-        action = data.actions[:, 2 * player : 2 * player + 2]
+    for player, seat in enumerate(data.task.spec.players):
+        action = data.force_of(player)
         idle = np.linalg.norm(action, axis=1) < IDLE_BELOW
         saturated = np.abs(action).max(axis=1) > SATURATED_ABOVE
         longest = longest_runs(idle, data.starts, data.lengths) / data.fps

@@ -14,8 +14,8 @@ SHIFTS = 39
 
 _LEAD = (
     f"Leader of a window of {WINDOW_S:g} s, every {HOP_S:g} s: the player whose action, cross-correlated with the "
-    f"partner's over lags up to {MAX_LAG_S:.2f} s either way (each less its mean over the episode, both axes "
-    "together), has its largest correlation ahead of it; none where that is at lag 0 or not positive."
+    f"partner's over lags up to {MAX_LAG_S:.2f} s either way (each less its mean over the episode{{axes}}), has its "
+    "largest correlation ahead of it; none where that is at lag 0 or not positive."
 )
 _NULL = f"player 1 turned in time within each episode by at least {MIN_SHIFT_S:g} s"
 
@@ -29,11 +29,9 @@ def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.nda
     Returns:
         `(W,)` +1 where player 0 leads, -1 where player 1 does, 0 for none; `(W,)` episodes.
     """
-    actions = data.actions - (
-        np.column_stack([data.per_episode(data.actions[:, axis]) for axis in range(4)]) / data.lengths[:, None]
-    )[data.episode].astype(data.actions.dtype)
     # A row an axis: contiguous, and no sum over an axis of two.
-    one, two = actions[:, :2].T.copy(), (actions[:, 2:] if order is None else actions[order, 2:]).T.copy()
+    one, two = (_centred(data, data.force_of(player)).T.copy() for player in (0, 1))
+    two = two if order is None else two.take(order, axis=1)
     count = one.shape[1]
     window, reach = max(2, round(WINDOW_S * data.fps)), max(1, round(MAX_LAG_S * data.fps))
     offset = np.arange(count) - data.starts[data.episode]
@@ -41,15 +39,15 @@ def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.nda
     begin = np.flatnonzero(inside & ((offset - reach) % max(1, round(HOP_S * data.fps)) == 0))
     if not len(begin):
         return np.zeros(0, dtype=int), data.episode[begin]
-    energy_one = _windowed(one[0] ** 2 + one[1] ** 2, begin, window)
-    total_two = np.concatenate(([0.0], np.cumsum(two[0] ** 2 + two[1] ** 2, dtype=float)))
+    energy_one = _windowed(_added(one**2), begin, window)
+    total_two = np.concatenate(([0.0], np.cumsum(_added(two**2), dtype=float)))
     best, lag_of_best = np.zeros(len(begin)), np.zeros(len(begin), dtype=int)
     product = np.zeros(count)
     # Lag 0 first, then outwards: a tie goes to the smaller lag.
     for lag in sorted(range(-reach, reach + 1), key=abs):
         here, there = slice(max(0, -lag), count - max(0, lag)), slice(max(0, lag), count - max(0, -lag))
         product[:] = 0.0
-        product[here] = one[0, here] * two[0, there] + one[1, here] * two[1, there]
+        product[here] = _added(one[:, here] * two[:, there])
         scale = np.sqrt(energy_one * (total_two[begin + lag + window] - total_two[begin + lag]))
         together = _windowed(product, begin, window)
         correlation = np.divide(together, scale, out=np.zeros(len(begin)), where=scale > 1e-9)
@@ -61,9 +59,11 @@ def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.nda
 def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Share of windows that player 0 leads, and changes of leader a minute."""
     lead, episode = leaders(data)
+    axes = data.axes and f"{data.axes} together"
+    lead_definition = _LEAD.format(axes=axes)
     leading, decided, switches, minutes = _per_episode(data, lead, episode)
-    share_definition = f"{_LEAD} Share of the windows with a leader in which player 0 leads."
-    switch_definition = f"{_LEAD} Changes of leader a minute between windows with one."
+    share_definition = f"{lead_definition} Share of the windows with a leader in which player 0 leads."
+    switch_definition = f"{lead_definition} Changes of leader a minute between windows with one."
     if not decided.any():
         note = f"no episode is long enough for a window of {WINDOW_S:g} s, or nobody moves"
         return {
@@ -113,6 +113,20 @@ def _per_episode(data: Trajectories, lead: np.ndarray, episode: np.ndarray) -> t
     hop = max(1, round(HOP_S * data.fps)) / data.fps
     minutes = np.bincount(episode, minlength=count) * hop / 60
     return leading, decided, switches, minutes
+
+
+def _centred(data: Trajectories, actions: np.ndarray) -> np.ndarray:
+    """`(N, m)` less their mean over each episode."""
+    sums = np.column_stack([data.per_episode(column) for column in actions.T])
+    return actions - (sums / data.lengths[:, None])[data.episode].astype(actions.dtype)
+
+
+def _added(rows: np.ndarray) -> np.ndarray:
+    """Sum of `(m, N)` over its few rows, one after the other."""
+    total = rows[0]
+    for row in rows[1:]:
+        total = total + row
+    return total
 
 
 def _windowed(values: np.ndarray, begin: np.ndarray, window: int) -> np.ndarray:

@@ -32,7 +32,8 @@ def neighbour_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rando
     low, high = data.task.spec.state.bounds
     scaled = (2 * (data.states - low) / (high - low) - 1).astype(np.float32)
     # Sums over the queries of each episode, for each number of neighbours.
-    variances = np.zeros((len(NEIGHBOURS), len(data.rows), 4))
+    width = len(data.task.spec.action)
+    variances = np.zeros((len(NEIGHBOURS), len(data.rows), 2 * width))
     spreads = np.zeros((len(NEIGHBOURS), len(data.rows)))
     queries = np.zeros(len(data.rows))
     keep_frame = np.zeros(len(data.states), dtype=bool)
@@ -53,9 +54,9 @@ def neighbour_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rando
     return {
         name: _ratio(data, bootstrap, variances, spreads, queries, columns, who)
         for name, columns, who in (
-            ("action_variance_ratio", slice(0, 4), "both players' actions"),
-            ("action_variance_ratio_player_0", slice(0, 2), "player 0's action"),
-            ("action_variance_ratio_player_1", slice(2, 4), "player 1's action"),
+            ("action_variance_ratio", slice(0, 2 * width), "both players' actions"),
+            ("action_variance_ratio_player_0", slice(0, width), "player 0's action"),
+            ("action_variance_ratio_player_1", slice(width, 2 * width), "player 1's action"),
         )
     }
 

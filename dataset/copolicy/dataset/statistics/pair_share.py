@@ -2,26 +2,29 @@
 
 import numpy as np
 
-from .estimate import Estimate, Null
+from .estimate import Estimate, Null, left_out
 from .resampling import Bootstrap, exchangeable, interval, permuted_within
-from .route_entropy import routes_taken
 from .trajectories import Trajectories
 
 _PERMUTATIONS = 999
+_ROUTE = "route_between_pair_share"
 
 
 def pair_share_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Eta squared of route and duration by pair within configurations, and of duration by configuration."""
-    words = routes_taken(data)
+    words = data.labels
     decided = np.array([index for index, word in enumerate(words) if word is not None], dtype=int)
     vocabulary = sorted({word for word in words if word is not None})
     onehot = np.array([[words[index] == word for word in vocabulary] for index in decided], dtype=float)
     success = np.flatnonzero([row.success for row in data.rows])
     duration = np.array([[data.rows[index].duration_s] for index in success])
+    if data.task.offers("strategy"):
+        what = "route class (chance that two differ, Light and Margolin 1971)"
+        route = {_ROUTE: _within_configurations(data, decided, onehot, what, rng)}
+    else:
+        route = left_out(data.task.missing("strategy labels"), _ROUTE)
     return {
-        "route_between_pair_share": _within_configurations(
-            data, decided, onehot, "route class (chance that two differ, Light and Margolin 1971)", rng
-        ),
+        **route,
         "duration_between_pair_share": _within_configurations(data, success, duration, "duration", rng),
         "duration_between_configuration_share": _by_configuration(data, success, duration, bootstrap, rng),
     }

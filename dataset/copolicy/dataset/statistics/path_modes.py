@@ -9,8 +9,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.metrics import adjusted_rand_score
 from sklearn.mixture import GaussianMixture
 
-from .estimate import Estimate
-from .route_entropy import routes_taken
+from .estimate import Estimate, left_out
 from .trajectories import Trajectories
 
 POINTS = 20
@@ -20,8 +19,9 @@ MIN_EPISODES = 8
 """Successful episodes of a configuration below which its paths are not counted."""
 
 MOST_MODES = 8
-RESOLUTION_PX = 10.0
-"""Spread within a mode below which it is not believed: paths that differ by less, rms, are one mode."""
+RESOLUTION = 1 / 120
+"""Spread within a mode below which it is not believed, of the width of the scene: paths that differ by less, rms, are
+one mode."""
 
 _COMPONENTS = 5
 _SUBSAMPLES = 10
@@ -36,14 +36,15 @@ def resample_path(path: np.ndarray, points: int = POINTS) -> np.ndarray:
     return np.column_stack([np.interp(places, along, path[:, axis]) for axis in range(2)])
 
 
-def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
+def count_modes(paths: np.ndarray, seed: int, resolution: float) -> tuple[int, np.ndarray]:
     """Number of Gaussian modes with the least BIC, and the mode of each path.
 
     Args:
-        paths: `(n, points, 2)`, px.
+        paths: `(n, points, 2)`.
         seed: of the mixtures' starts.
+        resolution: spread that a mode has at least, in the unit of the paths.
     """
-    # Divided so that a distance is the root mean square one between paths, px.
+    # Divided so that a distance is the root mean square one between paths.
     flat = paths.reshape(len(paths), -1) / np.sqrt(paths.shape[1])
     centred = flat - flat.mean(axis=0)
     directions = np.linalg.svd(centred, full_matrices=False)[2][: min(_COMPONENTS, len(paths) - 1)]
@@ -51,7 +52,7 @@ def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
     tree = linkage(scores, "ward")
     best = (np.inf, 1, np.zeros(len(paths), dtype=int))
     for modes in range(1, min(MOST_MODES, len(paths) // 3) + 1):
-        mixture = _mixture_from(scores, fcluster(tree, modes, "maxclust") - 1, seed)
+        mixture = _mixture_from(scores, fcluster(tree, modes, "maxclust") - 1, seed, resolution)
         with warnings.catch_warnings():
             # Fewer distinct paths than modes: that mixture loses on its BIC.
             warnings.simplefilter("ignore", ConvergenceWarning)
@@ -62,14 +63,14 @@ def count_modes(paths: np.ndarray, seed: int) -> tuple[int, np.ndarray]:
     return best[1], best[2]
 
 
-def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int) -> GaussianMixture:
+def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int, resolution: float) -> GaussianMixture:
     """A mixture that starts from clusters: from random starts, few episodes often end in a poor one."""
     clusters = [scores[label == number] for number in np.unique(label)]
-    variance = np.array([cluster.var(axis=0) for cluster in clusters]) + RESOLUTION_PX**2
+    variance = np.array([cluster.var(axis=0) for cluster in clusters]) + resolution**2
     return GaussianMixture(
         len(clusters),
         covariance_type="diag",
-        reg_covar=RESOLUTION_PX**2,
+        reg_covar=resolution**2,
         weights_init=np.array([len(cluster) for cluster in clusters]) / len(scores),
         means_init=np.array([cluster.mean(axis=0) for cluster in clusters]),
         precisions_init=1 / variance,
@@ -80,14 +81,18 @@ def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int) -> GaussianM
 
 def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
     """Modes of the paths of each configuration, and their mean over configurations."""
+    reason, outline = data.without_places, data.task.outline
+    if reason or outline is None:
+        return left_out(reason, "path_modes")
+    resolution = outline.size[0] * RESOLUTION
     definition = (
         f"Path modes in a configuration, averaged over configurations by their episodes: paths of the episodes that "
         f"reached the goal, {POINTS} points even in arc length, principal components, Gaussian mixture (diagonal, "
-        f"spread of at least {RESOLUTION_PX:g} px rms) of 1 to {MOST_MODES} modes with the least BIC and three "
-        f"episodes a mode or more. A configuration's range is that of {_SUBSAMPLES} subsamples of "
+        f"spread of at least {resolution:g} {outline.unit} rms) of 1 to {MOST_MODES} modes with the least BIC and "
+        f"three episodes a mode or more. A configuration's range is that of {_SUBSAMPLES} subsamples of "
         f"{_SUBSAMPLE_SHARE:.0%}; adjusted_rand compares the modes with the route classes (1 the same)."
     )
-    words = routes_taken(data)
+    words = data.labels
     success = np.array([row.success for row in data.rows])
     rng = np.random.default_rng(seed)
     per_configuration: dict[str, dict] = {}
@@ -97,11 +102,12 @@ def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
         if len(members) < MIN_EPISODES:
             continue
         paths = np.array([resample_path(data.path(index)) for index in members])
-        count, label = count_modes(paths, seed)
+        count, label = count_modes(paths, seed, resolution)
         episodes += len(members)
         total += count * len(members)
         keep = max(MIN_EPISODES - 1, round(_SUBSAMPLE_SHARE * len(members)))
-        again = [count_modes(paths[rng.choice(len(paths), keep, replace=False)], seed)[0] for _ in range(_SUBSAMPLES)]
+        draws = [paths[rng.choice(len(paths), keep, replace=False)] for _ in range(_SUBSAMPLES)]
+        again = [count_modes(drawn, seed, resolution)[0] for drawn in draws]
         weighted += rng.choice(again, _REPLICATES) * len(members)
         entry = {"episodes": len(members), "modes": count, "range": [min(again), max(again)]}
         entry["subsamples"] = dict(sorted(Counter(again).items()))

@@ -11,7 +11,6 @@ from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.info import split_range
 from ..lerobot_folder.tables import feature_values, read_parquet
-from ..task import require_table
 from .trajectories import EpisodeRow, Trajectories
 
 _EPISODE_COLUMNS = (
@@ -33,7 +32,6 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
         RunError: no episode is left.
     """
     folder = LeRobotFolder.open(root)
-    require_table(folder.task, root)
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
     info = folder.info
     rows = folder.rows(_EPISODE_COLUMNS)

@@ -1,49 +1,52 @@
-"""Which way around the obstacles: route classes, and how evenly they are taken in a configuration."""
+"""Strategy labels of episodes, of the table the way around the obstacles, and how evenly a configuration has them."""
 
+import math
 from collections import Counter
+from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
-
-from copolicy.tasks.table.routes import route_class, winding
 
 from .entropy import entropy, miller_madow, simpson
-from .estimate import Estimate
+from .estimate import Estimate, left_out
 from .resampling import Bootstrap, interval
 from .trajectories import Trajectories
 
 MIN_EPISODES = 5
 """Episodes of a configuration below which its entropy is not given: counts alone."""
 
-CLEAR_WINDING = 0.1
-"""Turns around an obstacle below which the side is called unclear."""
-
-_PASSED = "episodes that reached the goal: the route of an unfinished one is not decided"
-
-
-def routes_taken(data: Trajectories) -> list[str | None]:
-    """The side word of each episode, recomputed from its frames; None without success or without obstacles."""
-    return [
-        route_class(data.path(index), row.map_config) if row.success and row.map_config.obstacles else None
-        for index, row in enumerate(data.rows)
-    ]
+PASSED = "episodes that reached the goal: the route of an unfinished one is not decided"
 
 
 def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """Route classes, per configuration and over configurations."""
-    words = routes_taken(data)
-    used = np.array([index for index, word in enumerate(words) if word is not None], dtype=int)
-    taken = {index: word for index, word in enumerate(words) if word is not None}
-    estimates = {
-        "route_class": _route_class(data, taken),
-        "route_entropy": _conditional_entropy(data, taken, used, bootstrap, rng),
-        "route_entropy_pooled": _pooled_entropy(data, taken, rng),
+    """Strategy labels, and their entropy per configuration."""
+    if not data.task.offers("strategy"):
+        return left_out(data.task.missing("strategy labels"), "route_class", "route_entropy")
+    taken = labels_of(data)
+    return {
+        "route_class": route_classes(data, taken, f"Episodes with a strategy label. Of {PASSED}."),
+        "route_entropy": _conditional_entropy(data, taken, bootstrap, rng),
     }
-    return estimates
 
 
-def word_entropy(counts: Counter[str], obstacles: int, rng: np.random.Generator, replicates: int = 1000) -> dict:
+def labels_of(data: Trajectories) -> dict[int, str]:
+    """The strategy label of each episode that has one, by the episode."""
+    return {index: word for index, word in enumerate(data.labels) if word is not None}
+
+
+def route_classes(data: Trajectories, taken: dict[int, str], definition: str) -> Estimate:
+    """How many episodes have a label, and how many of them another one than the column `route_class` says."""
+    unlike = sum(data.rows[index].route_class not in ("", word) for index, word in taken.items())
+    details = {"episodes_without": len(data.rows) - len(taken), "unlike_the_episode_column": unlike}
+    return Estimate(len(taken), "episodes", definition, len(taken), details=details)
+
+
+def word_entropy(
+    counts: Counter[str], obstacles: int | None, rng: np.random.Generator, replicates: int = 1000
+) -> dict[str, Any]:
     """Entropy and its relatives of the words of one group of episodes.
+
+    Args:
+        obstacles: bits that a word can tell at most; None where nobody knows.
 
     Returns:
         `episodes`, `counts`, `entropy_bits` (Miller-Madow, at most one bit an obstacle), its `interval` over episodes
@@ -52,76 +55,48 @@ def word_entropy(counts: Counter[str], obstacles: int, rng: np.random.Generator,
     """
     numbers = np.array([number for _, number in sorted(counts.items())])
     total = int(numbers.sum())
-    result: dict = {"episodes": total, "obstacles": obstacles, "counts": dict(counts.most_common())}
+    most, of_most = (math.inf, {}) if obstacles is None else (float(obstacles), {"obstacles": obstacles})
+    result: dict[str, Any] = {"episodes": total, **of_most, "counts": dict(counts.most_common())}
     if total < MIN_EPISODES:
         return result | {"entropy_bits": None, "note": f"fewer than {MIN_EPISODES} episodes"}
-    plug_in, value = float(entropy(numbers)), min(float(miller_madow(numbers)), float(obstacles))
+    plug_in, value = float(entropy(numbers)), min(float(miller_madow(numbers)), most)
     if len(numbers) == 1:
         # A resample of one word holds one word: the bound is the largest share, p = 0.05, that another could have.
         hidden = 1 - 0.05 ** (1 / total)
         bounds = (0.0, float(entropy(np.array([hidden, 1 - hidden]))))
     else:
         draws = rng.multinomial(total, numbers / total, size=replicates)
-        bounds = interval(value, np.minimum(miller_madow(draws), obstacles), 0.0, float(obstacles))
+        bounds = interval(value, np.minimum(miller_madow(draws), most), 0.0, most)
     return result | {
         "entropy_bits": value,
         "interval": bounds,
         "plug_in_bits": plug_in,
         "effective_modes": 2**value,
         "effective_modes_interval": [2**bound for bound in bounds],
-        "normalised": value / obstacles,
+        **({} if obstacles is None else {"normalised": value / obstacles}),
         "simpson": float(simpson(numbers)),
     }
 
 
-def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
-    sides: dict[str, dict] = {}
-    unclear = disagree = 0
-    for index, word in taken.items():
-        row = data.rows[index]
-        path = data.path(index)
-        unclear += any(abs(winding(path, centre)) < CLEAR_WINDING for centre in row.map_config.obstacles)
-        disagree += bool(row.route_class) and row.route_class != word
-        entry = sides.setdefault(str(data.configurations[index]), {"episodes": 0, "left": [0] * len(word)})
-        entry["episodes"] += 1
-        entry["left"] = [left + (letter == "L") for left, letter in zip(entry["left"], word, strict=True)]
-    for entry in sides.values():
-        entry["left_interval"] = [
-            binomtest(left, entry["episodes"]).proportion_ci(method="wilson") for left in entry["left"]
-        ]
-    return Estimate(
-        len(taken),
-        "episodes",
-        "Episodes with a route class: for each obstacle the sign of the winding of the table's path around it, L below "
-        "it on screen when carried to the right, R above; letters by atan2(y, x) of the obstacles. Of " + _PASSED + ".",
-        len(taken),
-        details={
-            "episodes_without": len(data.rows) - len(taken),
-            "unclear_side": unclear,
-            "unlike_the_episode_column": disagree,
-            "left_by_obstacle": dict(sorted(sides.items())),
-        },
-    )
-
-
 def _conditional_entropy(
-    data: Trajectories, taken: dict[int, str], used: np.ndarray, bootstrap: Bootstrap, rng: np.random.Generator
+    data: Trajectories, taken: dict[int, str], bootstrap: Bootstrap, rng: np.random.Generator
 ) -> Estimate:
     definition = (
         "H(route | configuration): the entropy of the route classes in each configuration (start, goal, obstacles), "
         "Miller-Madow, averaged over configurations by their episodes. Each configuration's own interval draws its "
-        "episodes anew. Of " + _PASSED + "."
+        "episodes anew. Of " + PASSED + "."
     )
-    names = sorted({str(data.configurations[index]) for index in used})
-    cells = sorted({(str(data.configurations[index]), taken[index]) for index in used})
+    names = sorted({str(data.configurations[index]) for index in taken})
+    cells = sorted({(str(data.configurations[index]), taken[index]) for index in taken})
     column = {cell: place for place, cell in enumerate(cells)}
     onehot = np.zeros((len(data.rows), len(cells)), dtype=np.float32)
-    for index in used:
+    for index in taken:
         onehot[index, column[str(data.configurations[index]), taken[index]]] = 1
     per_configuration, enough = {}, []
+    bits = data.words.label_bits
     for name in names:
-        counts = Counter(taken[index] for index in used if data.configurations[index] == name)
-        entry = word_entropy(counts, len(next(iter(counts))), rng)
+        counts = Counter(taken[index] for index in taken if data.configurations[index] == name)
+        entry = word_entropy(counts, bits(next(iter(counts))) if bits else None, rng)
         per_configuration[name] = entry
         if entry["entropy_bits"] is not None:
             enough.append(name)
@@ -133,8 +108,8 @@ def _conditional_entropy(
     weighted, totals = np.zeros(len(replicates)), np.zeros(len(replicates))
     for name in enough:
         counts = replicates[:, [place for place, cell in enumerate(cells) if cell[0] == name]]
-        bits = np.minimum(miller_madow(counts), per_configuration[name]["obstacles"])
-        weighted += bits * counts.sum(axis=1)
+        entropies = np.minimum(miller_madow(counts), per_configuration[name].get("obstacles", math.inf))
+        weighted += entropies * counts.sum(axis=1)
         totals += counts.sum(axis=1)
     episodes = sum(per_configuration[name]["episodes"] for name in enough)
     value = sum(per_configuration[name]["entropy_bits"] * per_configuration[name]["episodes"] for name in enough)
@@ -149,20 +124,3 @@ def _conditional_entropy(
         **details,
     }
     return Estimate(value, "bits", definition, episodes, bounds, bootstrap.resampled, details=details)
-
-
-def _pooled_entropy(data: Trajectories, taken: dict[int, str], rng: np.random.Generator) -> Estimate:
-    sizes = sorted({len(word) for word in taken.values()})
-    details = {
-        f"{size}_obstacles": word_entropy(Counter(word for word in taken.values() if len(word) == size), size, rng)
-        for size in sizes
-    }
-    return Estimate(
-        None,
-        "bits",
-        "Entropy of the route classes over all configurations with one, two and three obstacles (in details): it mixes "
-        "maps and is no measure of multimodality, but all that can be set beside labels that do not tell the map.",
-        len(taken),
-        note="one value a number of obstacles, in details",
-        details=details,
-    )

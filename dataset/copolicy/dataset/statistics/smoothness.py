@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import welch
 
-from .estimate import Estimate
+from .estimate import Estimate, left_out
 from .resampling import Bootstrap
 from .trajectories import Trajectories
 
@@ -20,9 +20,9 @@ _SPARC_PADDING = 4
 
 
 def f95(action: np.ndarray, fps: float) -> float:
-    """Frequency below which 95 percent of the power of an action `(T, 2)` lies, Hz; nan where it never changes.
+    """Frequency below which 95 percent of the power of an action `(T, m)` lies, Hz; nan where it never changes.
 
-    Welch's density (Hann, mean removed, half overlapping), both axes added, between bins interpolated.
+    Welch's density (Hann, mean removed, half overlapping), all axes added, between bins interpolated.
     """
     segment = min(len(action), max(4, round(WELCH_S * fps)))
     frequency, power = welch(action, fs=fps, nperseg=segment, axis=0, detrend="constant")
@@ -71,25 +71,21 @@ def log_dimensionless_jerk(speed: np.ndarray, fps: float) -> float:
 
 
 def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
-    """Means over episodes; f95 for each player, smoothness of the table's speed."""
+    """Means over episodes; f95 for each player, smoothness of the speed of what moves."""
     names = ("action_f95_player_0", "action_f95_player_1", "sparc", "log_dimensionless_jerk")
     values = np.full((len(data.rows), len(names)), np.nan)
+    actions, speed = [data.force_of(player) for player in (0, 1)], np.linalg.norm(data.velocity, axis=1)
     for index, (start, end) in enumerate(zip(data.starts.tolist(), data.ends.tolist(), strict=True)):
         if end - start < MIN_S * data.fps or end - start < 4:
             continue
-        actions = data.actions[start:end]
-        speed = np.linalg.norm(data.states[start:end, 4:6], axis=1)
-        values[index] = (
-            f95(actions[:, :2], data.fps),
-            f95(actions[:, 2:], data.fps),
-            sparc(speed, data.fps),
-            log_dimensionless_jerk(speed, data.fps),
-        )
+        of_speed = (sparc(speed[start:end], data.fps), log_dimensionless_jerk(speed[start:end], data.fps))
+        values[index] = (*(f95(action[start:end], data.fps) for action in actions), *of_speed)
     spectrum = (
         "Frequency below which 95 % of the power of player {}'s action lies (Welch, segments of "
-        f"{WELCH_S:g} s, both axes), mean over episodes; at most half the frame rate of {data.fps} Hz."
+        f"{WELCH_S:g} s{data.axes}), mean over episodes; at most half the frame rate of {data.fps} Hz."
     )
-    rate = f"of the table's speed, mean over episodes. It depends on the frame rate ({data.fps} Hz): compare alike."
+    speed_of = f"of the {data.words.noun}'s speed"
+    rate = f"{speed_of}, mean over episodes. It depends on the frame rate ({data.fps} Hz): compare alike."
     definitions = (
         ("Hz", spectrum.format(0)),
         ("Hz", spectrum.format(1)),
@@ -102,4 +98,4 @@ def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str,
         note = "" if value is not None else f"no episode of {MIN_S:g} s in which it moves"
         episodes = int(np.isfinite(values[:, column]).sum())
         estimates[name] = Estimate(value, unit, definition, episodes, bounds, bootstrap.resampled, note=note)
-    return estimates
+    return estimates if data.words.velocity else estimates | left_out(data.task.missing("velocity"), *names[2:])

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..exceptions import RunError, ShapeError
 from ..task import PairTask, get_task
+from ..task_parts import TaskStatistics
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,36 @@ class Trajectories:
         return measured
 
     @cached_property
+    def words(self) -> TaskStatistics:
+        """How the task speaks of its statistics."""
+        return self.task.statistics
+
+    @property
+    def axes(self) -> str:
+        """How many axes of an action are taken together, after a comma; empty for one."""
+        count = len(self.task.spec.action)
+        return {1: "", 2: ", both axes"}.get(count, f", all {count} axes")
+
+    def force_of(self, player: int) -> np.ndarray:
+        """`(N, m)` a player's action in units of its full force, the farthest of its bounds."""
+        actions = np.split(self.actions, 2, axis=1)[player]
+        return actions / np.abs(self.task.spec.action.bounds).max(axis=0).astype(actions.dtype)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """`(N, k)` of what moves; k is 0 where the task does not say it."""
+        return self.states[:, list(self.words.velocity)]
+
+    @cached_property
+    def labels(self) -> list[str | None]:
+        """The strategy label of each episode, recomputed from its frames; None without success or label."""
+        spans = zip(self.rows, self.starts.tolist(), self.ends.tolist(), strict=True)
+        return [
+            (row.success and self.task.strategy(row.map_config, self.states[start:end])) or None
+            for row, start, end in spans
+        ]
+
+    @cached_property
     def pairs(self) -> np.ndarray:
         """`(E,)` number of each episode's pair; episodes without a pair's name count as one more pair."""
         return np.unique([row.pair_id for row in self.rows], return_inverse=True)[1]
@@ -138,6 +169,23 @@ class Trajectories:
         if path is None:
             raise RunError(self.task.missing("tracked point"))
         return path
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """`(N, 2)` the tracked point in all frames."""
+        return np.concatenate([self.path(index) for index in range(len(self.rows))])
+
+    @property
+    def tracked(self) -> str:
+        """What `points` are of, in words."""
+        return f"the {self.words.noun}'s centre"
+
+    @property
+    def without_places(self) -> str:
+        """Why there are no statistics of places: the sentence for the part that the task lacks; empty where none."""
+        if not self.task.offers("path"):
+            return self.task.missing("tracked point")
+        return "" if self.task.outline else self.task.missing("outline")
 
     def per_episode(self, values: np.ndarray) -> np.ndarray:
         """Sum of a value of the frames `(N,)` over each episode, `(E,)`."""

@@ -1,45 +1,82 @@
-"""Where the table has been: visitation entropy, coverage, and how differently pairs spread over a map."""
+"""Where the tracked point has been: visitation entropy, coverage, and how differently pairs spread over a map."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from copolicy.tasks.table.map_config import WINDOW
-
+from ..outline import Outline, Shape
 from .entropy import entropy, miller_madow
-from .estimate import Estimate, Null
+from .estimate import Estimate, Null, left_out
 from .resampling import Bootstrap, exchangeable, interval, permuted_within
 from .trajectories import Trajectories
 
-CELL_PX = 25
-_COLUMNS, _ROWS = WINDOW[0] // CELL_PX, WINDOW[1] // CELL_PX
+COLUMNS = 48
 _REPLICATES = 200
 _PERMUTATIONS = 199
+_NAMES = ("visitation_entropy", "visitation_coverage", "visitation_divergence_between_pairs")
 
 
-def visitation_counts(data: Trajectories) -> csr_matrix:
-    """`(E, cells)` frames of each episode with the table's centre in each cell of 25 px, row by row from the top."""
-    column = np.clip((data.states[:, 0] // CELL_PX).astype(int), 0, _COLUMNS - 1)
-    row = np.clip((data.states[:, 1] // CELL_PX).astype(int), 0, _ROWS - 1)
-    cell = row * _COLUMNS + column
-    ones = np.ones(len(cell), dtype=np.float32)
-    return csr_matrix((ones, (data.episode, cell)), shape=(len(data.rows), _COLUMNS * _ROWS))
+@dataclass(frozen=True)
+class Grid:
+    """Square cells over a scene, row by row from the top.
 
+    Attributes:
+        side: of a cell.
+    """
 
-def free_cells(squares: tuple[tuple[tuple[float, float], float], ...]) -> np.ndarray:
-    """`(cells,)` whether the middle of a cell lies outside every obstacle, given by centre and side."""
-    y, x = np.mgrid[0:_ROWS, 0:_COLUMNS] * CELL_PX + CELL_PX / 2
-    inside = np.zeros((_ROWS, _COLUMNS), dtype=bool)
-    for (centre_x, centre_y), size in squares:
-        inside |= np.maximum(np.abs(x - centre_x), np.abs(y - centre_y)) < size / 2
-    return ~inside.ravel()
+    side: float
+    unit: str
+    rows: int
+
+    @classmethod
+    def over(cls, outline: Outline) -> "Grid":
+        """As many columns as `COLUMNS`, and the rows that it takes."""
+        side = outline.size[0] / COLUMNS
+        return cls(side, outline.unit, max(1, math.ceil(outline.size[1] / side - 1e-9)))
+
+    @property
+    def cells(self) -> int:
+        """How many there are."""
+        return COLUMNS * self.rows
+
+    def __str__(self) -> str:
+        return f"a grid of {self.side:g} {self.unit}"
+
+    def counts(self, data: Trajectories) -> csr_matrix:
+        """`(E, cells)` frames of each episode with the tracked point in each cell."""
+        column = np.clip((data.points[:, 0] // self.side).astype(int), 0, COLUMNS - 1)
+        row = np.clip((data.points[:, 1] // self.side).astype(int), 0, self.rows - 1)
+        ones = np.ones(len(column), dtype=np.float32)
+        return csr_matrix((ones, (data.episode, row * COLUMNS + column)), shape=(len(data.rows), self.cells))
+
+    def free(self, obstacles: Sequence[Shape]) -> np.ndarray:
+        """`(cells,)` whether the middle of a cell lies outside every obstacle, a convex polygon each."""
+        y, x = (np.mgrid[0 : self.rows, 0:COLUMNS] * self.side + self.side / 2).reshape(2, -1)
+        free = np.ones(self.cells, dtype=bool)
+        for _, corners in obstacles:
+            sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+            turns = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for (ax, ay), (bx, by) in sides]
+            free &= ~(np.all(np.array(turns) > 0, axis=0) | np.all(np.array(turns) < 0, axis=0))
+        return free
 
 
 def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Entropy and coverage per set of obstacles, averaged over them by their frames, and divergence between pairs."""
-    counts = visitation_counts(data)
+    reason, outline = data.without_places, data.task.outline
+    if reason or outline is None:
+        return left_out(reason, *_NAMES)
+    grid = Grid.over(outline)
+    counts = grid.counts(data)
     groups = data.groups(with_goal=False)
     weights = np.array([data.lengths[group].sum() for group in groups], dtype=float)
-    free = [free_cells(data.rows[group[0]].map_config.squares) for group in groups]
+    obstacles = [
+        [shape for shape in outline.fixed(data.rows[group[0]].map_config) if shape.role == "obstacle"]
+        for group in groups
+    ]
+    free = [grid.free(shapes) for shapes in obstacles]
     pooled = [np.asarray(counts[group].sum(axis=0)).ravel() for group in groups]
     bits = np.array([miller_madow(row) for row in pooled])
     seen = np.array([(row[cells] > 0).mean() for row, cells in zip(pooled, free, strict=True)])
@@ -54,7 +91,7 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     drawn_weight = drawn_weight[kept] / drawn_weight[kept].sum(axis=1, keepdims=True)
     per_layout = [
         {
-            "obstacles": data.rows[group[0]].map_config.obstacles,
+            "obstacles": [np.mean(shape.corners, axis=0) for shape in obstacles[place]],
             "episodes": len(group),
             "entropy_bits": float(bits[place]),
             "coverage": float(seen[place]),
@@ -63,35 +100,35 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     ]
     value, covered = float(np.average(bits, weights=weights)), float(np.average(seen, weights=weights))
     episodes = len(data.rows)
-    grid = f"a grid of {CELL_PX} px, for each set of obstacles, averaged over them by frames"
+    where = f"{grid}, for each set of obstacles, averaged over them by frames"
     return {
-        "visitation_entropy": Estimate(
+        _NAMES[0]: Estimate(
             value,
             "bits",
-            f"Entropy (Miller-Madow) of the table's centre over {grid}; a uniform spread would have "
-            f"{np.log2(_COLUMNS * _ROWS):.1f} bits.",
+            f"Entropy (Miller-Madow) of {data.tracked} over {where}; a uniform spread would have "
+            f"{np.log2(grid.cells):.1f} bits.",
             episodes,
             interval(value, (drawn_bits[kept] * drawn_weight).sum(axis=1), 0.0),
             bootstrap.resampled,
             details={"layouts": per_layout},
         ),
-        "visitation_coverage": Estimate(
+        _NAMES[1]: Estimate(
             covered,
             "1",
-            f"Share of the cells outside obstacles that the table's centre has been in, on {grid}. It grows with the "
+            f"Share of the cells outside obstacles that {data.tracked} has been in, on {where}. It grows with the "
             "number of episodes; the interval is that of as many episodes.",
             episodes,
             interval(covered, (drawn_seen[kept] * drawn_weight).sum(axis=1), 0.0, 1.0),
             bootstrap.resampled,
         ),
-        "visitation_divergence_between_pairs": _between_pairs(data, counts, groups, bootstrap, rng),
+        _NAMES[2]: _between_pairs(data, grid, counts, groups, rng),
     }
 
 
-def _between_pairs(data: Trajectories, counts: csr_matrix, groups, bootstrap: Bootstrap, rng) -> Estimate:
+def _between_pairs(data: Trajectories, grid: Grid, counts: csr_matrix, groups, rng) -> Estimate:
     definition = (
         "Generalised Jensen-Shannon divergence between the pairs' visitation (what a cell tells of who was there: "
-        f"entropy of all together less the mean entropy of each, by frames) on a grid of {CELL_PX} px, for each set "
+        f"entropy of all together less the mean entropy of each, by frames) on {grid}, for each set "
         "of obstacles, averaged over them by frames; 0 where all pairs spread alike. With few episodes it is far "
         "from 0 by chance: hold it against its null."
     )

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 from .mapping import GamepadMapping
 
-_CONTROLS = ("a", "b", "x", "y", "back", "start", "leftshoulder", "rightshoulder")
-_XBOX = dict(zip(_CONTROLS, ("A", "B", "X", "Y", "View", "Menu", "LB", "RB"), strict=True))
-_PLAYSTATION = dict(
+_CONTROLS: tuple[str, ...] = ("a", "b", "x", "y", "back", "start", "leftshoulder", "rightshoulder")
+_XBOX: dict[str, str] = dict(zip(_CONTROLS, ("A", "B", "X", "Y", "View", "Menu", "LB", "RB"), strict=True))
+_PLAYSTATION: dict[str, str] = dict(
     zip(_CONTROLS, ("Cross", "Circle", "Square", "Triangle", "Share", "Options", "L1", "R1"), strict=True)
 )
 _PLAYSTATION_OLD = _PLAYSTATION | {"back": "Select", "start": "Start"}

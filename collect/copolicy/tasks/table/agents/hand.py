@@ -6,7 +6,7 @@ import numpy as np
 
 from copolicy.dataset.task_spec import RECORD_HZ
 
-from .habits import Habits
+from .profiles import Habits
 
 _NOISE_S = 0.5  # s, correlation time of the noise
 _PULSE_S = (0.6, 1.2)  # s, shortest and longest pulse

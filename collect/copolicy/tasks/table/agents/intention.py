@@ -9,8 +9,8 @@ from copolicy.dataset.task_spec import RECORD_HZ
 from ..map_config import MapConfig
 from . import grid
 from .cost_to_go import Route, routes
-from .habits import Habits
 from .partner_force import PartnerForce
+from .profiles import Habits
 
 _DISAGREE = 0.25  # of a full force: how much better another route must explain the other's pull
 _DETOUR = 250.0  # px: a route that has become so much longer than another is given up at once

@@ -10,8 +10,7 @@ from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.task import SimulatedPlayers
 
 from ..map_config import MapConfig
-from .habits import Habits
-from .profiles import PAIRS, PARTNERS, ROBOTS
+from .profiles import PAIRS, PARTNERS, ROBOTS, Habits
 
 if TYPE_CHECKING:
     from .scripted import ScriptedPilot

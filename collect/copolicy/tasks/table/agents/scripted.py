@@ -10,10 +10,10 @@ from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 
 from ..map_config import MapConfig
 from ..physics import Physics
-from .habits import Habits
 from .hand import UnsteadyHand
 from .intention import Intention
 from .partner_force import PartnerForce
+from .profiles import Habits
 
 _GAIN = 2.0  # 1/s, how sharply it corrects the table's velocity
 _TURN_GAIN = 1.5  # 1/s, how sharply it corrects the table's orientation

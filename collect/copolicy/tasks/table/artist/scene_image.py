@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from copolicy.collect.screen.canvas import new_surface
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.features import SCENE_SIZE
 from copolicy.dataset.outline import Pose
@@ -19,8 +20,7 @@ class SceneImage:
     """
 
     def __init__(self, map_config: MapConfig, size: tuple[int, int] = SCENE_SIZE):
-        # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
-        self._surface = pygame.Surface(size, depth=32)
+        self._surface = new_surface(size)
         self._view = TableView(map_config)
 
     def draw(self, pose: Pose) -> np.ndarray:

@@ -1,12 +1,17 @@
-"""What a demonstration shows: the world, and below it who holds which end."""
+"""An episode of a policy with a simulated partner, and its film: the same every time, without a clock."""
 
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
-from copolicy.dataset.task import SceneView
+from copolicy.dataset.episode import Episode, EpisodeMeta
+from copolicy.dataset.task import PairTask, SceneView, get_task
 
+from ..agents import Policy, PolicyAgent, ScriptedAgent
 from ..replay.pictures import LAST_S
-from ..replay.track import Track, sampled
-from ..screen.canvas import Canvas
+from ..replay.track import Track, sampled, track_of
+from ..rollout import Rollout, Trace
+from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
 from ..screen.outline_view import scene_view
 from ..screen.palette import MUTED, TEXT
@@ -20,6 +25,57 @@ _CAPTION_Y = 646
 _TRAIL_STRIDE = 3  # steps
 
 
+def demonstrate(
+    policy: Policy,
+    scenario: Any,
+    partner: str = "S01",
+    seed: int = 0,
+    settings: Any = None,
+    task: PairTask | None = None,
+) -> Track:
+    """Lets a policy on the robot's seat and a simulated partner act to the end of the episode.
+
+    Chunks come as in real time, but the world waits for each, so that the speed of the machine changes nothing.
+
+    Args:
+        policy: at the robot's seat.
+        scenario: the map.
+        partner: name of a simulated pair, whose human is the partner.
+        seed: of the policy's noise and of the partner.
+        settings: of the world; the usual ones if None.
+        task: the table if None.
+
+    Raises:
+        InvalidValueError: the policy has learned another task.
+    """
+    task = task or get_task()
+    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
+    settings = settings or task.settings_type()
+    try:
+        rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], settings=settings)
+        trace = Trace(rollout)
+        while len(rollout.running):
+            robot.wait()
+            rollout.step()
+    finally:
+        robot.close()
+    name = task.name_of(scenario)
+    (outcome,) = rollout.outcomes
+    meta = EpisodeMeta(
+        "",
+        controller_0=robot.name,
+        controller_1=human.name,
+        **name.columns,
+        seed=seed,
+        source="simulated",
+        success=outcome.success,
+        termination_reason=outcome.reason,
+    )
+    states = task.states_of(trace.states(0))
+    episode = Episode(states[:-1], trace.actions(0), states[-1], meta, scenario, settings=settings, task=task.spec.name)
+    return track_of(Path(name.scenario), episode)
+
+
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
     """The pictures of an episode in order; the same surface each time, drawn anew.
 
@@ -29,8 +85,7 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed:
         frames_per_second: of the film.
         speed: times real time.
     """
-    # pygame 2.6 crashes where it draws smooth lines near the edge of a surface of 24 bits.
-    surface = pygame.Surface(size, depth=32)
+    surface = new_surface(size)
     view = scene_view(track.task, track.episode.scenario)
     positions = sampled(track, frames_per_second, speed)
     for position in [*positions, *[positions[-1]] * round(LAST_S * frames_per_second)]:

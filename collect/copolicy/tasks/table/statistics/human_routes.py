@@ -11,12 +11,12 @@ from importlib.resources import files
 
 import numpy as np
 
-from ..exceptions import FileFormatError
-from .entropy import jensen_shannon
-from .estimate import Estimate, Null
-from .resampling import interval
-from .route_entropy import MIN_EPISODES, routes_taken, word_entropy
-from .trajectories import Trajectories
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.statistics.entropy import jensen_shannon
+from copolicy.dataset.statistics.estimate import Estimate, Null
+from copolicy.dataset.statistics.resampling import interval
+from copolicy.dataset.statistics.route_entropy import MIN_EPISODES, word_entropy
+from copolicy.dataset.statistics.trajectories import Trajectories
 
 _LABELS = "human_passing_sides/train_passing_labels.csv"
 _MIRROR = str.maketrans("LR", "RL")
@@ -43,13 +43,22 @@ def human_route_entropy(rng: np.random.Generator) -> dict[str, dict]:
     return {f"{size}_obstacles": word_entropy(counts, size, rng) for size, counts in human_routes().items()}
 
 
+def human_reference(rng: np.random.Generator) -> dict[str, dict | str]:
+    """What these people did, as a part of the statistics' document."""
+    source = "Yang and Mavrogiannis, HRI 2025: passing sides of 330 human-human demonstrations; "
+    return {
+        "source": f"{source}labels, not trajectories (BSD-3-Clause)",
+        "routes": human_route_entropy(rng),
+    }
+
+
 def human_distance(data: Trajectories, rng: np.random.Generator) -> dict[str, Estimate]:
     """Jensen-Shannon divergence between the routes of a data set and the human ones, per number of obstacles.
 
     Whether the labels' left is our left is not documented, so both readings are computed and the smaller one is the
     value; the null takes the smaller of both as well.
     """
-    words = [word for word in routes_taken(data) if word is not None]
+    words = [word for word in data.labels if word is not None]
     reference = human_route_entropy(rng)
     estimates = {}
     for size, human in human_routes().items():

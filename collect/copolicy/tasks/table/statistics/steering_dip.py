@@ -5,9 +5,9 @@ from diptest import dipstat
 from diptest.consts import Consts
 from scipy.stats import false_discovery_control
 
-from .estimate import Estimate, Null
-from .resampling import Bootstrap
-from .trajectories import Trajectories
+from copolicy.dataset.statistics.estimate import Estimate, Null
+from copolicy.dataset.statistics.resampling import Bootstrap
+from copolicy.dataset.statistics.trajectories import Trajectories
 
 MIN_EPISODES = 8
 """Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""

@@ -1,0 +1,90 @@
+"""Two agents act on a set of scenarios, and what happened comes back as episodes."""
+
+import uuid
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.episode import Episode, EpisodeMeta
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.task import TABLE, get_task
+
+from .agents.named import make_agent
+from .rollout import Agent, Rollout, Trace
+
+
+def run_episodes(
+    robot: Agent | str,
+    human: Agent | str,
+    maps: str | Sequence[Any] = "holdout",
+    *,
+    task: str = TABLE,
+    limit: int | None = None,
+    seed: int = 0,
+    settings: Any = None,
+) -> list[Episode]:
+    """Lets two agents act on every scenario of a set, side by side, until each episode ends.
+
+        episodes = run_episodes("policy:pretrained", "scripted:stubborn", maps="unseen", limit=12)
+        np.mean([episode.meta.success for episode in episodes])
+
+    Args:
+        robot: at the robot's seat; an agent, or its name for `make_agent`.
+        human: at the human's seat; the same agent may not sit at both.
+        maps: name of a set of scenarios, a file of maps, or one of its splits as `FILE#split`; or scenarios themselves.
+        task: name of the task.
+        limit: number of scenarios, the first ones; all if None.
+        seed: of whatever agents draw at random; episode k gets `seed + k`.
+        settings: of the worlds; the task's defaults if None.
+
+    Returns:
+        One episode a scenario at the task's rate, in order; its `meta` says how it ended.
+
+    Raises:
+        UnknownNameError: no such agent or set.
+        InvalidValueError: one agent at both seats, or an agent at a seat that is not its own.
+        FileFormatError: a checkpoint, recording or file of maps that cannot be used.
+    """
+    found = get_task(task)
+    if limit is not None and limit < 1:
+        raise InvalidValueError("limit", "at least 1", limit)
+    scenarios = (found.scenario_set(maps).scenarios if isinstance(maps, str) else maps)[:limit]
+    if not scenarios:
+        raise InvalidValueError("maps", "at least one", "none")
+    if robot is human and not isinstance(robot, str):
+        raise InvalidValueError("human", "another agent than the robot's", robot.name)
+    agents = tuple(make_agent(agent, task) if isinstance(agent, str) else agent for agent in (robot, human))
+    seeds = [seed + index for index in range(len(scenarios))]
+    rollout = Rollout(found, scenarios, (agents[0], agents[1]), seeds=seeds, settings=settings)
+    trace = Trace(rollout)
+    rollout.run()
+    return [
+        _episode(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
+    ]
+
+
+def _episode(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+    task, outcome = rollout.task, rollout.outcomes[index]
+    states, actions = task.states_of(trace.states(index)), trace.actions(index)
+    robot, human = (agent.name for agent in rollout.agents)
+    name = task.name_of(scenario)
+    identity = f"{task.spec.name} {scenario.digest} {robot} {human} {seed}"
+    meta = EpisodeMeta(
+        episode_uuid=str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
+        controller_0=robot,
+        controller_1=human,
+        **name.columns,
+        seed=seed,
+        source="simulated",
+        success=outcome.success,
+        termination_reason=outcome.reason,
+        duration_s=len(actions) / task.spec.record_hz,
+        route_class=task.strategy(scenario, states) if outcome.success else "",
+        software_version=version("lerobot_policy_copolicy"),
+    )
+    return Episode(
+        states[:-1], np.asarray(actions), states[-1], meta, scenario,
+        fps=task.spec.record_hz, settings=settings, task=task.spec.name,
+    )  # fmt: skip

@@ -1,0 +1,20 @@
+"""Statistics of carrying a table beside the generic ones: sides of obstacles, people's routes, the steering's dip."""
+
+from copolicy.dataset.statistics.forces import FULL_FORCES
+from copolicy.dataset.task_parts import TaskStatistics
+
+from .human_routes import human_reference
+from .routes import route_statistics
+from .steering_dip import dip_statistics
+
+STATISTICS = TaskStatistics(
+    noun="table",
+    people="people carried the table",
+    velocity=(4, 5),
+    interaction="Interaction force: half the difference of both players' forces along the table, in units of a "
+    "player's full force; positive pulls apart.",
+    interaction_unit=FULL_FORCES,
+    label_bits=len,  # a letter an obstacle
+    families={"routes": route_statistics, "actions": dip_statistics},
+    reference=human_reference,
+)

@@ -1,0 +1,68 @@
+"""Routes of the table: on which side of each obstacle, and over maps with as many obstacles, beside people's."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import binomtest
+
+from copolicy.dataset.statistics.estimate import Estimate
+from copolicy.dataset.statistics.resampling import Bootstrap
+from copolicy.dataset.statistics.route_entropy import PASSED, labels_of, route_classes, word_entropy
+from copolicy.dataset.statistics.trajectories import Trajectories
+
+from ..routes import winding
+from .human_routes import human_distance
+
+CLEAR_WINDING = 0.1
+"""Turns around an obstacle below which the side is called unclear."""
+
+
+def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
+    """Sides of the obstacles, entropy over configurations, and the distance to people."""
+    taken = labels_of(data)
+    return {
+        "route_class": _route_class(data, taken),
+        "route_entropy_pooled": _pooled_entropy(data, taken, rng),
+        **human_distance(data, rng),
+    }
+
+
+def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
+    sides: dict[str, dict] = {}
+    unclear = 0
+    for index, word in taken.items():
+        path, obstacles = data.path(index), data.rows[index].map_config.obstacles
+        unclear += any(abs(winding(path, centre)) < CLEAR_WINDING for centre in obstacles)
+        entry = sides.setdefault(str(data.configurations[index]), {"episodes": 0, "left": [0] * len(word)})
+        entry["episodes"] += 1
+        entry["left"] = [left + (letter == "L") for left, letter in zip(entry["left"], word, strict=True)]
+    for entry in sides.values():
+        entry["left_interval"] = [
+            binomtest(left, entry["episodes"]).proportion_ci(method="wilson") for left in entry["left"]
+        ]
+    definition = (
+        "Episodes with a route class: for each obstacle the sign of the winding of the table's path around it, L below "
+        f"it on screen when carried to the right, R above; letters by atan2(y, x) of the obstacles. Of {PASSED}."
+    )
+    estimate = route_classes(data, taken, definition)
+    without, unlike = estimate.details.items()
+    own = (("unclear_side", unclear), ("left_by_obstacle", dict(sorted(sides.items()))))
+    return replace(estimate, details=dict((without, own[0], unlike, own[1])))
+
+
+def _pooled_entropy(data: Trajectories, taken: dict[int, str], rng: np.random.Generator) -> Estimate:
+    sizes = sorted({len(word) for word in taken.values()})
+    details = {
+        f"{size}_obstacles": word_entropy(Counter(word for word in taken.values() if len(word) == size), size, rng)
+        for size in sizes
+    }
+    return Estimate(
+        None,
+        "bits",
+        "Entropy of the route classes over all configurations with one, two and three obstacles (in details): it mixes "
+        "maps and is no measure of multimodality, but all that can be set beside labels that do not tell the map.",
+        len(taken),
+        note="one value a number of obstacles, in details",
+        details=details,
+    )

@@ -1,0 +1,195 @@
+"""A data set as notebooks and scripts read it: episodes as arrays, and one table of what is known of each."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+
+from .exceptions import CopolicyError, FileFormatError, InvalidValueError
+from .features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
+from .files.local_path import require_hub_name
+from .files.meta_files import RAW_FOLDER
+from .lerobot_folder.folder import POSITIONS, LeRobotFolder
+from .lerobot_folder.tables import pa
+from .physics_text import physics_of
+from .publication.repo_id import checked_repo_id
+from .task import PairTask
+
+_REWARD = "next.reward"
+
+
+def load_dataset(path: str | Path, revision: str | None = None) -> "PairDataset":
+    """A data set in a folder, or one on the Hub, of which everything but the recordings is downloaded.
+
+    Args:
+        path: a folder, `USER/NAME`, or `hf://datasets/USER/NAME`.
+        revision: tag, branch or commit on the Hub; `main` if None.
+
+    Raises:
+        FileFormatError: no such folder, or no LeRobot v3 data set of an installed task.
+        HubError: the Hub does not answer, or has no such data set or revision.
+        MissingExtraError: pyarrow is not installed, or for the Hub its client.
+    """
+    folder = Path(path)
+    if not folder.exists():
+        folder = _downloaded(str(path), revision)
+    elif revision is not None:
+        raise InvalidValueError("revision", f"None, since {path} is a folder", revision)
+    found = LeRobotFolder.open(folder)
+    found.require_task((STATE, ACTION, ENVIRONMENT_STATE))
+    return PairDataset(found)
+
+
+def _downloaded(text: str, revision: str | None) -> Path:
+    from .hub.client import hub_errors, snapshot_download
+    from .hub.repository import resolve
+
+    if revision is not None and "://" not in text:
+        repo_id = checked_repo_id(text, "path")
+    else:
+        repo_id = require_hub_name(text, "a folder, or USER/NAME of a data set on the Hub")
+    # By its commit: asked for a branch or tag while the Hub is away, the client takes an older copy and says nothing.
+    commit = resolve(repo_id, revision or "main")[1]
+    with hub_errors(repo_id, "downloading"):
+        skipped = f"{RAW_FOLDER}/*"
+        return Path(snapshot_download(repo_id, repo_type="dataset", revision=commit, ignore_patterns=skipped))
+
+
+@dataclass(frozen=True, repr=False)
+class DatasetEpisode:
+    """One episode at the rate of its data set.
+
+    Not an `Episode`: a data set keeps no state after the last action, and has columns that recordings do not have.
+
+    Attributes:
+        index: `episode_index`.
+        columns: what is known of it, by the names of `EpisodeMeta`.
+        states: `(T, n)`, by `TaskSpec.state`.
+        actions: `(T, 2 m)`, by `TaskSpec.joint_action`: robot, human.
+        past_human_actions: `(T, m)` the human's action of the frame before, zeros at first.
+        rewards: `(T,)` of the state that each frame leads to.
+        fps: frames a second.
+    """
+
+    index: int
+    columns: Mapping[str, Any]
+    states: np.ndarray
+    actions: np.ndarray
+    past_human_actions: np.ndarray
+    rewards: np.ndarray
+    fps: int
+    task: PairTask
+    scenario: Any
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __repr__(self) -> str:
+        about = ", ".join(str(self.columns[name]) for name in ("map_id", "source", "termination_reason"))
+        return f"DatasetEpisode({self.index}, states={self.states.shape}, actions={self.actions.shape}, {about})"
+
+    @property
+    def settings(self) -> Any:
+        """Of the world that led from state to state; None where the data set does not say."""
+        return physics_of(self.columns["physics"], self.task)
+
+    @property
+    def path(self) -> np.ndarray | None:
+        """`(T, 2)` the point that the task tracks; None where it tracks none."""
+        return self.task.path(self.states)
+
+    @property
+    def interaction(self) -> np.ndarray | None:
+        """`(T,)` what passes between the players, see `PairTask.interaction`; None where it is not measured."""
+        return self.task.interaction(self.states, self.actions)
+
+
+class PairDataset:
+    """A LeRobot v3 data set of a pair task.
+
+    Attributes:
+        root: its folder.
+        info: `meta/info.json`.
+        task: of its episodes.
+        fps: frames a second.
+        episodes: a sequence of `DatasetEpisode`; iterating holds one data file in memory, indexing all of them.
+    """
+
+    def __init__(self, folder: LeRobotFolder):
+        self._folder = folder
+        self.root = folder.root
+        self.info = folder.info
+        self.task = folder.task
+        self.fps = int(folder.info["fps"])
+        self.episodes = Episodes(folder, self.fps)
+
+    def __len__(self) -> int:
+        return len(self.episodes)
+
+    def __repr__(self) -> str:
+        sources = sorted({row["source"] for row in self._folder.rows(("source",))})
+        frames = sum(self._folder.lengths)
+        return (
+            f"PairDataset({self.root.name}: {len(self)} episodes of {self.task.spec.title}, {frames} frames at "
+            f"{self.fps} Hz, source: {', '.join(sources)})"
+        )
+
+    @property
+    def splits(self) -> dict[str, range]:
+        """Episodes of each split."""
+        return self._folder.splits
+
+    @cached_property
+    def table(self) -> pa.Table:
+        """One row an episode: `episode_index`, `length` and the episode columns; `.to_pandas()` where pandas is."""
+        keys = [name for name in self._folder.episodes.column_names if "/" not in name and name not in POSITIONS[2:]]
+        return self._folder.episodes.select(keys)
+
+
+class Episodes(Sequence[DatasetEpisode]):
+    """The episodes of a data set in order."""
+
+    def __init__(self, folder: LeRobotFolder, fps: int):
+        self._folder, self._fps = folder, fps
+        self._rows = folder.rows()
+        features = features_of(folder.task.spec)
+        self._shapes = {name: features[name]["shape"] for name in (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)}
+        self._shapes[_REWARD] = (1,)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __iter__(self) -> Iterator[DatasetEpisode]:
+        if "_loaded" in self.__dict__:
+            yield from self._loaded
+            return
+        for index, columns in self._folder.frames(self._shapes):
+            yield self._episode(index, columns)
+
+    @overload
+    def __getitem__(self, index: int) -> DatasetEpisode: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[DatasetEpisode]: ...
+    def __getitem__(self, index: int | slice) -> DatasetEpisode | list[DatasetEpisode]:
+        return self._loaded[index]
+
+    def __repr__(self) -> str:
+        return f"Episodes({len(self)} of {self._folder.root.name})"
+
+    @cached_property
+    def _loaded(self) -> list[DatasetEpisode]:
+        return [self._episode(index, columns) for index, columns in self._folder.frames(self._shapes)]
+
+    def _episode(self, index: int, columns: Mapping[str, np.ndarray]) -> DatasetEpisode:
+        row, task = self._rows[index], self._folder.task
+        try:
+            scenario = task.scenario_of_vector(columns[ENVIRONMENT_STATE][0].astype(float), row)
+        except CopolicyError as error:
+            raise FileFormatError(self._folder.root / "data", f"a scenario in episode {index}", str(error)) from None
+        return DatasetEpisode(
+            index, row, columns[STATE], columns[ACTION], columns[HUMAN_ACTION], columns[_REWARD].reshape(-1),
+            self._fps, task, scenario,
+        )  # fmt: skip
