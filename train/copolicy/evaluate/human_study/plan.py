@@ -233,7 +233,9 @@ def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> di
 
 
 def _digest(plan: StudyPlan) -> str:
-    configurations = [asdict(one) if is_dataclass(type(one)) else json.loads(one.to_json()) for one in plan.configurations]
+    configurations = [
+        asdict(one) if is_dataclass(type(one)) else json.loads(one.to_json()) for one in plan.configurations
+    ]
     for one in configurations:
         for later in ("obstacle_sizes", "named"):  # of later versions: plans without them keep their digest
             if later in one and not one[later]:
