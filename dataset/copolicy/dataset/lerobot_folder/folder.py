@@ -134,8 +134,8 @@ class LeRobotFolder:
         """
         expected = iter(enumerate(self.lengths))
         for number, group in groupby(self._parts(shapes), key=lambda part: part[0]):
-            _, path, columns = next(group)
-            for _, _, more in group:  # an episode that goes on in the next file
+            (_, path, columns), *rest = group
+            for _, _, more in rest:  # an episode that goes on in the next file
                 columns = {name: np.concatenate((values, more[name])) for name, values in columns.items()}
             due, found = next(expected, None), (number, len(columns["index"]))
             if found != due:
@@ -178,7 +178,7 @@ class LeRobotFolder:
 
 def _first_index(path: Path) -> int:
     """The least `index` of a file of frames."""
-    return int(feature_values(read_parquet(path, ["index"]), "index", (1,), path).min(initial=0))
+    return int(feature_values(read_parquet(path, ["index"]), "index", (1,), path).min(initial=2**62))
 
 
 def data_files(root: Path) -> list[Path]:
