@@ -94,5 +94,6 @@ def write_folder(data: Trajectories, root: Path, **columns) -> Path:
         for name, values in arrays.items()
     }
     parts["index"] = pa.array(np.arange(frames))
+    parts["episode_index"] = pa.array(data.episode)
     parquet.write_table(pa.table(parts), root / "data/chunk-000/file-000.parquet")
     return root

@@ -170,6 +170,8 @@ def test_a_task_without_an_outline_is_verified_and_not_drawn(peg, simulated, tmp
         assert "left out: the task 'peg' has no outline" in capsys.readouterr().err
     call = ["maps", "show", "right", "--task", "peg", "--out", str(tmp_path / "new" / "maps.png")]
     assert main(call) == 2
+    assert main(["play", "--task", "peg", "--pilots", "scripted", "scripted", "--out", str(tmp_path / "out")]) == 2
+    assert "left out: the task 'peg' has no outline" in capsys.readouterr().err.splitlines()[-1]
     assert not [path for path in tmp_path.iterdir() if path.name != "simulated"]
 
 

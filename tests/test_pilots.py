@@ -12,7 +12,7 @@ from copolicy.dataset.exceptions import InvalidValueError, ShapeError, UnknownNa
 from copolicy.tasks.table.agents import PAIRS, Habits, grid, simulated_pair
 from copolicy.tasks.table.agents.clearance import square_clearance, wall_clearance
 from copolicy.tasks.table.agents.cost_to_go import routes
-from copolicy.tasks.table.agents.partner_force import PartnerForce
+from copolicy.tasks.table.agents.intention import PartnerForce
 from copolicy.tasks.table.agents.scripted import ScriptedPilot
 from copolicy.tasks.table.features import state_vector, theta_of
 from copolicy.tasks.table.interaction import interaction_force

@@ -15,7 +15,7 @@ from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
 
 from .demonstration.command import add_demo_command
-from .map_commands import add_maps_command
+from .maps.command import add_maps_command
 from .play.command import add_play_command
 from .replay.command import add_replay_command
 from .simulate.recipes import RECIPES

@@ -262,7 +262,10 @@ class PairTask(ABC):
         return dict(zip(vector.names, limits.tolist(), strict=True))
 
     def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step."""
+        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step.
+
+        A task with angles in its state says what a whole turn is.
+        """
         return np.abs(recorded - other)
 
     def displaced(self, scenario: Any, scale: float, rng: np.random.Generator) -> Any:

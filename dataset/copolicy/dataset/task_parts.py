@@ -30,7 +30,7 @@ class Settings(Protocol):
 
     @property
     def step_limit(self) -> int:
-        """Steps after which an episode ends with the reason `timeout`."""
+        """A field: steps after which an episode ends with the reason `timeout`."""
         ...
 
 

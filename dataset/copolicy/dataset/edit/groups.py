@@ -4,6 +4,10 @@ from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Literal
 
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
 from ..scenarios import base_name
 from .selection import Row, consents_of
 
@@ -23,17 +27,25 @@ def groups(rows: Sequence[Row], motions: Sequence[Hashable], by: By, same_consen
         motions: a digest of each episode's states and actions.
         same_consent: `pairs` only; a consent id in two pairs is the same person.
     """
-    joined = _Joined(len(rows))
-    for place, (row, motion) in enumerate(zip(rows, motions, strict=True)):
-        joined.join(place, ("motion", motion))
-        if row.get("source_sha256"):
-            joined.join(place, ("recording", row["source_sha256"]))
-        for key in _keys(row, by, same_consent):
-            joined.join(place, key)
-    return joined.groups()
+    keys: dict[Hashable, int] = {}
+    edges = [
+        (place, len(rows) + keys.setdefault(key, len(keys)))
+        for place, (row, motion) in enumerate(zip(rows, motions, strict=True))
+        for key in (("motion", motion), *_keys(row, by, same_consent))
+    ]
+    if not edges:
+        return []
+    nodes = len(rows) + len(keys)
+    graph = coo_array((np.ones(len(edges)), tuple(zip(*edges, strict=True))), (nodes, nodes))
+    found: dict[int, list[int]] = defaultdict(list)
+    for place, component in enumerate(connected_components(graph, directed=False)[1][: len(rows)].tolist()):
+        found[component].append(place)
+    return list(found.values())
 
 
 def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
+    if row.get("source_sha256"):
+        yield "recording", row["source_sha256"]
     if by == "maps":
         yield "map", base_map(row)
     elif by == "pairs":
@@ -52,27 +64,3 @@ def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
 def base_map(row: Row) -> str:
     """The map of an episode, whatever its start orientation."""
     return base_name(row.get("map_id") or "")
-
-
-class _Joined:
-    """Places joined by the keys that they share (union-find)."""
-
-    def __init__(self, count: int):
-        self._parents = list(range(count))
-        self._seen: dict[Hashable, int] = {}
-
-    def join(self, place: int, key: Hashable) -> None:
-        a, b = self._root(place), self._root(self._seen.setdefault(key, place))
-        self._parents[max(a, b)] = min(a, b)
-
-    def _root(self, place: int) -> int:
-        while self._parents[place] != place:
-            self._parents[place] = self._parents[self._parents[place]]
-            place = self._parents[place]
-        return place
-
-    def groups(self) -> list[list[int]]:
-        found: dict[int, list[int]] = defaultdict(list)
-        for place in range(len(self._parents)):
-            found[self._root(place)].append(place)
-        return list(found.values())

@@ -68,11 +68,20 @@ def require_type[T](value: Any, kind: type[T], what: str, path: Path | str) -> T
     Raises:
         FileFormatError: it has another one; the line names where it is.
     """
+    converted(value, kind, what, path)
+    return value
+
+
+def converted[T](value: Any, kind: type[T], what: str, path: Path | str) -> T:
+    """A value as a dataclass; further keys are left out.
+
+    Raises:
+        FileFormatError: it is none; the line names where it is.
+    """
     try:
-        msgspec.convert(value, kind)
+        return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         raise _mismatch(str(error), what, path) from None
-    return value
 
 
 def _mismatch(message: str, what: str, path: Path | str) -> FileFormatError:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,8 @@ class LeRobotFolder:
     def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
         """Number and columns of each episode in order, `(T, n)` or `(T,)` each; one file is in memory at a time.
 
+        Rows are taken in the order of their `index`, whatever the order in a file and of the files.
+
         Args:
             shapes: of the columns, by name.
 
@@ -130,8 +133,26 @@ class LeRobotFolder:
                 holds other episodes than meta/episodes says.
         """
         expected = iter(enumerate(self.lengths))
-        for path in data_files(self.root):
+        for number, group in groupby(self._parts(shapes), key=lambda part: part[0]):
+            (_, path, columns), *rest = group
+            for _, _, more in rest:  # an episode that goes on in the next file
+                columns = {name: np.concatenate((values, more[name])) for name, values in columns.items()}
+            due, found = next(expected, None), (number, len(columns["index"]))
+            if found != due:
+                named = f"episode {due[0]} with {due[1]} frames" if due else "its end"
+                raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
+            yield number, {name: columns[name] for name in shapes}
+        if left := next(expected, None):
+            raise FileFormatError(self.root / "data", f"the frames of episode {left[0]}", "none")
+
+    def _parts(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, Path, dict[str, np.ndarray]]]:
+        """Number, file and columns of each run of rows of one episode, in the order of their `index`."""
+        shapes = {"index": (1,), **shapes}
+        for path in sorted(data_files(self.root), key=_first_index):
             table = read_parquet(path, ["episode_index", *shapes])
+            index, order = np.unique(feature_values(table, "index", (1,), path), return_index=True)
+            if len(index) == table.num_rows and (np.diff(order) < 0).any():
+                table = table.take(pa.array(order))
             numbers = feature_values(table, "episode_index", (1,), path)
             columns = {name: feature_values(table, name, shape, path) for name, shape in shapes.items()}
             columns |= {name: columns[name].reshape(len(numbers), -1) for name in VECTORS if name in columns}
@@ -140,13 +161,7 @@ class LeRobotFolder:
                     raise FileFormatError(path, f"finite {name}", "nan or inf")
             starts = np.flatnonzero(np.diff(numbers, prepend=-1)).tolist()
             for start, end in zip(starts, [*starts[1:], len(numbers)], strict=True):
-                due, found = next(expected, None), (int(numbers[start]), end - start)
-                if found != due:
-                    named = f"episode {due[0]} with {due[1]} frames" if due else "its end"
-                    raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
-                yield found[0], {name: values[start:end] for name, values in columns.items()}
-        if left := next(expected, None):
-            raise FileFormatError(self.root / "data", f"the frames of episode {left[0]}", "none")
+                yield int(numbers[start]), path, {name: values[start:end] for name, values in columns.items()}
 
     def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:
         """Checks that the data set is one of its task.
@@ -159,6 +174,11 @@ class LeRobotFolder:
         if difference:
             expected = f"a data set of {self.task.spec.title} (copolicy-convert)"
             raise FileFormatError(self.root / INFO_FILE, expected, difference)
+
+
+def _first_index(path: Path) -> int:
+    """The least `index` of a file of frames."""
+    return int(feature_values(read_parquet(path, ["index"]), "index", (1,), path).min(initial=2**62))
 
 
 def data_files(root: Path) -> list[Path]:

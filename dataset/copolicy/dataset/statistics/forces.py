@@ -27,21 +27,14 @@ def force_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Ge
     """Size of the interaction measure, conflict, and asymmetry of effort."""
     episodes = len(data.rows)
     effort = [data.per_episode(np.linalg.norm(data.force_of(player), axis=1)) for player in (0, 1)]
-    asymmetry, asymmetry_bounds = bootstrap.ratio(effort[0] - effort[1], effort[0] + effort[1])
-    return {
-        **_interaction(data, bootstrap),
-        **_conflict(data, bootstrap, rng),
-        "effort_asymmetry": Estimate(
-            asymmetry,
-            "1",
-            "(E0 - E1) / (E0 + E1) with E the mean size of a player's force: 1 where player 0 does all, 0 (the null) "
-            "where both work alike.",
-            episodes,
-            asymmetry_bounds,
-            bootstrap.resampled,
-            note="" if asymmetry is not None else "no player applies a force",
-        ),
-    }
+    both = effort[0] + effort[1]
+    definition = (
+        "(E0 - E1) / (E0 + E1) with E the mean size of a player's force: 1 where player 0 does all, 0 (the null) where "
+        "both work alike."
+    )
+    note = "" if both.any() else "no player applies a force"
+    asymmetry = bootstrap.estimate(effort[0] - effort[1], both, "1", definition, episodes, note=note)
+    return {**_interaction(data, bootstrap), **_conflict(data, bootstrap, rng), "effort_asymmetry": asymmetry}
 
 
 def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
@@ -49,20 +42,13 @@ def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate
     if not data.task.offers("interaction"):
         return left_out(data.task.missing("interaction measure"), *names)
     size, episodes, words = np.abs(data.force), len(data.rows), data.words
-    mean, mean_bounds = bootstrap.ratio(data.per_episode(size), data.lengths.astype(float))
     signed = dict(zip(map(str, PERCENTILES), np.percentile(data.force, PERCENTILES).tolist(), strict=True))
     top, top_bounds = _percentile_95(data, size, bootstrap)
-    definitions = (
-        f"{words.interaction} Mean size; percentiles of the signed force in details.",
-        f"{words.interaction} 95th percentile of its size.",
-    )
-    return {
-        names[0]: Estimate(
-            mean, words.interaction_unit, definitions[0], episodes, mean_bounds, bootstrap.resampled,
-            details={"signed_percentiles": signed},
-        ),
-        names[1]: Estimate(top, words.interaction_unit, definitions[1], episodes, top_bounds, bootstrap.resampled),
-    }  # fmt: skip
+    mean_of = f"{words.interaction} Mean size; percentiles of the signed force in details."
+    top_of, unit = f"{words.interaction} 95th percentile of its size.", words.interaction_unit
+    sums, details = data.per_episode(size), {"signed_percentiles": signed}
+    mean = bootstrap.estimate(sums, data.lengths.astype(float), unit, mean_of, episodes, details=details)
+    return dict(zip(names, (mean, Estimate(top, unit, top_of, episodes, top_bounds, bootstrap.resampled)), strict=True))
 
 
 def opposed_work(
@@ -124,31 +110,23 @@ def _percentile_95(data: Trajectories, size: np.ndarray, bootstrap: Bootstrap) -
 def activity_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
     """Idle and saturated share of each player's frames."""
     estimates = {}
-    frames = data.lengths.astype(float)
+    frames, episodes = data.lengths.astype(float), len(data.rows)
     for player, seat in enumerate(data.task.spec.players):
         action = data.force_of(player)
         idle = np.linalg.norm(action, axis=1) < IDLE_BELOW
         saturated = np.abs(action).max(axis=1) > SATURATED_ABOVE
         longest = longest_runs(idle, data.starts, data.lengths) / data.fps
-        share, bounds = bootstrap.ratio(data.per_episode(idle), frames)
-        estimates[f"idle_player_{player}"] = Estimate(
-            share,
-            "1",
+        definitions = (
             f"Share of frames in which player {player} ({seat} seat) applies less than {IDLE_BELOW:g} of a full force.",
-            len(data.rows),
-            bounds,
-            bootstrap.resampled,
-            details={"longest_s": float(longest.max()), "median_longest_of_an_episode_s": float(np.median(longest))},
-        )
-        share, bounds = bootstrap.ratio(data.per_episode(saturated), frames)
-        estimates[f"saturation_player_{player}"] = Estimate(
-            share,
-            "1",
             f"Share of frames in which a component of player {player}'s force ({seat} seat) is over "
             f"{SATURATED_ABOVE:g} of the full force.",
-            len(data.rows),
-            bounds,
-            bootstrap.resampled,
+        )
+        runs = {"longest_s": float(longest.max()), "median_longest_of_an_episode_s": float(np.median(longest))}
+        estimates[f"idle_player_{player}"] = bootstrap.estimate(
+            data.per_episode(idle), frames, "1", definitions[0], episodes, details=runs
+        )
+        estimates[f"saturation_player_{player}"] = bootstrap.estimate(
+            data.per_episode(saturated), frames, "1", definitions[1], episodes
         )
     return estimates
 

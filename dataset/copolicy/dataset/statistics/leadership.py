@@ -1,5 +1,7 @@
 """Who leads: whose action runs ahead of the partner's, how often that changes, against players turned in time."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from .estimate import Estimate, Null
@@ -76,29 +78,13 @@ def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
         turned = _per_episode(data, *leaders(data, order))
         shares.append(turned[0].sum() / max(turned[1].sum(), 1))
         rates.append(turned[2].sum() / turned[3].sum())
-    share, share_bounds = bootstrap.ratio(leading, decided)
-    rate, rate_bounds = bootstrap.ratio(switches, minutes)
-    episodes = int((decided > 0).sum())
+    episodes, counted = int((decided > 0).sum()), {"windows": len(lead), "windows_with_leader": int(decided.sum())}
+    share = bootstrap.estimate(leading, decided, "1", share_definition, episodes, details=counted)
+    noisy = switch_definition + " Noise switches often: hold it against its null."
+    rate = bootstrap.estimate(switches, minutes, "1/min", noisy, episodes)
     return {
-        "leadership_share": Estimate(
-            share,
-            "1",
-            share_definition,
-            episodes,
-            share_bounds,
-            bootstrap.resampled,
-            Null.of(_NULL, share or 0.0, np.array(shares), two_sided=True),
-            details={"windows": len(lead), "windows_with_leader": int(decided.sum())},
-        ),
-        "leadership_switches": Estimate(
-            rate,
-            "1/min",
-            switch_definition + " Noise switches often: hold it against its null.",
-            episodes,
-            rate_bounds,
-            bootstrap.resampled,
-            Null.of(_NULL, rate or 0.0, np.array(rates), two_sided=True),
-        ),
+        name: replace(estimate, null=Null.of(_NULL, estimate.value or 0.0, np.array(draws), two_sided=True))
+        for name, estimate, draws in (("leadership_share", share, shares), ("leadership_switches", rate, rates))
     }
 
 

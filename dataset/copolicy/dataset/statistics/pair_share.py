@@ -3,7 +3,7 @@
 import numpy as np
 
 from .estimate import Estimate, Null, left_out
-from .resampling import Bootstrap, exchangeable, interval, permuted_within
+from .resampling import Bootstrap, drawn_within, exchangeable, interval, permuted_within
 from .trajectories import Trajectories
 
 _PERMUTATIONS = 999
@@ -70,7 +70,7 @@ def _within_configurations(
     if not np.isfinite(value):
         return Estimate(None, "1", definition, len(chosen), note="nothing varies within a configuration")
     cells = np.unique(np.column_stack((strata, pairs)), axis=0, return_inverse=True)[1].ravel()
-    again = np.array([explained(values, pairs, strata, _drawn(cells, rng)) for _ in range(_PERMUTATIONS)])
+    again = np.array([explained(values, pairs, strata, drawn_within(cells, rng)) for _ in range(_PERMUTATIONS)])
     bounds = interval(value, again[np.isfinite(again)], 0.0, 1.0)
     draws = np.array([explained(values, permuted_within(pairs, strata, rng), strata) for _ in range(_PERMUTATIONS)])
     null = Null.of("pairs shuffled among the episodes of each configuration", value, draws)
@@ -105,12 +105,3 @@ def _by_configuration(
         bootstrap.resampled,
         Null.of("configurations shuffled among episodes", value, draws),
     )
-
-
-def _drawn(cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """How often each episode is drawn when those of each cell are drawn anew."""
-    order = np.argsort(cells, kind="stable")
-    sizes = np.bincount(cells)
-    begin = np.repeat(np.cumsum(sizes) - sizes, sizes)
-    places = begin + (rng.random(len(cells)) * np.repeat(sizes, sizes)).astype(int)
-    return np.bincount(order[places], minlength=len(cells)).astype(float)

@@ -1,6 +1,6 @@
 """Reads the episodes of a LeRobot v3 data set for its statistics: three columns of the frames, no images."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.info import split_range
-from ..lerobot_folder.tables import feature_values, read_parquet
+from ..lerobot_folder.tables import row_count
 from .trajectories import EpisodeRow, Trajectories
 
 _EPISODE_COLUMNS = (
@@ -35,15 +35,12 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
     info = folder.info
     rows = folder.rows(_EPISODE_COLUMNS)
-    states, actions, scenarios = _frames(folder)
     split_of = _splits(info.get("splits") or {}, len(rows))
     left_out = {"discarded": 0, "other_source": 0, "empty": 0}
     kept: list[tuple[np.ndarray, np.ndarray]] = []
     kept_rows: list[EpisodeRow] = []
-    begin = 0
-    for index, row in enumerate(rows):
-        frames = slice(begin, begin + row["length"])
-        begin += row["length"]
+    for index, frames in _frames(folder):
+        row = rows[index]
         reason = (
             "discarded" if row["discarded"]
             else "other_source" if source is not None and row["source"] != source
@@ -53,8 +50,8 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
         if reason:
             left_out[reason] += 1
             continue
-        kept.append((states[frames], actions[frames]))
-        kept_rows.append(_row(folder, row, scenarios[index], split_of[index]))
+        kept.append((frames[STATE], frames[ACTION]))
+        kept_rows.append(_row(folder, row, frames[ENVIRONMENT_STATE][0], split_of[index]))
     if not kept:
         raise RunError(f"{root}: expected an episode to describe, found {len(rows)}, left out {left_out}")
     return Trajectories.of(kept, kept_rows, int(info["fps"]), folder.task), {
@@ -62,27 +59,12 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     }
 
 
-def _frames(folder: LeRobotFolder) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States and actions of all frames, and the environment state of each episode."""
-    parts: dict[str, list[np.ndarray]] = {STATE: [], ACTION: [], ENVIRONMENT_STATE: []}
-    order: list[np.ndarray] = []
-    root, lengths, features = folder.root, folder.lengths, features_of(folder.task.spec)
-    for path in folder.data_files:
-        table = read_parquet(path, (*parts, "index"))
-        order.append(feature_values(table, "index", (1,), path))
-        for name in parts:
-            shape = features[name]["shape"]
-            parts[name].append(feature_values(table, name, shape, path).reshape(-1, *shape))
-    places = np.concatenate(order)
-    if len(places) != sum(lengths) or not np.array_equal(np.sort(places), np.arange(len(places))):
-        raise FileFormatError(root / "data", f"{sum(lengths)} frames with index 0, 1, ..., each once", f"{len(places)}")
-    by_index = np.argsort(places)
-    states, actions, environment = (np.concatenate(parts[name])[by_index] for name in parts)
-    for name, values in ((STATE, states), (ACTION, actions), (ENVIRONMENT_STATE, environment)):
-        if not np.isfinite(values).all():
-            raise FileFormatError(root / "data", f"finite {name}", "nan or inf")
-    firsts = np.cumsum([0, *lengths[:-1]])
-    return states, actions, environment[firsts]
+def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    total, found = sum(folder.lengths), sum(row_count(path) for path in folder.data_files)
+    if found != total:
+        raise FileFormatError(folder.root / "data", f"{total} frames with index 0, 1, ..., each once", f"{found}")
+    features = features_of(folder.task.spec)
+    return folder.frames({name: features[name]["shape"] for name in (STATE, ACTION, ENVIRONMENT_STATE)})
 
 
 def _row(folder: LeRobotFolder, row: dict[str, Any], vector: np.ndarray, split: str) -> EpisodeRow:

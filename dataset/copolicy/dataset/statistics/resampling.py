@@ -1,6 +1,10 @@
 """Chance: bootstrap over episodes or pairs, permutation within configurations, circular shifts in time."""
 
+from typing import Any
+
 import numpy as np
+
+from .estimate import Estimate
 
 MIN_CLUSTERS = 5
 """Pairs that it takes to draw pairs anew; with fewer, episodes are drawn, and the interval tells less."""
@@ -37,6 +41,13 @@ class Bootstrap:
         drawn = below != 0
         return value, interval(value, (self.weights[drawn] @ numerator) / below[drawn])
 
+    def estimate(
+        self, numerator: np.ndarray, denominator: np.ndarray, unit: str, definition: str, episodes: int, **more: Any
+    ) -> Estimate:
+        """The ratio as an estimate; `more` are further fields of it."""
+        value, bounds = self.ratio(numerator, denominator)
+        return Estimate(value, unit, definition, episodes, bounds, self.resampled, **more)
+
     def mean(self, values: np.ndarray) -> tuple[float | None, tuple[float, float] | None]:
         """Mean of a value of the episodes `(E,)` over those where it is finite, and its interval."""
         finite = np.isfinite(values)
@@ -63,6 +74,15 @@ def permuted_within(labels: np.ndarray, strata: np.ndarray, rng: np.random.Gener
     result = np.empty_like(labels)
     result[order] = labels[shuffled]
     return result
+
+
+def drawn_within(groups: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """`(E,)` how often each episode is drawn when those of each group `(E,)` are drawn anew."""
+    order = np.argsort(groups, kind="stable")
+    sizes = np.bincount(groups)
+    begin = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    places = begin + (rng.random(len(groups)) * np.repeat(sizes, sizes)).astype(int)
+    return np.bincount(order[places], minlength=len(groups)).astype(float)
 
 
 def exchangeable(labels: np.ndarray, strata: np.ndarray) -> int:

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from ..outline import Outline, Shape
 from .entropy import entropy, miller_madow
 from .estimate import Estimate, Null, left_out
-from .resampling import Bootstrap, exchangeable, interval, permuted_within
+from .resampling import Bootstrap, drawn_within, exchangeable, interval, permuted_within
 from .trajectories import Trajectories
 
 COLUMNS = 48
@@ -149,14 +149,7 @@ def _between_pairs(data: Trajectories, grid: Grid, counts: csr_matrix, groups, r
 
     value = divergence(data.pairs, np.ones(episodes))
     # Pairs are what is compared, so the episodes of each are drawn anew, not the pairs.
-    again = []
-    for _ in range(_REPLICATES):
-        weight = np.zeros(episodes)
-        order = np.argsort(data.pairs, kind="stable")
-        sizes = np.bincount(data.pairs)
-        begin = np.repeat(np.cumsum(sizes) - sizes, sizes)
-        np.add.at(weight, order[begin + (rng.random(episodes) * np.repeat(sizes, sizes)).astype(int)], 1.0)
-        again.append(divergence(data.pairs, weight))
+    again = [divergence(data.pairs, drawn_within(data.pairs, rng)) for _ in range(_REPLICATES)]
     bounds = interval(value, np.array(again), 0.0)
     if not movable:
         note = "no configuration was carried by two pairs: no null"

@@ -3,8 +3,8 @@
 import hashlib
 import math
 import struct
-from dataclasses import asdict, dataclass
-from typing import Any, TypedDict
+from dataclasses import dataclass
+from typing import Any
 
 from ..exceptions import InvalidValueError
 
@@ -75,26 +75,6 @@ class EpisodeContent:
     columns: dict[str, str]
 
 
-class EpisodeFields(TypedDict):
-    """An `EpisodeContent` in JSON."""
-
-    episode_uuid: str
-    digest: str
-    frames: int
-    features: dict[str, str]
-    columns: dict[str, str]
-
-
-class ContentFields(TypedDict):
-    """A `Content` in JSON."""
-
-    fps: float | int
-    robot_type: str | None
-    features: dict[str, Any]
-    tasks: list[str]
-    episodes: list[EpisodeFields]
-
-
 @dataclass(frozen=True)
 class Content:
     """Everything that two data sets are compared by."""
@@ -117,18 +97,3 @@ class Content:
             "episodes": [episode.digest for episode in self.episodes],
         }
         return f"{FORMAT}:sha256:{digest(fields)}"
-
-    def to_json(self) -> dict[str, Any]:
-        """For the record of a release."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, fields: ContentFields) -> "Content":
-        """The inverse of `to_json`."""
-        episodes = tuple(
-            EpisodeContent(
-                episode["episode_uuid"], episode["digest"], episode["frames"], episode["features"], episode["columns"]
-            )
-            for episode in fields["episodes"]
-        )
-        return cls(fields["fps"], fields["robot_type"], fields["features"], fields["tasks"], episodes)

@@ -3,12 +3,11 @@
 import hashlib
 import json
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TypedDict
 
 from ..exceptions import FileFormatError
-from ..files.json_file import parse_json, read_json
+from ..files.json_file import converted, parse_json, read_json
 from ..files.listing import is_hidden, visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER
 from .digests import digest
@@ -26,14 +25,10 @@ class FileEntry:
     sha256: str
 
 
-class _Entry(TypedDict):
-    size: int
-    sha256: str
-
-
-class _File(TypedDict):
+@dataclass(frozen=True)
+class _File:
     schema: str
-    files: dict[str, _Entry]
+    files: dict[str, FileEntry]
 
 
 @dataclass(frozen=True)
@@ -59,7 +54,7 @@ class Manifest:
         Raises:
             FileFormatError: none there, or something else.
         """
-        return cls._of(read_json(path, _File, _WHAT), path)
+        return cls._of(read_json(path, dict, _WHAT), path)
 
     @classmethod
     def from_text(cls, text: str, path: Path | str = MANIFEST_FILE) -> "Manifest":
@@ -71,18 +66,18 @@ class Manifest:
         Raises:
             FileFormatError: something else.
         """
-        return cls._of(parse_json(text, _File, _WHAT, path), path)
+        return cls._of(parse_json(text, dict, _WHAT, path), path)
 
     @classmethod
-    def _of(cls, fields: "_File", path: Path | str) -> "Manifest":
-        if fields["schema"] != _SCHEMA:
-            raise FileFormatError(path, _WHAT, f"schema {fields['schema']!r}")
-        return cls({name: FileEntry(entry["size"], entry["sha256"]) for name, entry in fields["files"].items()})
+    def _of(cls, fields: dict, path: Path | str) -> "Manifest":
+        stored = converted(fields, _File, _WHAT, path)
+        if stored.schema != _SCHEMA:
+            raise FileFormatError(path, _WHAT, f"schema {stored.schema!r}")
+        return cls(stored.files)
 
     def to_text(self) -> str:
         """The text of the file."""
-        files = {name: {"size": entry.size, "sha256": entry.sha256} for name, entry in sorted(self.files.items())}
-        return json.dumps({"schema": _SCHEMA, "files": files}, indent=2) + "\n"
+        return json.dumps(asdict(_File(_SCHEMA, dict(sorted(self.files.items())))), indent=2) + "\n"
 
     def differences(self, other: "Manifest", without: Collection[str] = ()) -> list[str]:
         """One line for each file but some that is not the same in both; `other` is what was found."""

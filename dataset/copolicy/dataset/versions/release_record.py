@@ -1,34 +1,18 @@
 """The record of a release, `meta/copolicy_release.json`: its version and everything to compare a later state with."""
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError, UnknownNameError
-from ..files.json_file import read_json
+from ..files.json_file import converted, read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EARLIER_FOLDER, RELEASE_FILE
 from ..publication.data_version import DataVersion
-from .digests import Content, ContentFields
+from .digests import Content
 from .withdrawals import is_anonymous
 
 _SCHEMA = "copolicy-release-1"
-
-
-class _Record(TypedDict):
-    """The file: schema and tag beside the fields of a `ReleaseRecord`."""
-
-    schema: str
-    tag: str
-    version: str
-    date: str
-    notes: str
-    changes: list[str]
-    content_hash: str
-    files_sha256: str
-    content: ContentFields
-    withdrawn: NotRequired[int]
 
 
 @dataclass(frozen=True)
@@ -58,7 +42,7 @@ class ReleaseRecord:
 
     def to_text(self) -> str:
         """The text of the file."""
-        record = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self), "content": self.content.to_json()}
+        record = {"schema": _SCHEMA, "tag": self.data_version.tag, **asdict(self)}
         if not self.withdrawn:
             del record["withdrawn"]  # as readers of earlier versions expect it
         return json.dumps(record, indent=1) + "\n"
@@ -71,11 +55,10 @@ class ReleaseRecord:
             FileFormatError: none there, or something else.
         """
         what = f"the record of a release ({_SCHEMA})"
-        stored = read_json(path, _Record, what)
-        if stored["schema"] != _SCHEMA:
-            raise FileFormatError(path, what, f"schema {stored['schema']!r}")
-        values: dict[str, Any] = {column.name: stored[column.name] for column in fields(cls) if column.name in stored}
-        record = cls(**{**values, "content": Content.from_json(stored["content"])})
+        stored = read_json(path, dict, what)
+        record = converted(stored, cls, what, path)
+        if stored.get("schema") != _SCHEMA:
+            raise FileFormatError(path, what, f"schema {stored.get('schema')!r}")
         # What was withdrawn after the release has no digest any more.
         anonymous = any(is_anonymous(episode) for episode in record.content.episodes)
         if not anonymous and record.content.hash != record.content_hash:

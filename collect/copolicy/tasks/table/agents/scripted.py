@@ -11,8 +11,7 @@ from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 from ..map_config import MapConfig
 from ..physics import Physics
 from .hand import UnsteadyHand
-from .intention import Intention
-from .partner_force import PartnerForce
+from .intention import Intention, PartnerForce
 from .profiles import Habits
 
 _GAIN = 2.0  # 1/s, how sharply it corrects the table's velocity

@@ -8,11 +8,11 @@ import numpy as np
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import PairTask
 
-from .replay.pictures import write_png
-from .screen.canvas import Canvas, new_surface
-from .screen.outline_view import outline_of, scene_view
-from .screen.palette import MUTED, TEXT
-from .sdl import pygame
+from ..replay.pictures import write_png
+from ..screen.canvas import Canvas, new_surface
+from ..screen.outline_view import outline_of, scene_view
+from ..screen.palette import MUTED, TEXT
+from ..sdl import pygame
 
 _GAP, _HEAD, _CAPTION = 12, 64, 26
 _SHEET = 1200

@@ -103,7 +103,7 @@ def _show(arguments: argparse.Namespace) -> dict[str, Any]:
     chosen = task.scenario_set(arguments.maps)
     if arguments.orientations:
         chosen = task.turned(chosen)
-    from .map_sheet import write_map_sheet  # pygame
+    from .sheet import write_map_sheet  # pygame
 
     size = write_map_sheet(task, chosen, arguments.out, arguments.width)
     return {**chosen.describe(), "maps": len(chosen.scenarios), "out": str(arguments.out), "size": list(size)}

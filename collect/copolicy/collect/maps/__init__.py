@@ -1,0 +1,1 @@
+"""Files of one's own maps, and sheets of any set."""
