@@ -82,7 +82,7 @@ def build_payload(
         elif not rows:
             missing["interaction"] = left_out(facts.task, "interaction measure")
         if not rows and facts.task.path(frames.states) is None:
-            missing["drift"] = left_out(facts.task, "path by which a re-simulation is compared")
+            missing["drift"] = left_out(facts.task, "tracked point")
         rows.append(row)
         blocks.append(block)
         start += len(block)
