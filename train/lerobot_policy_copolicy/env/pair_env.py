@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from copolicy.collect.agents import HeldAgent, ScriptedAgent
-from copolicy.collect.agents.scripted import pair_name
+from copolicy.collect.agents.simulated import pair_name
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
