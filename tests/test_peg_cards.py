@@ -46,6 +46,16 @@ def test_a_card_speaks_of_its_own_task(peg_set, capsys):
     assert "citeAs" not in metadata
 
 
+def test_statistics_that_the_task_lacks_are_named_with_the_reason(peg_set, capsys):
+    from copolicy.dataset.cli import main as dataset
+
+    assert dataset(["stats", str(peg_set)]) == 0
+    card = card_of(peg_set)
+    assert "routes: route entropy" not in "".join(line for line in card.splitlines() if line.startswith("|"))
+    assert ": left out: the task 'peg' has no strategy labels" in card
+    assert "| leadership: leadership share |" in card
+
+
 def test_a_task_without_an_outline_has_no_figures(peg, peg_set, monkeypatch, capsys):
     monkeypatch.setattr(type(peg), "outline", None)
     assert "Figures of paths: left out: the task 'peg' has no outline." in card_of(peg_set)
@@ -62,7 +72,7 @@ def test_the_page_draws_the_outline_and_leaves_out_what_is_lacking(peg_set, visi
     text = page.locator("body").inner_text()
     words = {match[0].lower() for match in OF_THE_TABLE.findall(text.replace("Heat maps", ""))}
     assert words <= {"obstacles", "obstacle"}  # panels are by sets of obstacles, whatever the task
-    for part in ("strategy labels", "interaction measure", "path by which a re-simulation is compared"):
+    for part in ("strategy labels", "interaction measure", "tracked point"):
         assert f"Left out: the task 'peg' has no {part}." in text
     assert [head.inner_text() for head in page.locator("#pair-table th[scope=col]").all()] == [
         "Pair", "Source", "Episodes", "Success", "Duration, s",

@@ -92,7 +92,7 @@ def _by_obstacles(facts: DatasetFacts, outline: Outline) -> tuple[int, list[Grou
     """How many sets of obstacles there are; title and members of the most frequent, fewest obstacles first."""
     groups: dict[tuple, list[DrawnEpisode]] = defaultdict(list)
     for row, frames in zip(facts.episodes, read_frames(facts), strict=True):
-        episode = DrawnEpisode(row, outline.poses(frames.states)[:, :2], outline.fixed(frames.scenario))
+        episode = DrawnEpisode(row, outline.poses(frames.states)[:, :2], outline.fixed(frames.map_config))
         groups[obstacles_of(episode.fixed)].append(episode)
     largest = sorted(groups, key=lambda key: -len(groups[key]))[:_MOST_PANELS]
     return len(groups), [

@@ -21,12 +21,13 @@ class EpisodeFrames:
         index: `episode_index`.
         states: `(T, n)`, as the task's spec names them.
         actions: `(T, m)`, robot first.
+        map_config: the scenario.
     """
 
     index: int
     states: np.ndarray
     actions: np.ndarray
-    scenario: Any
+    map_config: Any
     task: PairTask
 
     @property

@@ -1,5 +1,6 @@
 """The section of a card on how many ways the data set shows of doing the same thing."""
 
+from collections import defaultdict
 from typing import Any
 
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
@@ -16,7 +17,13 @@ def multimodality(facts: DatasetFacts) -> str:
     heading = "## Multimodality"
     if stored is None:
         return f"{heading}\n\nNot computed: `copolicy-dataset stats` was not run on this data set."
-    entries = estimates(stored)
+    entries, lacking = [], defaultdict(list)
+    for entry in estimates(stored):
+        if (note := str(entry.get("note") or "")).startswith("left out:"):
+            lacking[note].append(entry["name"])
+        else:
+            entries.append(entry)
+    absent = ["\n".join(f"- {', '.join(names)}: {note}" for note, names in lacking.items())] if lacking else []
     rows = [
         (entry["name"], number(entry["value"]), entry["unit"], _interval(entry.get("interval")),
          _null(entry.get("null")), number(entry.get("episodes")))
@@ -30,6 +37,7 @@ def multimodality(facts: DatasetFacts) -> str:
             heading,
             *_origin(stored, facts),
             table(("statistic", "value", "unit", "95 % interval", "by chance", "episodes"), rows),
+            *absent,
             *_routes(route_statistics(stored)),
             f"<details><summary>Definitions</summary>\n\n{definitions}\n\n</details>",
         )

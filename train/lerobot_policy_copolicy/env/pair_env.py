@@ -12,6 +12,7 @@ from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import OBSERVATION_KEYS, bounds_of
+from copolicy.dataset.task import SceneView
 
 from .configuration import PairTaskEnvConfig
 
@@ -101,6 +102,7 @@ class PairEnv(gymnasium.Env):
             raise InvalidValueError("map_index", f"0 to {len(self.maps) - 1}", index)
         self._next_map = (index + 1) % len(self.maps)
         self.map_index, scenario = int(index), self.maps[index]
+        self._view: SceneView | None = None
         self._environment = self.pair_task.scenario_vector(scenario).astype(np.float32)
         self._given = HeldAgent(np.zeros(self._size)), HeldAgent(np.zeros(self._size))
         agents, seed = self._given, 0
@@ -155,8 +157,9 @@ class PairEnv(gymnasium.Env):
         size = _WIDTH, round(_WIDTH * outline.size[1] / outline.size[0])
         surface = pygame.Surface(size, depth=24)
         (pose,), (forces,) = outline.poses(self.world.observation[None]), outline.forces(self._action[None])
-        view = scene_view(self.pair_task, self.maps[self.map_index])
-        view.draw(surface, surface.get_rect(), tuple(pose.tolist()), forces.tolist())
+        if self._view is None:  # it keeps what stands still
+            self._view = scene_view(self.pair_task, self.maps[self.map_index])
+        self._view.draw(surface, surface.get_rect(), tuple(pose.tolist()), forces.tolist())
         return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(*size[::-1], 3)
 
     def _observation(self) -> dict[str, Any]:

@@ -75,14 +75,14 @@ def build_payload(
         block = _block(frames, outline, interaction)[::step]
         row = {name: _finite(episode[name]) for name in _COLUMNS} | {"from": start, "frames": len(block)}
         if outline is not None:
-            row["scene"] = scenes.setdefault(outline.fixed(frames.scenario), len(scenes))
+            row["scene"] = scenes.setdefault(outline.fixed(frames.map_config), len(scenes))
         if interaction is not None:
             size = np.abs(interaction)
             row |= {"force_mean": float(size.mean()), "force_p95": float(np.quantile(size, 0.95))}
         elif not rows:
             missing["interaction"] = left_out(facts.task, "interaction measure")
         if not rows and facts.task.path(frames.states) is None:
-            missing["drift"] = left_out(facts.task, "path by which a re-simulation is compared")
+            missing["drift"] = left_out(facts.task, "tracked point")
         rows.append(row)
         blocks.append(block)
         start += len(block)

@@ -155,9 +155,9 @@ class TableTask(PairTask):
 
     def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The table on its map, as `SceneImage` draws it."""
-        from .artist.scene_image import SceneImage  # pygame
+        from .artist.scene_image import scene_image  # pygame
 
-        image = SceneImage(scenario, size)
+        image = scene_image(scenario, size)
         for (x, y), theta in zip(states[:, :2].tolist(), theta_of(states).tolist(), strict=True):
             yield image.draw((x, y, theta))
 

@@ -1,5 +1,7 @@
 """The image of the scene that policies see, drawn without a display: in videos of data sets and in the environment."""
 
+import functools
+
 import numpy as np
 
 from copolicy.collect.screen.canvas import new_surface
@@ -27,3 +29,9 @@ class SceneImage:
         """The image at a pose (px, px, rad): `(height, width, 3)` uint8."""
         self._view.draw(self._surface, self._surface.get_rect(), pose)
         return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))
+
+
+@functools.lru_cache(maxsize=4)
+def scene_image(map_config: MapConfig, size: tuple[int, int]) -> SceneImage:
+    """One that may have drawn its map before: an environment asks for an image at a time."""
+    return SceneImage(map_config, size)
