@@ -115,7 +115,7 @@ class EpisodeTable:
         """One finding for every episode that a mask `(E,)` or `(F,)` marks, with its own figure."""
         places = self.framed if len(where) == len(self.framed) else range(len(self.labels))
         for place in np.flatnonzero(where):
-            figure = figures[place]
+            figure: Any = figures[place]
             plain = figure.item() if isinstance(figure, np.generic) else figure
             yield Finding(self.labels[places[place]], rule, plain, limit, severity, message)
 
