@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 _BLOCK = re.compile(r"^(?:<!-- ([a-z ]+)(?:: (.*))? -->\n)?```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_ELSEWHERE = ("uv run copolicy-quickstart", "uv run pytest")
+_ELSEWHERE = ("copolicy-quickstart", "pytest")
 """Commands that the continuous integration and `tests/test_quickstart.py` run."""
 
 
@@ -44,7 +44,8 @@ def commands(block: Block) -> Iterator[str]:
     """The commands of a block as they can be run here."""
     lines = (line.split("  #")[0].rstrip() for line in block.text.replace("\\\n", " ").splitlines())
     for line in filter(None, lines):
-        if re.match(r"(uv run )?copolicy-collect play\b", line):
+        line = line.removeprefix("uv run ")  # the caller's PATH has the commands
+        if line.startswith("copolicy-collect play "):
             line = re.sub(r"\b(keyboard|joystick)\b", "scripted", line) + " --headless --episodes 1"
             line += "" if "--pilots" in line else " --pilots scripted scripted"
         if not line.startswith(_ELSEWHERE):
