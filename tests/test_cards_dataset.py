@@ -11,6 +11,7 @@ from report_page import route_document
 from copolicy.cards.cli import main
 from copolicy.cards.dataset_card import render
 from copolicy.cards.facts import DatasetFacts
+from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.limits import RULES_VERSION
 from copolicy.dataset.cli import main as dataset_command
@@ -275,3 +276,22 @@ def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
     assert "| 3 | stick unplugged |" in text
     assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text
     assert "its own trainer and loader take every episode unless they" in text
+
+
+def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):
+    # Path modes and dips are then counted in the configuration, which few episodes leave out.
+    lab, recordings, root = tmp_path / "one.yaml", tmp_path / "recordings", tmp_path / "set"
+    assert collect(["maps", "make", "--count", "1", "--bounds", "obstacles=1", "--seed", "1", "--out", str(lab)]) == 0
+    simulate = ["simulate", "--maps", str(lab), "--episodes", "10", "--seed", "1", "--out", str(recordings)]
+    assert collect([*simulate, "--workers", "1"]) == 0
+    assert convert(["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/one", "--license", "cc0-1.0"]) == 0
+    assert dataset_command(["stats", str(root)]) == 0
+    stored = json.loads((root / "meta" / "copolicy_stats.json").read_text(encoding="utf-8"))["statistics"]
+    estimates = [estimate for family in stored.values() for estimate in family.values()]
+    details = [entry for one in estimates for entry in one.get("details", {}).get("configurations", {}).values()]
+    assert any("counts" in entry for entry in details)
+    assert any("counts" not in entry for entry in details)
+    capsys.readouterr()
+    assert main(["dataset", str(root), "--repo-id", "lab/one", "--overwrite"]) == 0, capsys.readouterr().err
+    assert main(["report", str(root), "--out", str(tmp_path / "page.html")]) == 0, capsys.readouterr().err
+    assert "H(route" in (root / "README.md").read_text(encoding="utf-8")

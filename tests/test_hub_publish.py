@@ -150,6 +150,12 @@ def test_a_card_made_after_the_release_is_published_with_a_fitting_manifest(hub,
     assert is_published(hub, dataset)
 
 
+def test_croissant_made_after_the_release_is_published_too(hub, dataset, publish):
+    (dataset / "meta" / "croissant.json").write_text('{"@type": "sc:Dataset"}', encoding="utf-8")
+    assert publish().status == 0
+    assert is_published(hub, dataset)
+
+
 REFUSED = {
     "no release": (
         lambda root: (root / "meta/copolicy_release.json").unlink(),

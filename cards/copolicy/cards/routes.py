@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files.meta_files import STATISTICS_FILE
+
 _MIRROR = str.maketrans("LR", "RL")
 _PLAYED = {"human": "people", "simulated": "simulated pairs", "upstream": "pairs of the original's files"}
 
@@ -62,13 +65,20 @@ class RouteStatistics:
 
 
 def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
-    """The routes in `meta/copolicy_stats.json`, None where it holds nothing about them."""
+    """The routes in `meta/copolicy_stats.json`, None where it holds nothing about them.
+
+    Raises:
+        FileFormatError: a configuration without its routes.
+    """
     family = stored.get("statistics", {}).get("routes")
     if not isinstance(family, dict):
         return None
     stated = family.get("route_entropy")
     details = (stated or {}).get("details", {})
     configurations = details.get("configurations", {})
+    without = [name for name, entry in configurations.items() if "counts" not in entry]
+    if without:
+        raise FileFormatError(STATISTICS_FILE, "routes of each configuration (run copolicy-dataset stats)", without[0])
     entropy = None
     if stated is not None:
         entropy = {name: entry for name, entry in stated.items() if name != "details"}

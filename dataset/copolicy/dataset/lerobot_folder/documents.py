@@ -19,10 +19,10 @@ class _Routes(TypedDict, total=False):
 
 
 class Configuration(TypedDict):
-    """The routes of one configuration of obstacles."""
+    """What a statistic says of one configuration; `counts` are those of routes."""
 
     episodes: int
-    counts: dict[str, int]
+    counts: NotRequired[dict[str, int]]
     entropy_bits: NotRequired[Number]
     interval: NotRequired[tuple[Number, Number] | None]
     effective_modes: NotRequired[Number]

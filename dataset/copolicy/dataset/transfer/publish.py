@@ -12,7 +12,14 @@ from typing import Any
 from ..checks.checking import check_dataset
 from ..exceptions import FileFormatError, RunError
 from ..files.json_file import parse_json
-from ..files.meta_files import CARD_FILE, CHECK_FILE, MANIFEST_FILE, RAW_MANIFEST_FILE, RELEASE_FILE
+from ..files.meta_files import (
+    CARD_FILE,
+    CHECK_FILE,
+    CROISSANT_FILE,
+    MANIFEST_FILE,
+    RAW_MANIFEST_FILE,
+    RELEASE_FILE,
+)
 from ..files.staging import replace_text
 from ..hub.client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_api, hub_errors
 from ..hub.repository import BRANCH, Repository, read_file, read_repository
@@ -115,8 +122,8 @@ def _require_none_excluded(root: Path) -> None:
 def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     """Checks that the folder holds what its newest release says, and brings the manifest up to date with the card.
 
-    Card, figures and report may be made anew after a release, so that they can name its version, and so may the
-    findings of a check; data and other metadata may not change.
+    Card, figures, report and Croissant's description may be made anew after a release, so that they can name its
+    version, and so may the findings of a check; data and other metadata may not change.
 
     Raises:
         FileFormatError: no release, no card, a damaged manifest, or a folder that is no data set.
@@ -129,7 +136,8 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
     released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
     differences = released.differences(present)
-    changed = [line for line in released.differences(present, without={CHECK_FILE}) if line.startswith(_CHECKED)]
+    about = {CHECK_FILE, CROISSANT_FILE}
+    changed = [line for line in released.differences(present, without=about) if line.startswith(_CHECKED)]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"
