@@ -44,7 +44,7 @@ def _rooms_imported(path: Path) -> set[str]:
 
 
 def _files(folder: str) -> list[Path]:
-    files = sorted((ROOT / folder).rglob("*.py"))
+    files = sorted(path for path in (ROOT / folder).rglob("*.py") if "examples" not in path.parts)
     assert files, f"no source under {folder}/"
     return files
 
@@ -73,7 +73,7 @@ def _modules() -> dict[str, Path]:
     """Every module by its absolute name."""
     found = {}
     for room in ROOMS:
-        for path in (ROOT / room).rglob("*.py"):
+        for path in _files(room):
             parts = path.relative_to(ROOT / room).with_suffix("").parts
             found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found

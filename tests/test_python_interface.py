@@ -1,5 +1,6 @@
 """What a notebook imports from a room: it is there, it is light, and it says the same as the commands."""
 
+import json
 import subprocess
 import sys
 from importlib import import_module
@@ -14,8 +15,10 @@ from copolicy.collect import make_agent, run_episodes
 from copolicy.dataset import load_dataset, read_episode
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.listing import distinct_files
+from copolicy.evaluate import compare_episodes, coplan_episodes, success
+from copolicy.evaluate.cli import main as evaluate
 
-ROOMS = ("copolicy.dataset", "copolicy.collect")
+ROOMS = ("copolicy.dataset", "copolicy.collect", "copolicy.evaluate")
 HEAVY = ("torch", "lerobot", "datasets", "pandas", "matplotlib", "pymunk", "pygame", "scipy", "pyarrow")
 
 
@@ -143,3 +146,39 @@ def test_a_call_without_sense_is_refused():
         run_episodes("nothing", "nothing", [])
     with pytest.raises(UnknownNameError, match="unknown map set 'moon'"):
         run_episodes("nothing", "nothing", "moon")
+    with pytest.raises(InvalidValueError, match="robot: expected a policy, which acts for both players"):
+        run_episodes("nothing", None)
+
+
+def test_co_planning_is_that_of_the_command(tmp_path):
+    out = tmp_path / "eval.json"
+    flags = ["--maps", "unseen", "--limit", "2", "--seed", "4", "--out", str(out)]
+    assert evaluate(["coplan", "--policy", "pretrained", *flags]) == 0
+    stored = json.loads(out.read_text(encoding="utf-8"))
+    episodes = coplan_episodes("pretrained", "unseen", limit=2, seed=4)
+    assert success(episodes) == stored["summary"]["success"]
+    for row, episode in zip(stored["episodes"], episodes, strict=True):
+        assert (row["success"], row["reason"]) == (episode.meta.success, episode.meta.termination_reason)
+        assert (row["map_id"], row["steps"]) == (episode.meta.map_id, len(episode.actions))
+    again = coplan_episodes("pretrained", "unseen", limit=2, seed=5)
+    difference = compare_episodes(episodes, again)
+    expected = np.mean(
+        [one.meta.duration_s - other.meta.duration_s for one, other in zip(episodes, again, strict=True)]
+    )
+    assert difference["time_s"]["mean"] == pytest.approx(expected)
+    force = np.mean([row["interaction_mean"] for row in stored["episodes"]])
+    still = compare_episodes(episodes, run_episodes("nothing", "scripted:stubborn", "unseen", limit=2))
+    assert difference["interaction_mean"]["pairs"] == 2
+    assert still["interaction_mean"]["mean"] < force
+    assert set(difference) == {"success", "time_s", "interaction_mean", "interaction_p95"}
+
+
+def test_studies_without_sense_are_refused():
+    with pytest.raises(InvalidValueError, match="episodes: expected at least one, found 'none'"):
+        success([])
+    (one,) = run_episodes("nothing", "nothing", "holdout", limit=1)
+    (other,) = run_episodes("nothing", "nothing", "unseen", limit=1)
+    with pytest.raises(InvalidValueError, match="second: expected the 1 starts of the first, in order"):
+        compare_episodes([one], [other])
+    with pytest.raises(InvalidValueError, match=r"n_action_steps: expected 1 to [0-9]+, the actions of a chunk"):
+        coplan_episodes(n_action_steps=99, limit=1)

@@ -12,12 +12,13 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import TABLE, get_task
 
 from .agents.named import make_agent
+from .agents.policy import PolicyAgent
 from .rollout import Agent, Rollout, Trace
 
 
 def run_episodes(
     robot: Agent | str,
-    human: Agent | str,
+    human: Agent | str | None,
     maps: str | Sequence[Any] = "holdout",
     *,
     task: str = TABLE,
@@ -32,7 +33,8 @@ def run_episodes(
 
     Args:
         robot: at the robot's seat; an agent, or its name for `make_agent`.
-        human: at the human's seat; the same agent may not sit at both.
+        human: at the human's seat; the same agent may not sit at both. None: the robot's policy acts for both players
+            (co-planning).
         maps: name of a set of scenarios, a file of maps, or one of its splits as `FILE#split`; or scenarios themselves.
         task: name of the task.
         limit: number of scenarios, the first ones; all if None.
@@ -44,7 +46,8 @@ def run_episodes(
 
     Raises:
         UnknownNameError: no such agent or set.
-        InvalidValueError: one agent at both seats, or an agent at a seat that is not its own.
+        InvalidValueError: one agent at both seats, an agent at a seat that is not its own, or none at the human's
+            beside a robot that is no policy.
         FileFormatError: a checkpoint, recording or file of maps that cannot be used.
     """
     found = get_task(task)
@@ -55,9 +58,15 @@ def run_episodes(
         raise InvalidValueError("maps", "at least one", "none")
     if robot is human and not isinstance(robot, str):
         raise InvalidValueError("human", "another agent than the robot's", robot.name)
-    agents = tuple(make_agent(agent, task) if isinstance(agent, str) else agent for agent in (robot, human))
+    first = make_agent(robot, task) if isinstance(robot, str) else robot
+    if human is None:
+        if not isinstance(first, PolicyAgent):
+            raise InvalidValueError("robot", "a policy, which acts for both players", first.name)
+        second: Agent = first.other_half()
+    else:
+        second = make_agent(human, task) if isinstance(human, str) else human
     seeds = [seed + index for index in range(len(scenarios))]
-    rollout = Rollout(found, scenarios, (agents[0], agents[1]), seeds=seeds, settings=settings)
+    rollout = Rollout(found, scenarios, (first, second), seeds=seeds, settings=settings)
     trace = Trace(rollout)
     rollout.run()
     return [
