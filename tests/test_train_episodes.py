@@ -172,7 +172,7 @@ def test_a_loop_of_ones_own_is_stopped_at_an_excluded_frame(copied_table):
 
 def test_a_data_set_beside_the_policy_is_seen(copied_table):
     mark_discarded(copied_table, (1,))
-    config = SimpleNamespace(fps=None, physics=None, physics_mixture={})
+    config = SimpleNamespace(fps=None, physics=None, physics_mixture={}, filled=SimpleNamespace(task="table"))
     data = windows(copied_table, episodes=[0, 2])
     assert prepare_training(config, data.meta) == frozenset()  # pyright: ignore[reportArgumentType]
     data = windows(copied_table, episodes=[0, 1])
