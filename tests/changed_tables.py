@@ -13,7 +13,9 @@ BY_NAME = {rule.name: rule for rule in rules_of(get_task())}
 
 
 def find(table: EpisodeTable, rule: str) -> list[Finding]:
-    return list(BY_NAME[rule].find(table))
+    search = BY_NAME[rule].find
+    assert search is not None
+    return list(search(table))
 
 
 def of(findings: list[Finding]) -> list[tuple[str, str]]:

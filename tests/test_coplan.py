@@ -66,6 +66,8 @@ def test_a_replayed_demonstration_reaches_its_goal_on_its_path():
     for outcome, (actions, path) in zip(outcomes, recorded, strict=True):
         assert outcome.success
         assert outcome.reason == "goal"
+        assert outcome.path is not None
+        assert outcome.interaction is not None
         steps = min(len(path), len(outcome.path))
         assert np.abs(outcome.path[:steps] - path[:steps]).max() < 2.0
         assert outcome.plans == -(-outcome.steps // 24)

@@ -100,6 +100,7 @@ def test_each_plan_goes_its_way(left, right):
         np.testing.assert_array_equal(sample.plan, actions[:10])  # whole, whatever is executed of it
         assert sample.planned_path.shape == (31, 2)
         assert np.abs(sample.planned_path - path[:31]).max() < 1.0
+        assert sample.outcome.path is not None
         steps = min(len(path), len(sample.outcome.path))
         assert np.abs(sample.outcome.path[:steps] - path[:steps]).max() < 2.0
         assert sample.outcome.plans == -(-sample.outcome.steps // 24)
@@ -114,6 +115,7 @@ def test_plans_are_sampled_some_way_into_an_episode(left):
     assert np.abs(decision.way - left[1][:49]).max() < 2.0
     assert decision.pose[:2] == tuple(decision.way[-1])
     for sample in decision.samples:
+        assert sample.outcome.path is not None
         np.testing.assert_array_equal(sample.outcome.path[:49], decision.way)
         np.testing.assert_array_equal(sample.planned_path[0], decision.way[-1])
         np.testing.assert_array_equal(sample.plan, left[0][16:26])

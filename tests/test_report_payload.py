@@ -28,6 +28,7 @@ def test_frames_survive_their_packing(report_set):
         np.testing.assert_allclose(np.cos(part[:, 2]), frames.states[:, 2], atol=1e-4)
         np.testing.assert_allclose(np.sin(part[:, 2]), frames.states[:, 3], atol=1e-4)
         np.testing.assert_allclose(part[:, 3:7], frames.actions, atol=2e-5)
+        assert frames.interaction is not None
         np.testing.assert_allclose(part[:, 7], frames.interaction, atol=3e-5)
 
 

@@ -51,6 +51,7 @@ def test_scrubbing_shows_the_recorded_forces(visit, report, report_set):
     expect(page.locator("#player-title")).to_have_text("Episode 4")
     frames = next(frames for frames in read_frames(DatasetFacts.read(report_set)) if frames.index == 4)
     page.locator("#scrub").fill("25")
+    assert frames.interaction is not None
     robot, human = np.hypot(*frames.actions[25, :2]), np.hypot(*frames.actions[25, 2:])
     expect(page.locator("#player-readout")).to_contain_text(
         f"2.5 of {(len(frames.actions) - 1) / 10:.1f} s · robot seat ▲ {robot:.2f} · human seat ● {human:.2f} · "

@@ -43,7 +43,7 @@ SUCCESS_MARGIN, ENTROPY_MARGIN = 0.02, 0.1
 
 def route_entropy(outcomes: Sequence[Outcome]) -> float | None:
     """Entropy in bits of the routes that reached the goal on one map; None with fewer than two."""
-    routes = Counter(route_class(one.path, one.map_config) for one in outcomes if one.success)
+    routes = Counter(route_class(one.path, one.map_config) for one in outcomes if one.success and one.path is not None)
     total = sum(routes.values())
     if total < 2:
         return None

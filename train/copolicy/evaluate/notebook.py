@@ -78,7 +78,8 @@ def compare_episodes(first: Sequence[Episode], second: Sequence[Episode]) -> dic
     starts = [[episode.scenario.digest for episode in episodes] for episodes in (first, second)]
     if starts[0] != starts[1] or not first:
         raise InvalidValueError("second", f"the {len(first)} starts of the first, in order", f"{len(second)} others")
-    return paired_differences(*(episode_values(map(_row, range(len(first)), episodes)) for episodes in (first, second)))
+    one, other = (episode_values(map(_row, range(len(first)), episodes)) for episodes in (first, second))
+    return paired_differences(one, other)
 
 
 def _row(index: int, episode: Episode) -> dict[str, Any]:
