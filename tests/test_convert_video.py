@@ -288,5 +288,5 @@ def test_colours_are_those_of_bt_601(colour, ycc):
     mp4 = scene_clip([np.full((80, 160, 3), colour, np.uint8)] * 2, 10, SIZE).mp4
     with av.open(io.BytesIO(mp4), "r") as film:
         frame = next(film.decode(video=0)).to_ndarray(format="yuv420p")
-    planes = frame[:80], frame[80:100], frame[100:]
-    assert tuple(int(np.median(plane)) for plane in planes) == pytest.approx(ycc, abs=1)
+        planes = frame[:80], frame[80:100], frame[100:]
+        assert tuple(int(np.median(plane)) for plane in planes) == pytest.approx(ycc, abs=1)
