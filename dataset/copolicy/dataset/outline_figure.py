@@ -47,7 +47,8 @@ def panels(figure: Any, outline: Outline, count: int, most: int, below: float) -
     columns = min(most, count)
     rows = math.ceil(count / columns)
     width, height = outline.size
-    figure.set_size_inches(_PANEL * columns, (_PANEL * height / width + 0.35) * rows + below)
+    panel = _PANEL if columns > 1 else 1.7 * _PANEL  # room for the title and legend above and below a single one
+    figure.set_size_inches(panel * columns, (panel * height / width + 0.35) * rows + below)
     axes = list(figure.subplots(rows, columns, squeeze=False).flat)
     for unused in axes[count:]:
         unused.set_visible(False)
