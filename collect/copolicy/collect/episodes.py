@@ -61,11 +61,12 @@ def run_episodes(
     trace = Trace(rollout)
     rollout.run()
     return [
-        _episode(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
+        episode_of(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
     ]
 
 
-def _episode(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+def episode_of(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+    """What happened in a world of a rollout, from its start to its end, as an episode."""
     task, outcome = rollout.task, rollout.outcomes[index]
     states, actions = task.states_of(trace.states(index)), trace.actions(index)
     robot, human = (agent.name for agent in rollout.agents)

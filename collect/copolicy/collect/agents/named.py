@@ -12,7 +12,8 @@ from ..rollout import Agent, Start
 from .checkpoint_folder import PRETRAINED, load_policy
 from .policy import PolicyAgent
 from .replay import HeldAgent, ReplayAgent
-from .scripted import ScriptedAgent, simulated_players
+from .scripted import ScriptedAgent
+from .simulated import simulated_players
 
 KINDS = ("policy", "scripted", "replay", "nothing")
 

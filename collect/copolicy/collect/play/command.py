@@ -127,9 +127,9 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
     for pilot in pilots:
         if pilot.kind == "policy":
             conditions = training_conditions(checkpoint_folder(pilot.detail))
-            if not isinstance(conditions.physics, task.settings_type):
+            if conditions.task != task.spec.name:
                 expected = f"a policy that has learned the task {task.spec.name!r}"
-                raise InvalidValueError(f"policy:{pilot.detail}", expected, "one of another task")
+                raise InvalidValueError(f"policy:{pilot.detail}", expected, conditions.task)
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
             rest = conditions.physics

@@ -13,7 +13,6 @@ from copolicy.dataset.files.staging import new_file, require_new
 from copolicy.dataset.outline import Point, Shape, placed
 from copolicy.dataset.task_spec import PLAYERS
 
-from ..screen.outline_view import outline_of
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
 from .track import Track
 
@@ -62,7 +61,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
             raise InvalidValueError(str(path), "a name that ends with .rrd", path.suffix)
         require_new(path)
     rr, blueprint = require_rerun()
-    outline_of(track.task)
+    track.task.required_outline  # noqa: B018 (before anything is opened)
     if (
         path is None
         and sys.platform == "linux"
@@ -106,7 +105,7 @@ def _log_track(rr: Any, recording: Any, track: Track) -> None:
 
 def _log_scene(rr: Any, recording: Any, track: Track) -> None:
     """What stands still."""
-    outline, meta = outline_of(track.task), track.episode.meta
+    outline, meta = track.task.required_outline, track.episode.meta
     width, height = outline.size
     window = Shape("window", ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)))
     shapes = (window, *outline.fixed(track.episode.scenario))
@@ -128,7 +127,7 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
 
 
 def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
-    outline, pose, forces = outline_of(track.task), track.poses[step], track.forces_at(step)
+    outline, pose, forces = track.task.required_outline, track.poses[step], track.forces_at(step)
     radius = outline.size[0] / _WIDTH
     strips = [_closed([placed(pose, corner) for corner in shape.corners]) for shape in outline.body]
     colours = [_COLOURS.get(shape.role, WOOD) for shape in outline.body]

@@ -93,7 +93,7 @@ def _conditional_entropy(
     for index in taken:
         onehot[index, column[str(data.configurations[index]), taken[index]]] = 1
     per_configuration, enough = {}, []
-    bits = data.words.label_bits
+    bits = data.task.statistics.label_bits
     for name in names:
         counts = Counter(taken[index] for index in taken if data.configurations[index] == name)
         entry = word_entropy(counts, bits(next(iter(counts))) if bits else None, rng)
