@@ -58,6 +58,7 @@ def test_sound_data_pass_and_rules_that_the_task_lacks_are_named(peg, recordings
         assert set(document["limits"]).isdisjoint({"jump", "drift.error", "contact_margin"})
         assert document["limits"]["achieved_hz.error"]["unit"] == "share of 20 Hz"
     assert main(["check", str(root)]) == 0
+    assert "LeRobot v3 data set of two players at the task 'peg'.\n" in (root / "README.md").read_text(encoding="utf-8")
     assert "stuck             left out: the task 'peg' has no rule for a standstill" in capsys.readouterr().out
     assert main(["check", "--rules", "--task", "peg"]) == 0
     assert "px" not in capsys.readouterr().out

@@ -12,6 +12,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import TABLE, get_task
 
 from .agents.named import make_agent
+from .agents.policy import PolicyAgent
 from .rollout import Agent, Rollout, Trace
 
 
@@ -44,7 +45,7 @@ def run_episodes(
 
     Raises:
         UnknownNameError: no such agent or set.
-        InvalidValueError: one agent at both seats, or an agent at a seat that is not its own.
+        InvalidValueError: one agent at both seats, an agent at a seat that is not its own, or a policy of another task.
         FileFormatError: a checkpoint, recording or file of maps that cannot be used.
     """
     found = get_task(task)
@@ -56,6 +57,10 @@ def run_episodes(
     if robot is human and not isinstance(robot, str):
         raise InvalidValueError("human", "another agent than the robot's", robot.name)
     agents = tuple(make_agent(agent, task) if isinstance(agent, str) else agent for agent in (robot, human))
+    for agent in agents:
+        if isinstance(agent, PolicyAgent) and agent.task is not found:
+            expected = f"{agent.task.spec.name!r}, which {agent.name} has learned"
+            raise InvalidValueError("task", expected, task)
     seeds = [seed + index for index in range(len(scenarios))]
     rollout = Rollout(found, scenarios, (agents[0], agents[1]), seeds=seeds, settings=settings)
     trace = Trace(rollout)

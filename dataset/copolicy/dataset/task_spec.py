@@ -100,7 +100,6 @@ class TaskSpec:
         names = tuple(f"{player}_{name}" for player in self.players for name in one.names)
         return Vector(names, one.units * 2, one.low * 2, one.high * 2)
 
-    def force(self, actions: np.ndarray, player: int) -> np.ndarray:
-        """`(N, m)` a player's part of joint actions `(N, 2 m)`, in units of full force, the farthest of its bounds."""
-        own = np.split(actions, 2, axis=1)[player]
-        return own / np.abs(self.action.bounds).max(axis=0).astype(own.dtype)
+    def full_forces(self, actions: np.ndarray) -> np.ndarray:
+        """Joint actions `(N, 2 m)` in units of a player's full force, the farthest of the bounds of a number."""
+        return actions / np.abs(self.joint_action.bounds).max(axis=0).astype(actions.dtype)

@@ -73,7 +73,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         )
     below = blueprint.TextLogView(origin="events", name="Events")
     if track.interaction is not None:
-        graph = blueprint.TimeSeriesView(origin="interaction_force", name="Interaction force")
+        graph = blueprint.TimeSeriesView(origin="interaction_force", name=track.task.words.interaction.capitalize())
         below = blueprint.Horizontal(graph, below, column_shares=[3, 1])
     scene = blueprint.Spatial2DView(origin="world", name=track.task.spec.name.capitalize())
     layout = blueprint.Blueprint(
@@ -120,7 +120,8 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[width / _WIDTH])
         recording.log(f"world/trail/{player}", trail, static=True)
     if track.interaction is not None:
-        recording.log("interaction_force", rr.SeriesLines(names=["positive: pulling apart"]), static=True)
+        senses = track.task.words.interaction_senses
+        recording.log("interaction_force", rr.SeriesLines(names=[f"positive: {senses[0]}"]), static=True)
     lines = [f"**{track.path.name}**", meta.map_id, meta.pair_id, meta.termination_reason, meta.quality_flags]
     lines += [track.task.missing("interaction measure")] if track.interaction is None else []
     recording.log("about", rr.TextDocument("\n\n".join(line for line in lines if line)), static=True)

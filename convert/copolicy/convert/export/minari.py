@@ -81,7 +81,7 @@ def _environment(source: ExportSource) -> dict[str, Any]:
     kwargs = {"step_limit": source.task.settings_type().step_limit, **told}
     return {
         "id": gym_id,
-        "entry_point": _ENTRY_POINTS[gym_id],
+        "entry_point": _ENTRY_POINTS.get(gym_id),  # None: an environment that a task brings is made by its id
         "reward_threshold": None,
         "nondeterministic": False,
         "max_episode_steps": frames(kwargs["step_limit"], source.fps, source.task.spec.record_hz),

@@ -86,7 +86,7 @@ class EpisodeTable:
 
     def force(self, player: int) -> np.ndarray:
         """`(N, m)` a player's action in units of its full force."""
-        return self.task.spec.force(self.frames[ACTION], player)
+        return np.split(self.task.spec.full_forces(self.frames[ACTION]), 2, axis=1)[player]
 
     def longest_run(self, marks: np.ndarray) -> np.ndarray:
         """`(F,)` frames of the longest unbroken run of a mask `(N,)` within each episode."""

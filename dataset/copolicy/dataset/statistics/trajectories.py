@@ -108,7 +108,7 @@ class Trajectories:
 
     def force_of(self, player: int) -> np.ndarray:
         """`(N, m)` a player's action in units of its full force."""
-        return self.task.spec.force(self.actions, player)
+        return np.split(self.task.spec.full_forces(self.actions), 2, axis=1)[player].copy()
 
     @property
     def velocity(self) -> np.ndarray:
