@@ -18,7 +18,7 @@ def _finite(table: EpisodeTable) -> Iterator[Finding]:
         if values.dtype.kind != "f":
             continue
         rows = values.reshape(table.frame_count, -1)
-        wrong = table.count(~np.isfinite(rows).all(axis=1))
+        wrong = table.count(np.asarray(~np.isfinite(rows).all(axis=1)))
         yield from table.found("finite", wrong > 0, wrong, 0, f"frames whose {name} is not finite")
 
 
