@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from copolicy.dataset.scenarios import base_name
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.comparison.paired import base_map, clustered_mean, mcnemar_exact, welch
+from copolicy.evaluate.comparison.paired import clustered_mean, mcnemar_exact, welch
 
 
 def _write(path, successes, *, weights="", seconds=20.0, force=0.1, study="coplan", partner=None, **settings):
@@ -177,8 +178,8 @@ def test_one_method_is_nothing_to_compare(tmp_path, capsys):
 
 
 def test_orientations_of_a_map_are_drawn_together():
-    assert base_map("unseen-07-270deg") == base_map("unseen-07-0deg") == "unseen-07"
-    assert base_map("holdout-07") == "holdout-07"
+    assert base_name("unseen-07-270deg") == base_name("unseen-07-0deg") == "unseen-07"
+    assert base_name("holdout-07") == "holdout-07"
     rng = np.random.default_rng(0)
     effect = np.repeat(rng.normal(size=20), 8)  # 20 maps, 8 equal episodes each
     narrow = clustered_mean(effect, list(range(160)))["bootstrap_95"]

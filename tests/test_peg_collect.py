@@ -9,7 +9,9 @@ from play_session import SimulatedClock, settings
 
 from copolicy.collect.agents import HeldAgent, PersonAgent, PolicyAgent, ReplayAgent
 from copolicy.collect.cli import main
+from copolicy.collect.episodes import run_episodes
 from copolicy.collect.inputs import HALVES, InputSample
+from copolicy.collect.play.finished import Finished
 from copolicy.collect.play.lobby import Lobby
 from copolicy.collect.play.result import Result
 from copolicy.collect.play.session_run import prepared
@@ -248,7 +250,7 @@ def test_the_command_plays_another_task(peg, tmp_path, capsys):
     assert "--angular-limit: expected no such flag" in capsys.readouterr().err
     call[call.index("scripted:lazy")] = "policy:pretrained"
     assert main(call) == 2
-    assert "expected a policy that has learned the task 'peg', found 'one of another task'" in capsys.readouterr().err
+    assert "expected a policy that has learned the task 'peg', found 'table'" in capsys.readouterr().err
     call[call.index("policy:pretrained")] = "scripted:S01"
     assert main(call) == 2
     assert "unknown simulated pair 'S01'; available: even, lazy" in capsys.readouterr().err
@@ -299,6 +301,8 @@ def test_the_screen_speaks_of_the_task(peg, tmp_path):
         result.draw(canvas, 1.0)
         assert {"Mark", "left out: the task 'peg' has no interaction measure"} <= set(written)
         game.close_trial("keep")
+        Finished(game).draw(canvas, 1.0)
+        assert "successes today: 1 of 1" in written
         game.stop = "test"
 
 
@@ -384,10 +388,15 @@ def test_a_policy_is_filmed_with_a_simulated_partner(peg):
             return np.full((1, 8, 2), 0.2)
 
     track = demonstrate(Pushing(), peg.scenario_sets["right"][0], "lazy", task=peg)
+    assert (track.episode.fps, track.episode.meta.duration_s) == (20, track.steps / 20)
     assert (track.task, track.episode.meta.controller_1) == (peg, "scripted:lazy")
     assert verify(track)["max_drift_position"] == 0.0
     frames = sum(1 for _ in pictures(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
     assert frames == len(sampled(track, 4, 2.0)) + 4
+    with pytest.raises(
+        InvalidValueError, match="task: expected 'peg', which policy:pushing has learned, found 'table'"
+    ):
+        run_episodes(PolicyAgent(Pushing(), peg), "nothing", limit=1)
     Pushing.task = "table"
     with pytest.raises(InvalidValueError, match="expected a policy that has learned the task 'peg', found 'table'"):
         demonstrate(Pushing(), peg.scenario_sets["right"][0], "lazy", task=peg)

@@ -1,6 +1,7 @@
 """Every command of `copolicy-dataset` on data of a task with numbers alone."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,7 @@ def test_sound_data_pass_and_rules_that_the_task_lacks_are_named(peg, recordings
         assert set(document["limits"]).isdisjoint({"jump", "drift.error", "contact_margin"})
         assert document["limits"]["achieved_hz.error"]["unit"] == "share of 20 Hz"
     assert main(["check", str(root)]) == 0
+    assert "LeRobot v3 data set of two players at the task 'peg'.\n" in (root / "README.md").read_text(encoding="utf-8")
     assert "stuck             left out: the task 'peg' has no rule for a standstill" in capsys.readouterr().out
     assert main(["check", "--rules", "--task", "peg"]) == 0
     assert "px" not in capsys.readouterr().out
@@ -145,14 +147,16 @@ def test_a_task_with_more_parts_has_more_statistics(peg, root, capsys, monkeypat
     monkeypatch.setattr(kind, "strategy", lambda self, scenario, states: "slow" if len(states) > 22 else "fast")
     monkeypatch.setattr(kind, "interaction", lambda self, states, actions: 50 * (actions[:, 0] - actions[:, 1]))
     monkeypatch.setattr(kind, "path", lambda self, states: self.outline.poses(states)[:, :2])
-    monkeypatch.setattr(kind, "statistics", peg.statistics.__class__(noun="peg", velocity=(1,), interaction_unit="N"))
+    monkeypatch.setattr(kind, "words", replace(peg.words, noun="peg", body="the peg's middle"))
+    monkeypatch.setattr(kind, "statistics", peg.statistics.__class__(velocity=(1,), interaction_unit="N"))
     assert main(["stats", str(root)]) == 0
     families = json.loads((root / STATISTICS_FILE).read_text(encoding="utf-8"))["statistics"]
     assert families["routes"]["route_class"]["value"] == 3
     size, top = (families["forces"][f"interaction_force_{name}"] for name in ("mean", "p95"))
     assert (size["unit"], 0 < size["value"] < top["value"] <= 100) == ("N", True)
     assert top["interval"][0] <= top["value"] <= top["interval"][1]
-    assert "on a grid of 0.0416667 m" in families["visitation"]["visitation_coverage"]["definition"]
+    coverage = families["visitation"]["visitation_coverage"]["definition"]
+    assert "the peg's middle has been in, on a grid of 0.0416667 m" in coverage
     assert 0 < families["visitation"]["visitation_coverage"]["value"] < 1
     assert "the peg faster than 0.15 m/s" in families["forces"]["conflict_fraction"]["definition"]
     assert families["smoothness"]["sparc"]["value"] < 0

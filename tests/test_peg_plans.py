@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.evaluate.coplan.figure import save_trajectories
 from copolicy.evaluate.coplan.rollouts import coplan
@@ -58,5 +58,5 @@ def test_failures_are_drawn_too(peg, tmp_path):
 
 def test_what_cannot_be_drawn_is_refused(peg, monkeypatch):
     monkeypatch.setattr(type(peg), "outline", None)
-    with pytest.raises(InvalidValueError, match="left out: the task 'peg' has no outline"):
+    with pytest.raises(CopolicyError, match="left out: the task 'peg' has no outline"):
         decide(peg)

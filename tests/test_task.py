@@ -1,6 +1,7 @@
 """The task contract, and the table as the first task that keeps it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,3 +75,9 @@ def test_a_vector_without_sense_is_refused():
         Vector(("x", "y"), ("px",), (0.0, 0.0), (1.0, 1.0))
     with pytest.raises(InvalidValueError, match="low values below"):
         Vector(("x",), ("px",), (1.0,), (1.0,))
+
+
+def test_full_forces_are_the_farthest_bounds_of_a_number():
+    action = Vector(("grip", "push"), ("N", "N"), (-10.0, 0.0), (5.0, 4.0))
+    forces = replace(get_task("table").spec, action=action).full_forces(np.array([[5.0, 2.0, -10.0, 4.0]], np.float32))
+    assert (forces.dtype, forces.tolist()) == (np.float32, [[0.5, 0.5, -1.0, 1.0]])

@@ -155,7 +155,7 @@ def _episodes(facts: DatasetFacts) -> str:
     ]
     reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
     words, kept = facts.words, "Failures and time-outs are kept and marked."
-    if facts.task.has_strategy:
+    if facts.task.offers("strategy"):
         kept += f" {words.label.capitalize()}s{words.labels[0] and f', {words.labels[0]}'}:"
         routes = [(label or "none", count) for label, count in facts.counts("route_class").items()]
         labels = [table((words.label, "episodes"), routes)]

@@ -71,10 +71,10 @@ def save_figures(facts: DatasetFacts) -> list[tuple[str, str]]:
         most = f", the {len(groups)} most frequent of {total} sets of obstacles" if len(groups) < total else ""
         what = f"{len(facts.episodes)} episodes, source: {sources}{most}"
         colours = label_colours(facts.counts("route_class"))
-        by = f" by {words.label_class}" if task.has_strategy else ""
-        paths = _trajectories(groups, task.outline, colours, words.failure, task.has_strategy)
+        by = f" by {words.label_class}" if task.offers("strategy") else ""
+        paths = _trajectories(groups, task.outline, colours, words.failure, task.offers("strategy"))
         pictures.append(("trajectories.png", f"Paths of {words.body}{by} ({what}).", paths))
-        if task.has_strategy:
+        if task.offers("strategy"):
             caption = f"{words.label.capitalize()}s by set of obstacles ({what})."
             pictures.append(("routes.png", caption, _label_shares(groups, colours)))
     people = human_figure(facts)

@@ -49,7 +49,8 @@ def parser() -> argparse.ArgumentParser:
     )
     command.add_argument(
         "--start-noise", type=number("--start-noise", 0, 1), metavar="SCALE",
-        help="begin beside the start: up to SCALE times 90 px, 60 px and 0.6 rad away (default 0)",
+        help="begin beside the start: up to SCALE times what the task sees fit, 90 px, 60 px and 0.6 rad of the table "
+        "(default 0)",
     )  # fmt: skip
     command.add_argument(
         "--clearance",

@@ -46,8 +46,8 @@ def run_episodes(
 
     Raises:
         UnknownNameError: no such agent or set.
-        InvalidValueError: one agent at both seats, an agent at a seat that is not its own, or none at the human's
-            beside a robot that is no policy.
+        InvalidValueError: one agent at both seats, an agent at a seat that is not its own, none at the human's beside a
+            robot that is no policy, or a policy of another task.
         FileFormatError: a checkpoint, recording or file of maps that cannot be used.
     """
     found = get_task(task)
@@ -65,16 +65,20 @@ def run_episodes(
         second: Agent = first.other_half()
     else:
         second = make_agent(human, task) if isinstance(human, str) else human
+    for agent in (first, second):
+        if isinstance(agent, PolicyAgent) and agent.task is not found:
+            raise InvalidValueError("task", f"{agent.task.spec.name!r}, which {agent.name} has learned", task)
     seeds = [seed + index for index in range(len(scenarios))]
     rollout = Rollout(found, scenarios, (first, second), seeds=seeds, settings=settings)
     trace = Trace(rollout)
     rollout.run()
     return [
-        _episode(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
+        episode_of(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
     ]
 
 
-def _episode(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+def episode_of(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+    """What happened in a world of a rollout, from its start to its end, as an episode."""
     task, outcome = rollout.task, rollout.outcomes[index]
     states, actions = task.states_of(trace.states(index)), trace.actions(index)
     robot, human = (agent.name for agent in rollout.agents)

@@ -94,8 +94,6 @@ class PairTask(ABC):
         outline: what it looks like.
         studies: what results of studies say of it.
         orientations: how many start orientations `turned` gives a scenario; 1: there are none.
-        invitation: title of a session's window; that of the task where empty.
-        instruction: what players read before they begin; the sentence of the task where empty.
     """
 
     spec: ClassVar[TaskSpec]
@@ -104,8 +102,6 @@ class PairTask(ABC):
     outline: ClassVar[Outline | None] = None
     studies: ClassVar[Studies] = Studies()
     orientations: ClassVar[int] = 1
-    invitation: ClassVar[str] = ""
-    instruction: ClassVar[str] = ""
 
     @property
     def agents(self) -> SimulatedPlayers | None:
@@ -230,11 +226,6 @@ class PairTask(ABC):
         """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
         return ""
 
-    @property
-    def has_strategy(self) -> bool:
-        """Whether `strategy` labels episodes."""
-        return type(self).strategy is not PairTask.strategy
-
     def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
         """Id of its gymnasium environment and the arguments beside its rate, under settings that are not the usual."""
         steps = {name: value for name, value in settings.items() if name == "step_limit"}
@@ -243,7 +234,7 @@ class PairTask(ABC):
 
     @property
     def words(self) -> TaskWords:
-        """How cards and pages speak of it."""
+        """How screens, cards and pages speak of it."""
         return TaskWords.of(self.spec)
 
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
@@ -282,7 +273,7 @@ class PairTask(ABC):
 
     @property
     def statistics(self) -> TaskStatistics:
-        """Words of statistics, and statistics beside the generic ones."""
+        """What statistics are computed by, and statistics beside the generic ones."""
         return TaskStatistics()
 
     @property
@@ -348,6 +339,17 @@ class PairTask(ABC):
     def offers(self, part: str) -> bool:
         """Whether the task brings a part of its own, such as `strategy` or `interaction`."""
         return getattr(type(self), part) is not getattr(PairTask, part)
+
+    @property
+    def required_outline(self) -> Outline:
+        """The outline, for what cannot do without.
+
+        Raises:
+            CopolicyError: there is none.
+        """
+        if self.outline is None:
+            raise CopolicyError(self.missing("outline"))
+        return self.outline
 
     def missing(self, part: str) -> str:
         """The sentence with which a command leaves out what needs a part that the task does not offer."""

@@ -196,10 +196,9 @@ class PolicyFeatures:
 
 @dataclass(frozen=True)
 class TaskStatistics:
-    """The part `statistics` of a task: words for the definitions of its statistics, and those that it alone has.
+    """The part `statistics` of a task: what its statistics are computed by, and those that it alone has.
 
     Attributes:
-        noun: what moves, in a word.
         people: what a data set of people is.
         velocity: places in the state of the velocity of what moves, an axis of a player's action each; empty where
             there is none: no statistics of speed and of work.
@@ -211,7 +210,6 @@ class TaskStatistics:
         reference: what people did elsewhere, as a part of the document, from a generator.
     """
 
-    noun: str = "body"
     people: str = "people took part"
     velocity: tuple[int, ...] = ()
     interaction: str = "Size of what passes between the players, as the task measures it."

@@ -99,3 +99,7 @@ class TaskSpec:
         one = self.action
         names = tuple(f"{player}_{name}" for player in self.players for name in one.names)
         return Vector(names, one.units * 2, one.low * 2, one.high * 2)
+
+    def full_forces(self, actions: np.ndarray) -> np.ndarray:
+        """Joint actions `(N, 2 m)` in units of a player's full force, the farthest of the bounds of a number."""
+        return actions / np.abs(self.joint_action.bounds).max(axis=0).astype(actions.dtype)

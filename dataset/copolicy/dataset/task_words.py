@@ -1,4 +1,4 @@
-"""How cards, pages and figures speak of a task."""
+"""How screens, cards, pages and figures speak of a task."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,11 +20,14 @@ class TaskWords:
         place: where everything happens.
         episode: what an episode is.
         record: what meta/episodes holds, a sentence.
+        invitation: title of a session's window; that of the task where empty.
+        instruction: what players read before they begin; the sentence of the task where empty.
         purpose: what policies learn to do with a partner.
         limits: how far the data are from robots, the beginning of a sentence.
         scenario, scenarios: the noun.
         scenario_sees: what a policy sees of one.
-        body: what moves.
+        noun: what moves, in a word.
+        body: the point of it that is followed.
         state_sees: what a policy sees of it.
         acts: what a policy does with a partner, and where.
         action: what the numbers of an action are.
@@ -54,11 +57,14 @@ class TaskWords:
     place: str = "simulation"
     episode: str = "one attempt from start to end"
     record: str = "One record an episode: who acted with whom in which scenario, and how it ended."
+    invitation: str = ""
+    instruction: str = ""
     purpose: str = "act with a partner"
     limits: str = "The task is simulated under known dynamics"
     scenario: str = "scenario"
     scenarios: str = "scenarios"
     scenario_sees: str = "the scenario"
+    noun: str = "body"
     body: str = "what moves"
     state_sees: str = "the state"
     acts: str = "acts together with a partner, in simulation"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
-from copolicy.collect.angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
+from copolicy.collect.angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, FIGURES, POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number, seed
@@ -19,9 +19,6 @@ from copolicy.dataset.task import TABLE, PairTask, get_task
 
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
-
-LIMIT = "angular_acceleration_limit"
-"""The setting of a world behind `--angular-limit`."""
 
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
 

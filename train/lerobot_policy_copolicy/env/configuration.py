@@ -76,7 +76,7 @@ class PairTaskEnvConfig(EnvConfig):
         for name in ("observation_width", "observation_height"):
             if (side := getattr(self, name)) % 2 or not shortest <= side <= longest:
                 raise InvalidValueError(name, f"an even number of px from {shortest} to {longest}", side)
-        if self.pixels and type(task).images is PairTask.images:
+        if self.pixels and not task.offers("images"):
             raise InvalidValueError("pixels", f"false ({task.missing('images')})", self.pixels)
         columns = features_of(task.spec)
         self.features = {

@@ -13,6 +13,7 @@ from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import OBSERVATION_KEYS, bounds_of
 from copolicy.dataset.task import SceneView
+from copolicy.dataset.task_spec import TIMEOUT
 
 from .configuration import PairTaskEnvConfig
 
@@ -137,7 +138,7 @@ class PairEnv(gymnasium.Env):
         (outcome,) = self._rollout.outcomes
         # The past human action is that of the frame: of several held steps their mean, as in a data set.
         self._action = np.mean(trace.actions(0), axis=0)
-        truncated = outcome.reason == "timeout"
+        truncated = outcome.reason == TIMEOUT
         info = self._info(outcome.reason, outcome.success, self._interaction(trace))
         return self._observation(), self.world.reward(), outcome.done and not truncated, truncated, info
 
@@ -150,12 +151,13 @@ class PairEnv(gymnasium.Env):
         if not self.render_mode:
             return None
         # Here, because training without videos needs no pygame.
-        from copolicy.collect.screen.outline_view import outline_of, scene_view
+        from copolicy.collect.screen.canvas import new_surface
+        from copolicy.collect.screen.outline_view import scene_view
         from copolicy.collect.sdl import pygame
 
-        outline = outline_of(self.pair_task)
+        outline = self.pair_task.required_outline
         size = _WIDTH, round(_WIDTH * outline.size[1] / outline.size[0])
-        surface = pygame.Surface(size, depth=24)
+        surface = new_surface(size)
         (pose,), (forces,) = outline.poses(self.world.observation[None]), outline.forces(self._action[None])
         if self._view is None:  # it keeps what stands still
             self._view = scene_view(self.pair_task, self.maps[self.map_index])

@@ -23,6 +23,7 @@ from copolicy.dataset.outline_figure import (
     obstacles_of,
     places_text,
 )
+from copolicy.dataset.task_spec import TIMEOUT
 
 from ..artefacts import KeptFindings, estimates, statistics_doubt
 from ..dataset_card import source_text
@@ -64,7 +65,7 @@ def build_payload(
     outline, spec, words = facts.task.outline, facts.task.spec, facts.words
     step = max(1, math.ceil(facts.info["total_frames"] * 2 * len(FRAME_SCALES) / frame_bytes))
     missing = {} if outline else {"outline": left_out(facts.task, "outline")}
-    if not facts.task.has_strategy:
+    if not facts.task.offers("strategy"):
         missing["labels"] = left_out(facts.task, "strategy labels")
     blocks: list[np.ndarray] = []
     rows: list[dict[str, Any]] = []
@@ -101,7 +102,7 @@ def build_payload(
         "left_out": missing,
         "sources": {source: source_text(source, words, page=True) for source in facts.counts("source")},
         "successes": spec.successes,
-        "failures": [reason for reason in spec.reasons if reason not in (*spec.successes, "timeout")],
+        "failures": [reason for reason in spec.reasons if reason not in (*spec.successes, TIMEOUT)],
         "sides": all(set(label) <= {"L", "R"} for label in labels),
         "colours": {
             "labels": {label: paint for label, paint in label_colours(labels).items() if label},

@@ -14,7 +14,7 @@ function showRouteStatistics() {
   place.replaceChildren(
     ...statisticsDoubt(),
     make("p", {}, make("strong", {}, `The episodes are of ${routes.played_by}. `),
-      "All that reached the goal are counted, whatever is chosen above."),
+      `All that ${WORDS.success} are counted, whatever is chosen above.`),
     ...(routes.distances.length ? distanceFromPeople(routes) : []),
     ...(routes.configurations.length ? entropyByConfiguration(routes) : []),
   );

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.task import TABLE, get_task
+from copolicy.dataset.task import TABLE, PairTask, get_task
 
 from ..rollout import Agent, Start
 from .checkpoint_folder import PRETRAINED, load_policy
 from .policy import PolicyAgent
 from .replay import HeldAgent, ReplayAgent
-from .scripted import ScriptedAgent, simulated_players
+from .scripted import ScriptedAgent
+from .simulated import simulated_players
 
 KINDS = ("policy", "scripted", "replay", "nothing")
 
@@ -47,18 +48,18 @@ def make_agent(name: str, task: str = TABLE, **settings: Any) -> Agent:
         return PolicyAgent(policy, get_task(policy.task))
     found = get_task(task)
     if kind == "scripted":
-        return _scripted(detail, task, settings)
+        return _scripted(detail, found, settings)
     if kind == "replay":
         return ReplayAgent(Path(detail), found)
     return HeldAgent(np.zeros(len(found.spec.action)), "nothing")
 
 
-def _scripted(name: str, task: str, settings: dict[str, Any]) -> Agent:
-    players = simulated_players(get_task(task))
+def _scripted(name: str, task: PairTask, settings: dict[str, Any]) -> Agent:
+    players = simulated_players(task)
     if unknown := sorted(set(settings) - set(players.options if name in players.pairs else ())):
         raise InvalidValueError(f"scripted:{name}", "no such setting", ", ".join(unknown))
     if name in players.pairs:
-        return ScriptedAgent.of_pair(name, get_task(task), **settings)
+        return ScriptedAgent.of_pair(name, task, **settings)
     if name not in (*players.partners, *players.robots):
         raise UnknownNameError("simulated player", name, (*players.pairs, *players.partners, *players.robots))
     make = players.make_partner if name in players.partners else players.make_robot

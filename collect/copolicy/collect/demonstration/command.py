@@ -69,10 +69,9 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..agents.simulated import pair_name
     from ..replay.film import save_gif
     from ..replay.pictures import picture_count
-    from ..screen.outline_view import outline_of
     from .film import SIZE, demonstrate, pictures
 
-    outline_of(task)
+    task.required_outline  # noqa: B018 (a film needs one)
     partner = pair_name(task, arguments.partner)
     policy = load_policy(arguments.policy)
     physics = policy.conditions.physics

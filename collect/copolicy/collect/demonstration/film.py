@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.task import PairTask, SceneView, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
+from ..episodes import episode_of
 from ..replay.pictures import LAST_S
 from ..replay.track import Track, sampled, track_of
 from ..rollout import Rollout, Trace
@@ -50,7 +50,6 @@ def demonstrate(
     """
     task = task or get_task()
     robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
-    settings = settings or task.settings_type()
     try:
         rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], settings=settings)
         trace = Trace(rollout)
@@ -59,21 +58,7 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    name = task.name_of(scenario)
-    (outcome,) = rollout.outcomes
-    meta = EpisodeMeta(
-        "",
-        controller_0=robot.name,
-        controller_1=human.name,
-        **name.columns,
-        seed=seed,
-        source="simulated",
-        success=outcome.success,
-        termination_reason=outcome.reason,
-    )
-    states = task.states_of(trace.states(0))
-    episode = Episode(states[:-1], trace.actions(0), states[-1], meta, scenario, settings=settings, task=task.spec.name)
-    return track_of(Path(name.scenario), episode)
+    return track_of(Path(task.name_of(scenario).scenario), episode_of(rollout, trace, 0, scenario, seed, settings))
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:

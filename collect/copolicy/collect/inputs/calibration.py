@@ -94,7 +94,7 @@ class StickCalibration:
         return read
 
 
-_REST_SAMPLES = 30  # a second
+_REST_SAMPLES = 30  # a second at the rate that tasks have by default
 _SECTORS = 16
 _ROUNDS = 2  # the first time round many do not reach the edge everywhere
 _FAR = 0.5  # of an axis: nearer to the centre a stick is not turned round its edge
@@ -102,7 +102,7 @@ _RESTLESS = 0.35  # a stick that rests further off than this is being held
 
 
 class CalibrationRun:
-    """Collects readings of a stick at 30 Hz until they make a calibration.
+    """Collects readings of a stick, one a tick, until they make a calibration.
 
     First the stick must be left alone for a second (its centre, and how much it trembles), then turned round its
     edge twice (its range).

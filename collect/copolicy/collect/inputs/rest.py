@@ -7,10 +7,10 @@ _GENTLE = 0.35  # of a full force: beyond it a stick is held, unless it was neve
 
 
 class RestWatch:
-    """Follows the force of one device at 30 Hz and notices that it does not rest at zero.
+    """Follows the force of one device, a reading a tick, and notices that it does not rest at zero.
 
     A hand that holds a stick trembles, or lets go of it. A device whose centre was measured is doubted only after a
-    longer time, and while a table is carried not at all: people do hold a stick then.
+    longer time, and within an episode not at all: people do hold a stick then.
 
     Attributes:
         push: size of the force at rest; 0 while there is none.

@@ -10,7 +10,7 @@ from copolicy.dataset.task import PairTask
 
 from ..replay.pictures import write_png
 from ..screen.canvas import Canvas, new_surface
-from ..screen.outline_view import outline_of, scene_view
+from ..screen.outline_view import scene_view
 from ..screen.palette import MUTED, TEXT
 from ..sdl import pygame
 
@@ -34,7 +34,7 @@ def write_map_sheet(task: PairTask, chosen: ScenarioSet, path: Path, width: int)
 
 def draw_map_sheet(task: PairTask, chosen: ScenarioSet, width: int) -> pygame.Surface:
     """The sheet: rows of scenarios, each with its name, and its weight where it is not 1."""
-    count, outline = len(chosen.scenarios), outline_of(task)
+    count, outline = len(chosen.scenarios), task.required_outline
     starts = task.states_of(np.array([task.start_of(scenario) for scenario in chosen.scenarios]))
     columns = max(1, math.ceil(math.sqrt(count * 0.6)))
     cell = (_SHEET - (columns + 1) * _GAP) / columns

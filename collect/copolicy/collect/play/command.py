@@ -13,7 +13,7 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..angular_limit import ANGULAR_LIMITS, angular_limit_of, limited
+from ..angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
 from .settings import PilotSpec, PlaySettings
 
 _AS_GIVEN = (
@@ -127,14 +127,14 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
     for pilot in pilots:
         if pilot.kind == "policy":
             conditions = training_conditions(checkpoint_folder(pilot.detail))
-            if not isinstance(conditions.physics, task.settings_type):
+            if conditions.task != task.spec.name:
                 expected = f"a policy that has learned the task {task.spec.name!r}"
-                raise InvalidValueError(f"policy:{pilot.detail}", expected, "one of another task")
+                raise InvalidValueError(f"policy:{pilot.detail}", expected, conditions.task)
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
             rest = conditions.physics
             if bound is not None:
-                learned[pilot.detail] = conditions.physics.angular_acceleration_limit
+                learned[pilot.detail] = getattr(conditions.physics, LIMIT)
                 rest = limited(task, rest, bound)
             if rest != usual:
                 logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)

@@ -44,11 +44,12 @@ class Finished(MenuPhase):
         """Draws the summary."""
         canvas.box(0, 0, *SIZE)
         outcomes = Counter(outcome for outcome, verdict in self.game.results if verdict == "keep")
-        goals = sum(outcomes[reason] for reason in self.game.task.spec.successes)
+        successes = self.game.task.spec.successes
+        count, noun = sum(outcomes[reason] for reason in successes), "goals" if "goal" in successes else "successes"
         kept = self.game.folder.counts.kept_here.total()
         lines = [
             Line(f"episodes kept: {kept}", 38),
-            Line(f"goals today: {goals} of {outcomes.total()}", 30, MUTED),
+            Line(f"{noun} today: {count} of {outcomes.total()}", 30, MUTED),
             Line("Thank you both.", 34),
         ]
         draw_dialog(canvas, self.menu.title, lines, self.menu.labels, self.menu.cursor, GREEN)

@@ -265,6 +265,7 @@ class Game:
             score=trial.score,
             seats=(statuses[0], statuses[1]),
             interaction=trial.interaction,
+            senses=self.task.words.interaction_senses,
             missing=self.task.missing("interaction measure"),
             late=trial.loop.late + trial.loop.skipped,
             hz=trial.loop.achieved_hz,

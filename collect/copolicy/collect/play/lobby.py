@@ -110,7 +110,7 @@ class Lobby(Phase):
         plan = [
             f"{settings.episodes} episodes to keep{f', {kept} kept already' if kept else ''}; {len(game.maps)} maps, "
             f"{settings.practice} practice episodes",
-            game.task.instruction or game.task.spec.sentence,
+            game.task.words.instruction or game.task.spec.sentence,
         ]
         if game.folder.continued:
             plan[0] = f"{plan[0]} (continued)"

@@ -5,7 +5,6 @@ from typing import ClassVar
 from ..inputs import Command, Press
 from ..screen import SIZE, Canvas
 from ..screen.dialogs import Line, draw_dialog, draw_entry, outcome_colour, outcome_text
-from ..screen.outline_view import outline_of
 from ..screen.palette import MUTED, YELLOW
 from ..ticker import Tick
 from .game import Game
@@ -84,5 +83,5 @@ class Result(NotesPhase):
             hint = self.game.roster.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
         colour = outcome_colour(trial.task.spec, trial.outcome.reason)
         # Beside the body, so that everybody sees what happened.
-        middle = _LEFT if trial.pose[0] > outline_of(trial.task).size[0] / 2 else SIZE[0] - _LEFT
+        middle = _LEFT if trial.pose[0] > trial.task.required_outline.size[0] / 2 else SIZE[0] - _LEFT
         draw_dialog(canvas, menu.title, lines, menu.labels, menu.cursor, colour, 560, hint, middle)

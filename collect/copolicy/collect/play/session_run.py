@@ -61,7 +61,7 @@ def prepared(
         if settings.headless:
             init_events(window=True)
         else:
-            window = Window(settings.window, settings.fullscreen, task.invitation or task.spec.title)
+            window = Window(settings.window, settings.fullscreen, task.words.invitation or task.spec.title)
             pygame.mouse.set_visible(False)
         stack.callback(_close_pygame)
         loading = Loading(window)

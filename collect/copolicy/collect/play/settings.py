@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, UnknownNameError
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import TABLE, get_task
@@ -107,8 +107,7 @@ class PlaySettings:
         ):
             if value < least:
                 raise InvalidValueError(name, f"at least {least}", value)
-        if get_task(self.task).outline is None:
-            raise CopolicyError(get_task(self.task).missing("outline"))
+        get_task(self.task).required_outline  # noqa: B018 (what is played is seen)
         self.map_configs()
         if self.window is not None and not all(320 <= side <= 16384 for side in self.window):
             raise InvalidValueError("window", "WxH of at least 320x320", "{}x{}".format(*self.window))

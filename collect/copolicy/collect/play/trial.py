@@ -20,7 +20,6 @@ from ..agents import PersonAgent, PolicyAgent
 from ..recording.recorder import EpisodeRecorder
 from ..recording.wall_clock import WallClockAnchor
 from ..rollout import Agent, Rollout
-from ..screen.outline_view import outline_of
 from ..session import OFF_CENTRE, PRACTICE
 from ..ticker import LoopStatistics, Tick
 
@@ -63,7 +62,7 @@ class Trial:
         self.world: Any = self._rollout.worlds[0]
         self.step_limit = physics.step_limit
         self.outcome: Outcome = RUNNING
-        self._outline = outline_of(task)
+        self._outline = task.required_outline
         self.pose: Pose = self._seen_pose()
         self.before = self.pose
         self.forces = (0.0, 0.0, 0.0, 0.0)

@@ -260,7 +260,8 @@ class EpisodeRecorder:
         states = self._task.states_of(np.asarray(self._states).reshape(-1, len(self._spec.recorded)))
         meta, joint = self.meta, self._spec.joint_action
         suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
-        if suspected and identical(np.asarray(self._actions).reshape(-1, len(joint))):
+        actions = np.asarray(self._actions).reshape(-1, len(joint))
+        if suspected and identical(self._spec.full_forces(actions)):
             columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,

@@ -168,7 +168,7 @@ def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
         "paused": "pause" in happened,
         "slow_loop": part.loop.slow,
         OFF_CENTRE: OFF_CENTRE in happened,
-        IDENTICAL_ACTIONS: may_be_one_device(*who) and identical(actions),
+        IDENTICAL_ACTIONS: may_be_one_device(*who) and identical(part.task.spec.full_forces(actions)),
         RECOVERED: True,
     }
     meta = EpisodeMeta(

@@ -8,6 +8,8 @@ from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.exceptions import InvalidValueError
 
+from ..angular_limit import ANGULAR_LIMITS
+
 _VIEWER = Path()  # `--rerun` without a file
 
 
@@ -52,7 +54,7 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument(
         "--angular-limit",
-        choices=("pi/2", "pi/8"),
+        choices=ANGULAR_LIMITS,
         help="of --verify: another bound on the angular acceleration than the recording states",
     )
     command.add_argument(

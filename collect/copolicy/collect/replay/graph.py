@@ -1,6 +1,8 @@
-"""The interaction force of an episode over its time, with a cursor: pulling apart above, pressing together below."""
+"""The interaction measure of an episode over its time, with a cursor: positive above, negative below."""
 
 import numpy as np
+
+from copolicy.dataset.task import PairTask
 
 from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, VERMILION, Colour, mix
 from ..screen.text import draw_text
@@ -12,15 +14,16 @@ _SMALLEST_RANGE = 0.5  # of a full force: a calm episode shall look calm
 class ForceGraph:
     """Draws the curve once a size, and the cursor on it."""
 
-    def __init__(self, interaction: np.ndarray | None, steps: int, missing: str = ""):
+    def __init__(self, interaction: np.ndarray | None, steps: int, task: PairTask):
         """
         Args:
             interaction: `(steps,)`, units of a player's full force; None where it is not measured.
             steps: of the episode.
-            missing: why it is not measured; stands in the place of the curve.
+            task: says what it means, or why it is not measured, which stands in the place of the curve.
         """
         self._steps = steps
-        self._missing = missing if interaction is None else ""
+        self._missing = task.missing("interaction measure") if interaction is None else ""
+        self._positive, self._negative, _ = task.words.interaction_senses
         self._forces = np.zeros(0) if interaction is None else interaction
         self._range = max(_SMALLEST_RANGE, float(np.abs(self._forces).max(initial=0.0)) * 1.1)
         self._curve: pygame.Surface | None = None
@@ -43,9 +46,9 @@ class ForceGraph:
         surface.blit(self._curve, rect)
         if position is not None:
             self._shade(surface, rect, position)
-        draw_text(surface, "pulling apart", (rect.left + 0.3 * font, rect.top + 0.1 * font), font, MUTED)
+        draw_text(surface, self._positive, (rect.left + 0.3 * font, rect.top + 0.1 * font), font, MUTED)
         draw_text(
-            surface, "pressing together", (rect.left + 0.3 * font, rect.bottom - 0.1 * font), font, MUTED, "bottomleft"
+            surface, self._negative, (rect.left + 0.3 * font, rect.bottom - 0.1 * font), font, MUTED, "bottomleft"
         )
         if position is None or not len(self._forces):
             return

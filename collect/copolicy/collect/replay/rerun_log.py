@@ -13,7 +13,6 @@ from copolicy.dataset.files.staging import new_file, require_new
 from copolicy.dataset.outline import Point, Shape, placed
 from copolicy.dataset.task_spec import PLAYERS
 
-from ..screen.outline_view import outline_of
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
 from .track import Track
 
@@ -62,7 +61,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
             raise InvalidValueError(str(path), "a name that ends with .rrd", path.suffix)
         require_new(path)
     rr, blueprint = require_rerun()
-    outline_of(track.task)
+    track.task.required_outline  # noqa: B018 (before anything is opened)
     if (
         path is None
         and sys.platform == "linux"
@@ -74,7 +73,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         )
     below = blueprint.TextLogView(origin="events", name="Events")
     if track.interaction is not None:
-        graph = blueprint.TimeSeriesView(origin="interaction_force", name="Interaction force")
+        graph = blueprint.TimeSeriesView(origin="interaction_force", name=track.task.words.interaction.capitalize())
         below = blueprint.Horizontal(graph, below, column_shares=[3, 1])
     scene = blueprint.Spatial2DView(origin="world", name=track.task.spec.name.capitalize())
     layout = blueprint.Blueprint(
@@ -106,7 +105,7 @@ def _log_track(rr: Any, recording: Any, track: Track) -> None:
 
 def _log_scene(rr: Any, recording: Any, track: Track) -> None:
     """What stands still."""
-    outline, meta = outline_of(track.task), track.episode.meta
+    outline, meta = track.task.required_outline, track.episode.meta
     width, height = outline.size
     window = Shape("window", ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)))
     shapes = (window, *outline.fixed(track.episode.scenario))
@@ -121,14 +120,15 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[width / _WIDTH])
         recording.log(f"world/trail/{player}", trail, static=True)
     if track.interaction is not None:
-        recording.log("interaction_force", rr.SeriesLines(names=["positive: pulling apart"]), static=True)
+        senses = track.task.words.interaction_senses
+        recording.log("interaction_force", rr.SeriesLines(names=[f"positive: {senses[0]}"]), static=True)
     lines = [f"**{track.path.name}**", meta.map_id, meta.pair_id, meta.termination_reason, meta.quality_flags]
     lines += [track.task.missing("interaction measure")] if track.interaction is None else []
     recording.log("about", rr.TextDocument("\n\n".join(line for line in lines if line)), static=True)
 
 
 def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
-    outline, pose, forces = outline_of(track.task), track.poses[step], track.forces_at(step)
+    outline, pose, forces = track.task.required_outline, track.poses[step], track.forces_at(step)
     radius = outline.size[0] / _WIDTH
     strips = [_closed([placed(pose, corner) for corner in shape.corners]) for shape in outline.body]
     colours = [_COLOURS.get(shape.role, WOOD) for shape in outline.body]

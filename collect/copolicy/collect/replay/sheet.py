@@ -9,7 +9,6 @@ from copolicy.dataset.task_spec import PLAYERS
 
 from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
-from ..screen.outline_view import outline_of
 from ..screen.palette import INK, MUTED, TEXT
 from ..sdl import pygame
 from .pictures import write_png
@@ -58,7 +57,7 @@ def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, l
     columns = math.ceil(math.sqrt(frames * 0.75))
     rows = math.ceil(frames / columns)
     cell = (1200 - (columns + 1) * _GAP) / columns
-    scene_width, scene_height = outline_of(track.task).size
+    scene_width, scene_height = track.task.required_outline.size
     cell_height = cell * scene_height / scene_width
     graph_height = _LINE if track.interaction is None else _GRAPH
     size = (1200, math.ceil(_HEAD + rows * (cell_height + _GAP) + graph_height + _GAP))

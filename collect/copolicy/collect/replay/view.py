@@ -56,7 +56,7 @@ class ReplayView:
     def __init__(self, track: Track):
         self._track = track
         self._scene = scene_view(track.task, track.episode.scenario)
-        self._graph = ForceGraph(track.interaction, track.steps, track.task.missing("interaction measure"))
+        self._graph = ForceGraph(track.interaction, track.steps, track.task)
 
     def draw(self, surface: pygame.Surface, playback: Playback, shown: Shown) -> None:
         """Draws everything."""

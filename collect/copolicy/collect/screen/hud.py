@@ -37,7 +37,8 @@ class Hud:
         limit_s: of an episode.
         score: sum of rewards so far.
         seats: robot, human.
-        interaction: units of a player's full force, positive where they pull apart; None where it is not measured.
+        interaction: units of a player's full force; None where it is not measured.
+        senses: what it means where it is positive, negative and zero, see `TaskWords`.
         missing: why it is not measured.
         late: late and skipped ticks of this episode.
         hz: rate that the loop keeps, nan before it runs.
@@ -52,6 +53,7 @@ class Hud:
     score: float
     seats: tuple[SeatStatus, SeatStatus]
     interaction: float | None = 0.0
+    senses: tuple[str, str, str] = ("positive", "negative", "zero")
     missing: str = ""
     late: int = 0
     hz: float = math.nan
@@ -88,13 +90,14 @@ def _draw_seat(canvas: Canvas, seat: int, x: float, status: SeatStatus) -> None:
 
 
 def _draw_interaction(canvas: Canvas, hud: Hud) -> None:
-    """A scale from pressing together to pulling apart, and how the loop keeps its time."""
+    """A scale of the interaction, with room for the last word of each sense, and how the loop keeps its time."""
     x, y, width = 440, 706, 320
     if hud.interaction is None:
         canvas.text(hud.missing, (600, y + 6), 20, MUTED, "center", 440)
     else:
-        canvas.text("together", (x, 676), 22, MUTED)
-        canvas.text("apart", (x + width, 676), 22, MUTED, "topright")
+        positive, negative, _ = (sense.rpartition(" ")[2] for sense in hud.senses)
+        canvas.text(negative, (x, 676), 22, MUTED)
+        canvas.text(positive, (x + width, 676), 22, MUTED, "topright")
         canvas.bar(x, y, width, 12, 0.0, SKY)
         share = min(1.0, abs(hud.interaction))
         half = width / 2 * share

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.outline import Outline, Pose, placed
 from copolicy.dataset.task import PairTask, SceneView
 
 from ..sdl import pygame
+from .canvas import new_surface
 from .palette import FLOOR, FLOOR_DOT, GREEN, INK, OBSTACLE, SEATS, SHADOW, WOOD, WOOD_EDGE, Colour, mix
 from .patch import Point, SmoothPatch
 
@@ -24,18 +24,7 @@ def scene_view(task: PairTask, scenario: Any) -> SceneView:
     Raises:
         CopolicyError: the task has no outline.
     """
-    return task.view(scenario) or OutlineView(outline_of(task), scenario)
-
-
-def outline_of(task: PairTask) -> Outline:
-    """The outline of a task that is to be drawn.
-
-    Raises:
-        CopolicyError: it has none.
-    """
-    if task.outline is None:
-        raise CopolicyError(task.missing("outline"))
-    return task.outline
+    return task.view(scenario) or OutlineView(task.required_outline, scenario)
 
 
 def letterbox(area: pygame.Rect, size: tuple[float, float]) -> pygame.Rect:
@@ -96,7 +85,7 @@ class OutlineView:
         return [self.to_screen(placed(pose, point)) for point in points]
 
     def _draw_background(self, size: tuple[int, int]) -> pygame.Surface:
-        floor = pygame.Surface(size, depth=32)
+        floor = new_surface(size)
         floor.fill(FLOOR)
         px = self._px
         width, height = (round(side / px) for side in size)

@@ -20,6 +20,7 @@ from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.files.listing import is_hidden
+from copolicy.dataset.scenarios import DISPLACED
 from copolicy.dataset.task import TABLE, PairTask, get_task
 from copolicy.dataset.worker_pool import WorkerPool
 
@@ -106,7 +107,7 @@ def simulate(
         meta = _meta(of, scenario, pair, variant, seed, index)
         if start_noise:
             scenario = of.displaced(scenario, start_noise, np.random.default_rng((seed, index)))
-            meta = replace(meta, map_id=f"{meta.map_id}-displaced")
+            meta = replace(meta, map_id=meta.map_id + DISPLACED)
         jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", task, scenario, settings, meta, anchor, options))
     new = not out.exists()
     out.mkdir(parents=True, exist_ok=True)

@@ -44,8 +44,6 @@ class TableTask(PairTask):
     outline = TableOutline()
     studies = TableStudies()
     orientations = 4
-    invitation = "carry the table together"
-    instruction = "Carry the table to the green goal together. Nobody knows which way the other will go."
 
     @property
     def agents(self) -> SimulatedPlayers:

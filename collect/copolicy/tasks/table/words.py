@@ -1,4 +1,4 @@
-"""How cards, pages and figures speak of the table."""
+"""How screens, cards, pages and figures speak of the table."""
 
 from copolicy.dataset.task_words import TaskWords
 
@@ -16,11 +16,14 @@ WORDS = TaskWords(
     place="a simulated plane",
     episode="one carry from start to end",
     record="One record an episode: who carried what with whom on which map, and how it ended.",
+    invitation="carry the table together",
+    instruction="Carry the table to the green goal together. Nobody knows which way the other will go.",
     purpose="carry an object *with* a partner, where there are several good ways and both have to settle on one",
     limits="The table moves in a plane under known dynamics",
     scenario="map",
     scenarios="maps",
     scenario_sees="the map (start, goal, up to three obstacles)",
+    noun="table",
     body="the table's centre",
     state_sees="the table's pose and velocity",
     acts="carries a table together with a partner, in a simulated plane seen from above",

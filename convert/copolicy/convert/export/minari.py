@@ -19,6 +19,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS, PAIR_GYM_ID, bounds_of
 from copolicy.dataset.files.staging import new_folder
 from copolicy.dataset.task import distribution_of
+from copolicy.dataset.task_spec import TIMEOUT
 
 from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
@@ -80,7 +81,7 @@ def _environment(source: ExportSource) -> dict[str, Any]:
     kwargs = {"step_limit": source.task.settings_type().step_limit, **told}
     return {
         "id": gym_id,
-        "entry_point": _ENTRY_POINTS[gym_id],
+        "entry_point": _ENTRY_POINTS.get(gym_id),  # None: an environment that a task brings is made by its id
         "reward_threshold": None,
         "nondeterministic": False,
         "max_episode_steps": frames(kwargs["step_limit"], source.fps, source.task.spec.record_hz),
@@ -112,7 +113,7 @@ def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> No
     last = np.arange(len(episode)) == len(episode) - 1
     # Any other end than those of the task cuts the episode off.
     reason = episode.meta["termination_reason"]
-    terminated = reason != "timeout" and reason in episode.task.spec.reasons
+    terminated = reason != TIMEOUT and reason in episode.task.spec.reasons
     observations = (
         np.vstack((episode.states, episode.final_state())),
         np.tile(episode.environment, (len(episode) + 1, 1)),

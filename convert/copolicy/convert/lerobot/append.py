@@ -13,11 +13,11 @@ from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidV
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
 from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
 from copolicy.dataset.files.staging import about, write_as_lerobot
-from copolicy.dataset.lerobot_folder.info import read_info, task_of
+from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.references import Place, numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import is_minimal_card, minimal_card
+from copolicy.dataset.publication.minimal_card import is_minimal_card, write_minimal_card
 from copolicy.dataset.recording.log import read_metadata
 
 from ..recordings import convert_recordings, find_recordings
@@ -191,7 +191,7 @@ def _renew_minimal_card(root: Path) -> None:
     if path.exists() and not is_minimal_card(path):
         return
     path.unlink(missing_ok=True)  # a link
-    path.write_text(minimal_card({row["license"] or "" for row in episode_rows(root)}), encoding="utf-8")
+    write_minimal_card(path, {row["license"] for row in episode_rows(root)}, task_name(read_info(root)))
 
 
 def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:

@@ -22,7 +22,7 @@ from copolicy.dataset.files.meta_files import CARD_FILE, RECORD_FILE
 from copolicy.dataset.files.staging import new_folder
 from copolicy.dataset.lerobot_folder.info import robot_type
 from copolicy.dataset.publication.licences import licence_identifier
-from copolicy.dataset.publication.minimal_card import minimal_card
+from copolicy.dataset.publication.minimal_card import write_minimal_card
 from copolicy.dataset.task import get_task
 from copolicy.dataset.task_spec import TaskSpec
 
@@ -117,8 +117,7 @@ def write_dataset(
         write_stats(aggregate_stats(statistics), partial)
         text = json.dumps({**record(), "task": spec.to_dict(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
         (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
-        card = minimal_card({row["license"] for row in rows})
-        (partial / CARD_FILE).write_text(card, encoding="utf-8")
+        write_minimal_card(partial / CARD_FILE, {row["license"] for row in rows}, spec.name)
     _warn_of_licences(root, rows)
     successes = sum(row["success"] for row in rows)
     frames = rows[-1]["dataset_to_index"]

@@ -19,10 +19,10 @@ from copolicy.dataset.episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VAL
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
-from copolicy.dataset.lerobot_folder.info import read_info, task_of
+from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import minimal_card
+from copolicy.dataset.publication.minimal_card import write_minimal_card
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.digests import Content
 
@@ -77,8 +77,7 @@ def merge_datasets(
         _verify(content, sources, set(LOCAL_NAMES) if prefixes else set())
         record = _record(sources, prefixes)
         write_record(partial, record)
-        card = minimal_card({text or "" for text in expected.column("license").to_pylist()})
-        (partial / CARD_FILE).write_text(card, encoding="utf-8")
+        write_minimal_card(partial / CARD_FILE, set(expected.column("license").to_pylist()), task_name(sources[0].info))
     left_behind = {str(source.root): names for source in sources if (names := source.left_behind(licences_too=True))}
     return {
         "root": str(root),

@@ -20,10 +20,10 @@ from copolicy.dataset.files.meta_files import (
     TASKS_FILE,
 )
 from copolicy.dataset.files.staging import new_folder, replace_json, require_new, write_as_lerobot
-from copolicy.dataset.lerobot_folder.info import read_info, task_of
+from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.references import numbered_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
-from copolicy.dataset.publication.minimal_card import minimal_card
+from copolicy.dataset.publication.minimal_card import write_minimal_card
 
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
@@ -65,8 +65,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
         if plan.statistics:
             _write_statistics(partial)
         rows = episode_rows(partial)
-        card = minimal_card({row["license"] or "" for row in rows})
-        (partial / CARD_FILE).write_text(card, encoding="utf-8")
+        write_minimal_card(partial / CARD_FILE, {row["license"] for row in rows}, task_name(read_info(partial)))
     replace_json(plan.folder / FINDINGS_FILE, [finding.to_dict() for finding in findings], indent=1)
     conversion = plan.conversion
     written = WrittenDataset(

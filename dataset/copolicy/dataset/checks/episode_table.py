@@ -85,9 +85,8 @@ class EpisodeTable:
         return np.maximum.reduceat(values, self.starts)
 
     def force(self, player: int) -> np.ndarray:
-        """`(N, m)` a player's action in units of its full force, the farthest of its bounds."""
-        actions = np.split(self.frames[ACTION], 2, axis=1)[player]
-        return actions / np.abs(self.task.spec.action.bounds).max(axis=0).astype(actions.dtype)
+        """`(N, m)` a player's action in units of its full force."""
+        return np.split(self.task.spec.full_forces(self.frames[ACTION]), 2, axis=1)[player]
 
     def longest_run(self, marks: np.ndarray) -> np.ndarray:
         """`(F,)` frames of the longest unbroken run of a mask `(N,)` within each episode."""

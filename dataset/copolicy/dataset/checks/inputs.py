@@ -61,7 +61,7 @@ def _idle(table: EpisodeTable) -> Iterator[Finding]:
 
 def _identical(table: EpisodeTable) -> Iterator[Finding]:
     """A frame in which nobody gives a force says nothing: two idle players are no copy of each other."""
-    actions = np.hstack((table.force(0), table.force(1)))
+    actions = table.task.spec.full_forces(table.frames[ACTION])
     pushed = table.share(pushing(actions))
     share = np.divide(table.share(alike(actions)), pushed, out=np.zeros_like(pushed), where=pushed > 0)
     bound = table.limit("identical")

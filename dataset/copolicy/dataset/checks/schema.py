@@ -81,11 +81,12 @@ def _columns(table: EpisodeTable) -> Iterator[Finding]:
 def _outcome(table: EpisodeTable) -> Iterator[Finding]:
     reasons, successes = table.columns["termination_reason"], table.task.spec.successes
     reached, success = np.isin(reasons, successes), table.columns["success"]
-    message = "ended at the goal but is no success"
+    goal = " or ".join(successes)
+    message = f"ended at the {goal} but is no success"
     yield from table.found("outcome", reached & ~success, reasons, "success", message)
     # An episode of the original program may be a success by its own flag; ours end as soon as the goal is touched.
-    message = "a success that did not end at the goal"
-    yield from table.found("outcome", ~reached & success, reasons, " or ".join(successes), message)
+    message = f"a success that did not end at the {goal}"
+    yield from table.found("outcome", ~reached & success, reasons, goal, message)
 
 
 def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from ..files.file_kinds import kind_of
 from ..files.json_file import read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
-from ..task import PairTask, get_task
+from ..task import TABLE, PairTask, get_task
 
 _OURS = "copolicy"  # begins the robot types of our data sets
 _WHAT = "LeRobot's data set information"
@@ -25,14 +25,19 @@ def robot_type(task: str) -> str:
     return f"{_OURS}_{task}"
 
 
+def task_name(info: Mapping[str, Any]) -> str:
+    """Name of the task of a data set, installed or not; the table where its robot type names none."""
+    ours, _, name = str(info.get("robot_type") or "").partition("_")
+    return name if ours == _OURS and name else TABLE
+
+
 def task_of(info: Mapping[str, Any]) -> PairTask:
-    """The task of a data set; the table where its robot type names none.
+    """The task of a data set.
 
     Raises:
         UnknownNameError: the task is not installed.
     """
-    ours, _, name = str(info.get("robot_type") or "").partition("_")
-    return get_task(name if ours == _OURS and name else "table")
+    return get_task(task_name(info))
 
 
 class Feature(TypedDict):

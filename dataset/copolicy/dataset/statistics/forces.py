@@ -41,7 +41,7 @@ def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate
     names = ("interaction_force_mean", "interaction_force_p95")
     if not data.task.offers("interaction"):
         return left_out(data.task.missing("interaction measure"), *names)
-    size, episodes, words = np.abs(data.force), len(data.rows), data.words
+    size, episodes, words = np.abs(data.force), len(data.rows), data.task.statistics
     signed = dict(zip(map(str, PERCENTILES), np.percentile(data.force, PERCENTILES).tolist(), strict=True))
     top, top_bounds = _percentile_95(data, size, bootstrap)
     mean_of = f"{words.interaction} Mean size; percentiles of the signed force in details."
@@ -71,7 +71,8 @@ def opposed_work(
 
 
 def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    name, noun, places, state = "conflict_fraction", data.words.noun, data.words.velocity, data.task.spec.state
+    task, name = data.task, "conflict_fraction"
+    noun, places, state = task.words.noun, task.statistics.velocity, task.spec.state
     if len(places) != len(data.task.spec.action):
         return left_out(data.task.missing("velocity along the axes of an action"), name)
     slow = MIN_SPEED * state.high[places[0]]
@@ -99,7 +100,7 @@ def _percentile_95(data: Trajectories, size: np.ndarray, bootstrap: Bootstrap) -
     value = float(np.percentile(size, 95))
     # Up to two full forces at a right angle, or in as many bins to the largest.
     bins = round(np.sqrt(2) / _BIN) + 1
-    width = _BIN if data.words.interaction_unit == FULL_FORCES else float(size.max()) / bins or 1.0
+    width = _BIN if data.task.statistics.interaction_unit == FULL_FORCES else float(size.max()) / bins or 1.0
     place = np.minimum((size / width).astype(int), bins - 1)
     counts = np.bincount(data.episode * bins + place, minlength=len(data.rows) * bins).reshape(-1, bins)
     below = np.cumsum(bootstrap.weights @ counts.astype(np.float32), axis=1)

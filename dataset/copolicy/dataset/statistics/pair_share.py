@@ -58,8 +58,8 @@ def _within_configurations(
 ) -> Estimate:
     definition = (
         f"Eta squared: the share of the variation of {what} within configurations that lies between the pairs in "
-        "each, of episodes that reached the goal. With few episodes a pair and configuration it is large by chance: "
-        "hold it against its null."
+        f"each, of episodes that {data.task.words.success}. With few episodes a pair and configuration it is large by "
+        "chance: hold it against its null."
     )
     pairs, strata = data.pairs[chosen], data.strata[chosen]
     movable = exchangeable(pairs, strata) if len(chosen) else 0
@@ -86,7 +86,7 @@ def _by_configuration(
 ) -> Estimate:
     definition = (
         "Eta squared: the share of the variation of duration that lies between configurations, of episodes that "
-        "reached the goal."
+        f"{data.task.words.success}."
     )
     strata = data.strata[chosen]
     one = np.zeros(len(chosen), dtype=int)

@@ -84,10 +84,10 @@ def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
     reason, outline = data.without_places, data.task.outline
     if reason or outline is None:
         return left_out(reason, "path_modes")
-    resolution = outline.size[0] * RESOLUTION
+    resolution, succeeded = outline.size[0] * RESOLUTION, data.task.words.success
     definition = (
         f"Path modes in a configuration, averaged over configurations by their episodes: paths of the episodes that "
-        f"reached the goal, {POINTS} points even in arc length, principal components, Gaussian mixture (diagonal, "
+        f"{succeeded}, {POINTS} points even in arc length, principal components, Gaussian mixture (diagonal, "
         f"spread of at least {resolution:g} {outline.unit} rms) of 1 to {MOST_MODES} modes with the least BIC and "
         f"three episodes a mode or more. A configuration's range is that of {_SUBSAMPLES} subsamples of "
         f"{_SUBSAMPLE_SHARE:.0%}; adjusted_rand compares the modes with the route classes (1 the same)."
@@ -116,7 +116,7 @@ def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
             entry["adjusted_rand"] = float(adjusted_rand_score(known, label))
         per_configuration[str(name)] = entry
     if not per_configuration:
-        note = f"no configuration has {MIN_EPISODES} episodes that reached the goal"
+        note = f"no configuration has {MIN_EPISODES} episodes that {succeeded}"
         return {"path_modes": Estimate(None, "modes", definition, 0, note=note)}
     value = total / episodes
     low, high = np.quantile(weighted / episodes, (0.025, 0.975))

@@ -14,8 +14,6 @@ from .trajectories import Trajectories
 MIN_EPISODES = 5
 """Episodes of a configuration below which its entropy is not given: counts alone."""
 
-PASSED = "episodes that reached the goal: the route of an unfinished one is not decided"
-
 
 def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Strategy labels, and their entropy per configuration."""
@@ -23,9 +21,15 @@ def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Ge
         return left_out(data.task.missing("strategy labels"), "route_class", "route_entropy")
     taken = labels_of(data)
     return {
-        "route_class": route_classes(data, taken, f"Episodes with a strategy label. Of {PASSED}."),
+        "route_class": route_classes(data, taken, f"Episodes with a strategy label. {of_successes(data)}"),
         "route_entropy": _conditional_entropy(data, taken, bootstrap, rng),
     }
+
+
+def of_successes(data: Trajectories) -> str:
+    """The sentence of a definition that says which episodes have labels."""
+    words = data.task.words
+    return f"Of episodes that {words.success}: the {words.label} of an unfinished one is not decided."
 
 
 def labels_of(data: Trajectories) -> dict[int, str]:
@@ -84,7 +88,7 @@ def _conditional_entropy(
     definition = (
         "H(route | configuration): the entropy of the route classes in each configuration (start, goal, obstacles), "
         "Miller-Madow, averaged over configurations by their episodes. Each configuration's own interval draws its "
-        "episodes anew. Of " + PASSED + "."
+        f"episodes anew. {of_successes(data)}"
     )
     names = sorted({str(data.configurations[index]) for index in taken})
     cells = sorted({(str(data.configurations[index]), taken[index]) for index in taken})
@@ -93,7 +97,7 @@ def _conditional_entropy(
     for index in taken:
         onehot[index, column[str(data.configurations[index]), taken[index]]] = 1
     per_configuration, enough = {}, []
-    bits = data.words.label_bits
+    bits = data.task.statistics.label_bits
     for name in names:
         counts = Counter(taken[index] for index in taken if data.configurations[index] == name)
         entry = word_entropy(counts, bits(next(iter(counts))) if bits else None, rng)

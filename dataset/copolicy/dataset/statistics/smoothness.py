@@ -84,7 +84,7 @@ def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str,
         "Frequency below which 95 % of the power of player {}'s action lies (Welch, segments of "
         f"{WELCH_S:g} s{data.axes}), mean over episodes; at most half the frame rate of {data.fps} Hz."
     )
-    speed_of = f"of the {data.words.noun}'s speed"
+    speed_of = f"of the {data.task.words.noun}'s speed"
     rate = f"{speed_of}, mean over episodes. It depends on the frame rate ({data.fps} Hz): compare alike."
     definitions = (
         ("Hz", spectrum.format(0)),
@@ -98,4 +98,5 @@ def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str,
         note = "" if value is not None else f"no episode of {MIN_S:g} s in which it moves"
         episodes = int(np.isfinite(values[:, column]).sum())
         estimates[name] = Estimate(value, unit, definition, episodes, bounds, bootstrap.resampled, note=note)
-    return estimates if data.words.velocity else estimates | left_out(data.task.missing("velocity"), *names[2:])
+    task = data.task
+    return estimates if task.statistics.velocity else estimates | left_out(task.missing("velocity"), *names[2:])

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..exceptions import RunError, ShapeError
 from ..task import PairTask, get_task
-from ..task_parts import TaskStatistics
 
 
 @dataclass(frozen=True)
@@ -101,11 +100,6 @@ class Trajectories:
             raise RunError(self.task.missing("interaction measure"))
         return measured
 
-    @cached_property
-    def words(self) -> TaskStatistics:
-        """How the task speaks of its statistics."""
-        return self.task.statistics
-
     @property
     def axes(self) -> str:
         """How many axes of an action are taken together, after a comma; empty for one."""
@@ -113,14 +107,13 @@ class Trajectories:
         return {1: "", 2: ", both axes"}.get(count, f", all {count} axes")
 
     def force_of(self, player: int) -> np.ndarray:
-        """`(N, m)` a player's action in units of its full force, the farthest of its bounds."""
-        actions = np.split(self.actions, 2, axis=1)[player]
-        return actions / np.abs(self.task.spec.action.bounds).max(axis=0).astype(actions.dtype)
+        """`(N, m)` a player's action in units of its full force."""
+        return np.split(self.task.spec.full_forces(self.actions), 2, axis=1)[player].copy()
 
     @property
     def velocity(self) -> np.ndarray:
         """`(N, k)` of what moves; k is 0 where the task does not say it."""
-        return self.states[:, list(self.words.velocity)]
+        return self.states[:, list(self.task.statistics.velocity)]
 
     @cached_property
     def labels(self) -> list[str | None]:
@@ -174,11 +167,6 @@ class Trajectories:
     def points(self) -> np.ndarray:
         """`(N, 2)` the tracked point in all frames."""
         return np.concatenate([self.path(index) for index in range(len(self.rows))])
-
-    @property
-    def tracked(self) -> str:
-        """What `points` are of, in words."""
-        return f"the {self.words.noun}'s centre"
 
     @property
     def without_places(self) -> str:

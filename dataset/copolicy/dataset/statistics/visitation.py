@@ -105,7 +105,7 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
         _NAMES[0]: Estimate(
             value,
             "bits",
-            f"Entropy (Miller-Madow) of {data.tracked} over {where}; a uniform spread would have "
+            f"Entropy (Miller-Madow) of {data.task.words.body} over {where}; a uniform spread would have "
             f"{np.log2(grid.cells):.1f} bits.",
             episodes,
             interval(value, (drawn_bits[kept] * drawn_weight).sum(axis=1), 0.0),
@@ -115,8 +115,8 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
         _NAMES[1]: Estimate(
             covered,
             "1",
-            f"Share of the cells outside obstacles that {data.tracked} has been in, on {where}. It grows with the "
-            "number of episodes; the interval is that of as many episodes.",
+            f"Share of the cells outside obstacles that {data.task.words.body} has been in, on {where}. It grows with "
+            "the number of episodes; the interval is that of as many episodes.",
             episodes,
             interval(covered, (drawn_seen[kept] * drawn_weight).sum(axis=1), 0.0, 1.0),
             bootstrap.resampled,

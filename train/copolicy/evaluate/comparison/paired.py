@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from copolicy.dataset.scenarios import base_name
+
 REPLICATES = 10_000
 BOOTSTRAP = f"percentile bootstrap over maps, {REPLICATES} replicates, all episodes of a map drawn together"
 
@@ -20,11 +22,6 @@ Values = dict[str, float]
 def episode_key(row: Mapping[str, Any]) -> Key:
     """What makes two episodes the same episode: place in the list of starts, map, partner, repeat."""
     return row["map_index"], row["map_id"], row.get("start_theta"), row.get("partner", ""), row["repeat"]
-
-
-def base_map(map_id: str) -> str:
-    """A map's name without its start orientation: those of one map are no maps of their own."""
-    return map_id.rpartition("-")[0] if map_id.endswith("deg") else map_id
 
 
 def episode_values(rows: Iterable[Mapping[str, Any]]) -> dict[Key, Values]:
@@ -53,7 +50,7 @@ def paired_differences(one: Mapping[Key, Values], other: Mapping[Key, Values], s
         KeyError: `other` lacks an episode of `one`.
     """
     result: dict[str, Any] = {}
-    clusters = [base_map(str(key[1])) for key in one]
+    clusters = [base_name(str(key[1])) for key in one]  # start orientations of one map are no maps of their own
     for name in METRICS:
         if all(name in values for values in (*one.values(), *other.values())):
             differences = np.array([values[name] - other[key][name] for key, values in one.items()])

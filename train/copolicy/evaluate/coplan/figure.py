@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replacement
 from copolicy.dataset.outline_figure import (
     BLUE,
@@ -28,12 +27,10 @@ def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> No
     """Draws all outcomes into a PNG.
 
     Raises:
-        InvalidValueError: their task has no outline.
+        CopolicyError: their task has no outline.
     """
     task = outcomes[0].task
-    outline = task.outline
-    if outline is None:
-        raise InvalidValueError("outcomes", "ones of a task that can be drawn", task.missing("outline"))
+    outline = task.required_outline
     groups: dict[tuple, list[Outcome]] = defaultdict(list)
     for outcome in outcomes:
         groups[obstacles_of(outline.fixed(outcome.map_config))].append(outcome)

@@ -91,9 +91,8 @@ def coplan(
     agent = PolicyAgent(policy, get_task(policy.task), fps=fps, seed=seed)
     rollout = together(agent, [config for _, config, _ in episodes], physics)
     trace = traced_to_the_end(rollout, on_step)
-    about = {"task": rollout.task}
     return [
-        Outcome(*episode, *measured(rollout, trace, agent, k), end=rollout.ends[k], **about)
+        Outcome(*episode, *measured(rollout, trace, agent, k), task=rollout.task, end=rollout.ends[k])
         for k, episode in enumerate(episodes)
     ]
 

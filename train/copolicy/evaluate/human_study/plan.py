@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
+from copolicy.collect.angular_limit import LIMIT
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
 from copolicy.dataset.task import TABLE, PairTask, get_task
 
-from ..study_flags import LIMIT, usual_settings
+from ..study_flags import usual_settings
 
 _VERSION = 1
 _WHAT = "a plan of copolicy-eval human plan"

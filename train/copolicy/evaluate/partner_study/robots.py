@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from copolicy.collect.agents import HeldAgent, PolicyAgent, ScriptedAgent
-from copolicy.collect.agents.scripted import simulated_players
+from copolicy.collect.agents.simulated import simulated_players
 from copolicy.collect.rollout import Agent, Start
 from copolicy.dataset.task import PairTask, Player, get_task
 

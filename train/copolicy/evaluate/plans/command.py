@@ -6,16 +6,19 @@ from collections import Counter, defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from copolicy.collect.angular_limit import LIMIT, angular_limit_of
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 
-from ..study_flags import LIMIT, add_study_flags, learned_task, policy_of, protocol_of, study_needs
+from ..study_flags import add_study_flags, learned_task, policy_of, protocol_of, study_needs
 
 if TYPE_CHECKING:
     from .sampling import Decision
+
+_MAPS = "unseen"
 
 
 def add_plans_command(commands: argparse._SubParsersAction) -> None:
@@ -29,7 +32,7 @@ def add_plans_command(commands: argparse._SubParsersAction) -> None:
         study_needs,
     )
     command.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    add_maps_flag(command, "unseen")
+    add_maps_flag(command, _MAPS, given=False)
     command.add_argument(
         "--map",
         required=True,
@@ -53,7 +56,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
     task = learned_task(arguments.policy)
-    chosen = task.scenario_set(arguments.maps)
+    chosen = task.scenario_set(set_name(task, arguments.maps, _MAPS))
     maps = chosen.scenarios
     if not 0 <= arguments.map < len(maps):
         raise InvalidValueError("--map", f"0 to {len(maps) - 1}", arguments.map)
@@ -89,7 +92,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         "seconds": seconds,
         "samples": len(decision.samples),
         "fps": protocol.fps,
-        **({LIMIT: limit} if (limit := getattr(protocol.physics, LIMIT, None)) is not None else {}),
+        **({LIMIT: limit} if (limit := angular_limit_of(protocol.physics)) is not None else {}),
         **({"told_otherwise": list(protocol.told_otherwise)} if protocol.told_otherwise else {}),
         **_counts(decision),
         "picture": str(arguments.out),
@@ -109,6 +112,6 @@ def _counts(decision: "Decision") -> dict:
         routes[word] = {"plans": len(first), "robot_first_force": mean[:half], "human_first_force": mean[half:]}
     reasons = Counter(sample.outcome.reason for sample in decision.samples)
     labelled = {"routes": routes}
-    if not decision.task.has_strategy:
+    if not decision.task.offers("strategy"):
         labelled = {"succeeded": routes.get("", {"plans": 0}), "routes": decision.task.missing("strategy labels")}
     return {**labelled, "ended_by": dict(sorted(reasons.items()))}

@@ -39,8 +39,9 @@ def save_plans(decision: Decision, path: Path, title: str) -> None:
     if routes[None]:
         label = f"{decision.task.words.did_not}: {routes[None]}"
         handles.append(Line2D([], [], color=_FAILURE, linestyle="--", marker="x", label=label))
+    around = any(shape.role == "obstacle" for shape in decision.outline.fixed(decision.map_config))
     handles += [
-        Rectangle((0, 0), 1, 1, color=OBSTACLE, label="obstacle"),
+        *([Rectangle((0, 0), 1, 1, color=OBSTACLE, label="obstacle")] if around else []),
         Rectangle((0, 0), 1, 1, fill=False, hatch="///", label="goal"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), frameon=False)

@@ -9,7 +9,7 @@ import numpy as np
 from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
-from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.outline import Outline, Pose
 from copolicy.dataset.task import PairTask, World, get_task
 
@@ -53,18 +53,7 @@ class Decision:
     @property
     def outline(self) -> Outline:
         """Of the task."""
-        return outline_of(self.task)
-
-
-def outline_of(task: PairTask) -> Outline:
-    """The outline of a task, in which plans are drawn.
-
-    Raises:
-        InvalidValueError: it has none.
-    """
-    if task.outline is None:
-        raise InvalidValueError("--policy", "one of a task that can be drawn", task.missing("outline"))
-    return task.outline
+        return self.task.required_outline
 
 
 def sample_plans(
@@ -86,12 +75,12 @@ def sample_plans(
         fps: rate at which its actions are held; that of the data set that it was trained on if None.
 
     Raises:
-        InvalidValueError: the policy's task has no outline.
+        CopolicyError: the policy's task has no outline.
         RunError: the episode ended before `seconds`, or the policy cannot go on from there in several ways.
     """
     rate = fps or policy.fps
     task = get_task(policy.task)
-    outline, record_hz = outline_of(task), task.spec.record_hz
+    outline, record_hz = task.required_outline, task.spec.record_hz
     hold = clock.stride(rate, record_hz)
     agent = PolicyAgent(policy, task, fps=rate, seed=seed)
     rollout = together(agent, [config], physics)

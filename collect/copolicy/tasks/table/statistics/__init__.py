@@ -8,7 +8,6 @@ from .routes import route_statistics
 from .steering_dip import dip_statistics
 
 STATISTICS = TaskStatistics(
-    noun="table",
     people="people carried the table",
     velocity=(4, 5),
     interaction="Interaction force: half the difference of both players' forces along the table, in units of a "

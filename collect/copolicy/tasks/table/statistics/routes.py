@@ -8,7 +8,7 @@ from scipy.stats import binomtest
 
 from copolicy.dataset.statistics.estimate import Estimate
 from copolicy.dataset.statistics.resampling import Bootstrap
-from copolicy.dataset.statistics.route_entropy import PASSED, labels_of, route_classes, word_entropy
+from copolicy.dataset.statistics.route_entropy import labels_of, of_successes, route_classes, word_entropy
 from copolicy.dataset.statistics.trajectories import Trajectories
 
 from ..routes import winding
@@ -23,7 +23,7 @@ def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Ge
     taken = labels_of(data)
     return {
         "route_class": _route_class(data, taken),
-        "route_entropy_pooled": _pooled_entropy(data, taken, rng),
+        "route_entropy_pooled": _pooled_entropy(taken, rng),
         **human_distance(data, rng),
     }
 
@@ -43,7 +43,8 @@ def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
         ]
     definition = (
         "Episodes with a route class: for each obstacle the sign of the winding of the table's path around it, L below "
-        f"it on screen when carried to the right, R above; letters by atan2(y, x) of the obstacles. Of {PASSED}."
+        "it on screen when carried to the right, R above; letters by atan2(y, x) of the obstacles. "
+        f"{of_successes(data)}"
     )
     estimate = route_classes(data, taken, definition)
     without, unlike = estimate.details.items()
@@ -51,7 +52,7 @@ def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
     return replace(estimate, details=dict((without, own[0], unlike, own[1])))
 
 
-def _pooled_entropy(data: Trajectories, taken: dict[int, str], rng: np.random.Generator) -> Estimate:
+def _pooled_entropy(taken: dict[int, str], rng: np.random.Generator) -> Estimate:
     sizes = sorted({len(word) for word in taken.values()})
     details = {
         f"{size}_obstacles": word_entropy(Counter(word for word in taken.values() if len(word) == size), size, rng)

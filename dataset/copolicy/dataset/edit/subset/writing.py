@@ -12,10 +12,10 @@ import pyarrow.parquet as pq
 from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
 from ...files.staging import write_as_lerobot
-from ...lerobot_folder.info import split_range
+from ...lerobot_folder.info import split_range, task_name
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
 from ...lerobot_folder.tables import read_parquet
-from ...publication.minimal_card import minimal_card
+from ...publication.minimal_card import write_minimal_card
 from ...versions.content import read_content
 from .aggregation import aggregated_statistics, write_statistics
 from .stored_set import StoredSet
@@ -68,9 +68,8 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     totals = {"total_episodes": len(numbers), "total_frames": int(lengths.sum()), "splits": dict(splits)}
     info = {**source.info, **paths, **totals}
     write_as_lerobot(folder / INFO_FILE, info)
-    (folder / CARD_FILE).write_text(
-        minimal_card({source.rows[number]["license"] or "" for number in numbers}), encoding="utf-8"
-    )
+    licences = {source.rows[number]["license"] for number in numbers}
+    write_minimal_card(folder / CARD_FILE, licences, task_name(source.info))
     return _verified(source, numbers, folder)
 
 
