@@ -69,7 +69,9 @@ def test_git_and_the_wheel_take_it():
         .partition("[tool.")[0]
     )
     assert '"train"' in wheel.partition("only-include")[2].partition("\n")[0]
-    assert 'exclude = ["/*/README.md", "/*/docs", "/*/examples"]' in wheel  # of the rooms: not the model's own card, three folders down
+    assert (
+        'exclude = ["/*/README.md", "/*/docs", "/*/examples"]' in wheel
+    )  # of the rooms: not the model's own card, three folders down
 
 
 def test_the_name_is_not_taken_for_a_folder_of_the_same_name(tmp_path, monkeypatch):
