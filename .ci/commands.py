@@ -87,12 +87,12 @@ def main(folder: Path, documents: list[Path]) -> None:
     sys.path.append(str(ROOT / "tests"))
     from local_hub import LocalHub
 
-    with LocalHub() as hub:
-        for number, document in enumerate(documents):
-            workplace = folder / str(number)
-            workplace.mkdir(parents=True)
+    for number, document in enumerate(documents):
+        workplace = folder / str(number)
+        workplace.mkdir(parents=True)
+        with LocalHub() as hub:
             count = run(document, workplace, hub.environment(workplace / "home"))
-            print(f"{document}: {count} commands ran", flush=True)
+        print(f"{document}: {count} commands ran", flush=True)
 
 
 if __name__ == "__main__":
