@@ -85,7 +85,7 @@ def test_a_data_set_that_is_none_is_one_line(made, tmp_path):
         load_dataset(made / "sett")
     with pytest.raises(FileFormatError):
         load_dataset(made / "raw")
-    with pytest.raises(InvalidValueError, match=r"revision: expected None, since .* is a folder, found 'main'"):
+    with pytest.raises(InvalidValueError, match=r"revision: expected a data set on the Hub, .* is a folder, found"):
         load_dataset(made / "set", "main")
 
 

@@ -8,14 +8,12 @@ from typing import Any, overload
 
 import numpy as np
 
-from .exceptions import CopolicyError, FileFormatError, InvalidValueError
+from .exceptions import CopolicyError, FileFormatError
 from .features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
-from .files.local_path import require_hub_name
-from .files.meta_files import RAW_FOLDER
+from .hub.local_copy import local_copy
 from .lerobot_folder.folder import POSITIONS, LeRobotFolder
 from .lerobot_folder.tables import pa
 from .physics_text import physics_of
-from .publication.repo_id import checked_repo_id
 from .task import PairTask
 
 _REWARD = "next.reward"
@@ -30,32 +28,13 @@ def load_dataset(path: str | Path, revision: str | None = None) -> "PairDataset"
 
     Raises:
         FileFormatError: no such folder, or no LeRobot v3 data set of an installed task.
+        InvalidValueError: a revision of a folder.
         HubError: the Hub does not answer, or has no such data set or revision.
         MissingExtraError: pyarrow is not installed, or for the Hub its client.
     """
-    folder = Path(path)
-    if not folder.exists():
-        folder = _downloaded(str(path), revision)
-    elif revision is not None:
-        raise InvalidValueError("revision", f"None, since {path} is a folder", revision)
-    found = LeRobotFolder.open(folder)
+    found = LeRobotFolder.open(local_copy(str(path), revision))
     found.require_task((STATE, ACTION, ENVIRONMENT_STATE))
     return PairDataset(found)
-
-
-def _downloaded(text: str, revision: str | None) -> Path:
-    from .hub.client import hub_errors, snapshot_download
-    from .hub.repository import resolve
-
-    if revision is not None and "://" not in text:
-        repo_id = checked_repo_id(text, "path")
-    else:
-        repo_id = require_hub_name(text, "a folder, or USER/NAME of a data set on the Hub")
-    # By its commit: asked for a branch or tag while the Hub is away, the client takes an older copy and says nothing.
-    commit = resolve(repo_id, revision or "main")[1]
-    with hub_errors(repo_id, "downloading"):
-        skipped = f"{RAW_FOLDER}/*"
-        return Path(snapshot_download(repo_id, repo_type="dataset", revision=commit, ignore_patterns=skipped))
 
 
 @dataclass(frozen=True, repr=False)

@@ -9,10 +9,9 @@ from typing import Any
 from ..command_line.commands import add_command
 from ..command_line.extras import TABLES
 from ..exceptions import InvalidValueError
-from ..files.local_path import require_hub_name
-from ..files.meta_files import CHECK_FILE, RAW_FOLDER
+from ..files.meta_files import CHECK_FILE
 from ..files.staging import replace_json
-from ..publication.repo_id import checked_repo_id
+from ..hub.local_copy import local_copy
 from ..task import TABLE, get_task
 from .limits import limits_of
 from .result import CheckResult
@@ -60,8 +59,8 @@ def _check(arguments: argparse.Namespace) -> dict:
         raise InvalidValueError("PATH", "a folder, or USER/NAME of a data set on the Hub", None)
     from .checking import add_leaks, check_dataset  # scipy, which `--help` need not wait for
 
-    root = _locate(arguments.path, arguments.revision)
-    against = None if arguments.against is None else _locate(arguments.against)
+    root = local_copy(arguments.path, arguments.revision, ("PATH", "--revision"))
+    against = None if arguments.against is None else local_copy(arguments.against)
     alone = check_dataset(root)
     # What the Hub's client keeps of a data set is a cache, no place for findings.
     wanted = arguments.save and alone.table.kind == "lerobot" and Path(arguments.path).exists()
@@ -70,31 +69,6 @@ def _check(arguments: argparse.Namespace) -> dict:
     result = alone if against is None else add_leaks(alone, root, against)
     document = check_document(result, content, arguments.strict)
     return _summary(arguments, result, document, saved)
-
-
-def _locate(path: str, revision: str | None = None) -> Path:
-    """The folder behind a PATH: itself if it exists, else the data set `USER/NAME` of the Hub, downloaded."""
-    folder = Path(path)
-    if folder.exists():
-        if revision is not None:
-            raise InvalidValueError("--revision", f"a data set on the Hub, {path} is a folder", revision)
-        return folder
-    if revision is not None and "://" not in path:
-        return _download(checked_repo_id(path, "PATH"), revision)
-    return _download(require_hub_name(path, "a folder, or USER/NAME of a data set on the Hub"), revision)
-
-
-def _download(repo_id: str, revision: str | None) -> Path:
-    # Heavy packages, which a folder here need not wait for.
-    from ..hub.client import hub_errors, snapshot_download
-    from ..hub.repository import resolve
-
-    # By its commit: asked for a branch or tag while the Hub is away, the client takes an older copy and says nothing.
-    commit = resolve(repo_id, revision or "main")[1]
-    with hub_errors(repo_id, "downloading"):
-        # The checks read tables and metadata; a copy of the recordings beside them can be large.
-        skipped = f"{RAW_FOLDER}/*"
-        return Path(snapshot_download(repo_id, repo_type="dataset", revision=commit, ignore_patterns=skipped))
 
 
 def _save(root: Path, document: dict[str, Any]) -> str | None:
