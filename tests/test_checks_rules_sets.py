@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from changed_tables import all_frames, find, of, with_column, with_entry, with_frames
 
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.tasks.table.maps import MAP_SETS, identify, map_set
 from copolicy.tasks.table.rules.maps import named_map
@@ -104,7 +104,7 @@ def test_duplicates_by_name_and_by_bits(sound):
     assert [(f.episode, f.message) for f in find(copied, "duplicate_motion")] == [("6", message)]
 
 
-def episodes_of(sound: EpisodeTable, maps: list[str], pairs: list[str]) -> EpisodeTable:
+def episodes_of(sound: EpisodeData, maps: list[str], pairs: list[str]) -> EpisodeData:
     columns = {"map_id": np.array(maps), "map_set": np.array(["training"] * len(maps)), "pair_id": np.array(pairs)}
     return replace(sound, labels=tuple(map(str, range(len(maps)))), columns=columns)
 

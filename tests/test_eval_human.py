@@ -16,7 +16,7 @@ from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.session import recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
 from copolicy.evaluate.human_study.questionnaire import read_ratings

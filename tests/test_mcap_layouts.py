@@ -26,8 +26,8 @@ from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError
-from copolicy.dataset.recording.log import read_episode, read_metadata, read_recording
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, chunk_records
+from copolicy.dataset.recording.reader import read_episode, read_metadata, read_recording
 from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.evaluate.human_study.recordings import study_rows
 from copolicy.tasks.table.maps import MAP_SETS

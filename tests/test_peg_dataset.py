@@ -13,7 +13,7 @@ from local_hub import LocalHub
 from test_peg_task import record
 
 from copolicy.convert.cli import main as convert
-from copolicy.dataset.checks.checking import check_dataset, check_table, read_table
+from copolicy.dataset.checks.checking import check_data, check_dataset, read_data
 from copolicy.dataset.cli import main
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
@@ -65,7 +65,7 @@ def test_sound_data_pass_and_rules_that_the_task_lacks_are_named(peg, recordings
 
 
 def test_what_the_task_does_not_know_is_found(root):
-    sound = read_table(root)
+    sound = read_data(root)
 
     def put(place, value):
         return lambda values: values.__setitem__(place, value)
@@ -91,7 +91,7 @@ def test_what_the_task_does_not_know_is_found(root):
 
 
 def errors(table) -> set[str]:
-    return {finding.rule for finding in check_table(table).findings if finding.severity == "error"}
+    return {finding.rule for finding in check_data(table).findings if finding.severity == "error"}
 
 
 def test_damage_fails_the_command(root, capsys):
@@ -175,9 +175,9 @@ def test_edits_releases_and_differences(peg, recordings, root, tmp_path, capsys)
     json_of(capsys, "exclude", root, "--episodes", "4", "--reason", "late")
     json_of(capsys, "release", root, "--bump", "major", "--notes", "The first.")
     json_of(capsys, "withdraw", "C-7", root)
-    assert len(read_table(root).labels) == 5
+    assert len(read_data(root).labels) == 5
     json_of(capsys, "withdraw", "C-7", root, "--yes")
-    table = read_table(root)
+    table = read_data(root)
     assert (len(table.labels), table.task, table.damage) == (4, peg, ())
     assert json_of(capsys, "diff", tmp_path / "part", root, status=1)
     assert json_of(capsys, "diff", root, root) is not None
@@ -192,5 +192,5 @@ def test_published_and_pulled(root, peg, tmp_path):
         done = user.run("pull", "lab/peg", "--root", tmp_path / "pulled", "--raw", "--json")
         assert done.status == 0, done.err
         assert user.run("check", "lab/peg", "--revision", "data-1.0.0").status == 0
-    assert read_table(tmp_path / "pulled").task == peg
+    assert read_data(tmp_path / "pulled").task == peg
     assert main(["check", str(tmp_path / "pulled" / "raw")]) == 0

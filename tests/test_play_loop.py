@@ -11,8 +11,8 @@ from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.rollout import Agent
 from copolicy.collect.ticker import DT_NS
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode
 
 SCRIPTED = (PilotSpec("scripted", "S01"), PilotSpec("scripted", "S01"))
 

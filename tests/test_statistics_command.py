@@ -140,7 +140,7 @@ def test_files_of_the_original_program(tmp_path, upstream):
     raw = str(upstream / "examples_scripted" / "raw")
     assert convert(["upstream", raw, "--root", str(root), "--repo-id", "local/t"]) == 0
     data, _ = read_trajectories(root)
-    known = [(row.route_class, route_class(data.path(n), row.map_config)) for n, row in enumerate(data.rows)]
+    known = [(row.route_class, route_class(data.path(n), row.scenario)) for n, row in enumerate(data.rows)]
     assert all(column == word for (column, word), row in zip(known, data.rows, strict=True) if row.success)
     assert main(["stats", str(root)]) == 0
     document = json.loads((root / STATISTICS_FILE).read_text(encoding="utf-8"))

@@ -13,7 +13,7 @@ from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError, 
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import broken_links, distinct, distinct_files
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.recording.log import read_episode, recorded_task
+from copolicy.dataset.recording.reader import read_episode, recorded_task
 from copolicy.dataset.worker_pool import WorkerPool
 
 from .lerobot.prepare import Conversion, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from

@@ -12,7 +12,7 @@ import numpy as np
 from .exceptions import InvalidValueError
 from .task_spec import RECORD_HZ
 
-Hold = Literal["mean", "first"]
+Downsampling = Literal["mean", "first"]
 """How the actions between two frames become one: their mean (reproduces the motion), or the first of them."""
 
 
@@ -38,16 +38,18 @@ def frame_states(states: np.ndarray, fps: int, record_hz: int = RECORD_HZ) -> np
     return states[:: stride(fps, record_hz)]
 
 
-def frame_actions(actions: np.ndarray, fps: int, hold: Hold = "mean", record_hz: int = RECORD_HZ) -> np.ndarray:
+def frame_actions(
+    actions: np.ndarray, fps: int, downsampling: Downsampling = "mean", record_hz: int = RECORD_HZ
+) -> np.ndarray:
     """Actions of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`.
 
     The dynamics are linear in the force but for a clip, so the mean of the held steps gives the velocity that was
     recorded; the last frame may hold fewer steps.
     """
     step = stride(fps, record_hz)
-    if hold not in get_args(Hold):
-        raise InvalidValueError("hold", f"one of {get_args(Hold)}", hold)
-    if hold == "first" or step == 1:
+    if downsampling not in get_args(Downsampling):
+        raise InvalidValueError("downsampling", f"one of {get_args(Downsampling)}", downsampling)
+    if downsampling == "first" or step == 1:
         return actions[::step].copy()
     starts = np.arange(0, len(actions), step)
     counts = np.diff(np.append(starts, len(actions)))

@@ -11,13 +11,13 @@ from .task_spec import TaskSpec
 
 Source = Literal["human", "simulated", "upstream"]
 
-OTHER_REASONS = ("operator_discard", "device_lost", "focus_lost", "crash_recovered", "unknown")
+GENERIC_REASONS = ("operator_discard", "device_lost", "focus_lost", "crash_recovered", "unknown")
 """How an episode can end beside the reasons of its task."""
 
 
 def termination_reasons(spec: TaskSpec) -> tuple[str, ...]:
     """What the column `termination_reason` of an episode of a task can hold."""
-    return (*spec.reasons, *OTHER_REASONS)
+    return (*spec.reasons, *GENERIC_REASONS)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class EpisodeMeta:
     license: str = ""
     software_version: str = ""
     source_sha256: str = ""
-    physics: str = ""  # see physics_text
+    physics: str = ""  # see settings_text
     obstacle_size: int = 0  # px, 0 where it is not known; of the largest where they differ
     obstacle_sizes: str = ""  # px of each, comma separated, where they differ
     map_set_version: str = ""  # of a set from a file

@@ -48,7 +48,7 @@ class Outline(Protocol):
         ...
 
 
-def placed(pose: Pose, point: Point) -> Point:
+def to_scene(pose: Pose, point: Point) -> Point:
     """Where a point (u, v) of a body is in the scene."""
     x, y, theta = pose
     u, v = point
@@ -56,7 +56,7 @@ def placed(pose: Pose, point: Point) -> Point:
     return x + u * cos + v * sin, y - u * sin + v * cos
 
 
-def between(start: Pose, end: Pose, share: float) -> Pose:
+def interpolate_pose(start: Pose, end: Pose, share: float) -> Pose:
     """The pose at a share in [0, 1] of the way, turned the shorter way round."""
     turn = (end[2] - start[2] + math.pi) % (2 * math.pi) - math.pi
     x, y = (a + share * (b - a) for a, b in zip(start[:2], end[:2], strict=True))

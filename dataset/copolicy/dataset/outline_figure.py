@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from .outline import Outline, Point, Pose, Shape, placed
+from .outline import Outline, Point, Pose, Shape, to_scene
 
 # Okabe and Ito's palette, told apart with every kind of colour vision; its yellow is darker here, on white.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#E69F00", "#009E73", "#CC79A7"
@@ -79,7 +79,7 @@ def draw_body(axes: Any, outline: Outline, pose: Pose) -> None:
     """What moves, at a pose, below the lines of the figure."""
     for shape in outline.body:
         edge = "#8A7F6A" if shape.role == "body" else "none"
-        corners = [placed(pose, point) for point in shape.corners]
+        corners = [to_scene(pose, point) for point in shape.corners]
         axes.fill(*_columns(corners), facecolor=_FILLS[shape.role], edgecolor=edge, zorder=1.5)
 
 
@@ -93,7 +93,7 @@ def obstacles_of(shapes: Iterable[Shape]) -> tuple[tuple[Point, tuple[float, flo
     return tuple(sorted(found))
 
 
-def places_text(obstacles: Iterable[tuple[Point, Any]], outline: Outline) -> str:
+def positions_text(obstacles: Iterable[tuple[Point, Any]], outline: Outline) -> str:
     """Where obstacles are, as `(400, 200) (800, 350)`."""
     digits = decimals(outline)
     return " ".join(f"({x:.{digits}f}, {y:.{digits}f})" for (x, y), _ in obstacles)

@@ -13,7 +13,7 @@ from .features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_o
 from .hub.local_copy import local_copy
 from .lerobot_folder.folder import POSITIONS, LeRobotFolder
 from .lerobot_folder.tables import pa
-from .physics_text import physics_of
+from .settings_text import parse_settings_text
 from .task import PairTask
 
 _REWARD = "next.reward"
@@ -73,7 +73,7 @@ class DatasetEpisode:
     @property
     def settings(self) -> Any:
         """Of the world that led from state to state; None where the data set does not say."""
-        return physics_of(self.columns["physics"], self.task)
+        return parse_settings_text(self.columns["physics"], self.task)
 
     @property
     def path(self) -> np.ndarray | None:

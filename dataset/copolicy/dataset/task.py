@@ -178,7 +178,7 @@ class PairTask(ABC):
         """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
         return ""
 
-    def unseen_in(self, episodes: Sequence[Mapping[str, Any]]) -> str:
+    def unseen_summary(self, episodes: Sequence[Mapping[str, Any]]) -> str:
         """How many of some episodes, by these columns, have something that no policy sees; empty: none."""
         found = [text for columns in episodes if (text := self.unseen(columns))]
         return f"{len(found)} of {len(episodes)} have what no policy sees: {found[0]}" if found else ""
@@ -235,7 +235,7 @@ class PairTask(ABC):
     @property
     def words(self) -> TaskWords:
         """How screens, cards and pages speak of it."""
-        return TaskWords.of(self.spec)
+        return TaskWords.from_spec(self.spec)
 
     def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
         """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""

@@ -234,7 +234,7 @@ class Rule:
 
     Attributes:
         what: what it looks after; where `find` is None, the part that a task lacks without a rule of this name.
-        find: yields the findings of an `EpisodeTable`; None in the place of a rule that only a task can bring.
+        find: yields the findings of an `EpisodeData`; None in the place of a rule that only a task can bring.
         frames: columns of the frames that it reads.
         columns: episode columns that it reads.
         kinds: the kinds of data that it says something about.

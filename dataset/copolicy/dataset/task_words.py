@@ -88,7 +88,7 @@ class TaskWords:
     paper: str = ""
 
     @classmethod
-    def of(cls, spec: TaskSpec) -> "TaskWords":
+    def from_spec(cls, spec: TaskSpec) -> "TaskWords":
         """What the spec alone can say."""
         vectors = {"State": spec.state, "Scenario": spec.scenario, "Action of each player": spec.action}
         numbers = " ".join(f"{name}: {_numbers(vector)}." for name, vector in vectors.items())

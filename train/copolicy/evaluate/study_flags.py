@@ -179,7 +179,7 @@ def task_entry(task: PairTask) -> dict[str, str]:
 
 def unseen_entry(task: PairTask, scenarios: Sequence[Any]) -> dict[str, str]:
     """What policies do not see of some scenarios, as a result states it; says so."""
-    text = task.unseen_in([task.columns_of(scenario) for scenario in scenarios])
+    text = task.unseen_summary([task.columns_of(scenario) for scenario in scenarios])
     if text:
         logging.warning("warning: of the maps, %s", text)
     return {"unseen": text} if text else {}

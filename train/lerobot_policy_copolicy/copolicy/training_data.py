@@ -110,12 +110,12 @@ def require_same_rate(config: CopolicyConfig) -> None:
         there = replace(environment.physics, **learned)
         words = task.settings_summary(there), task.settings_summary(environment.physics)
         logging.warning("The policy learned under %s; the environment has %s", *words)
-    if unseen := task.unseen_in([task.columns_of(scenario) for scenario in environment.scenarios]):
+    if unseen := task.unseen_summary([task.columns_of(scenario) for scenario in environment.scenarios]):
         logging.warning("Of the maps of the environment, %s", unseen)
 
 
 def _unseen(task: PairTask, meta: Any, episodes: Collection[int] | None) -> str:
-    """See `PairTask.unseen_in`."""
+    """See `PairTask.unseen_summary`."""
     scenario = next(iter(scenarios[0] for scenarios in task.scenario_sets.values() if scenarios), None)
     table = meta.episodes
     names = [name for name in task.columns_of(scenario) if name in table.column_names] if table and scenario else []
@@ -127,7 +127,7 @@ def _unseen(task: PairTask, meta: Any, episodes: Collection[int] | None) -> str:
         for episode, row in zip(numbers, rows, strict=True)
         if episodes is None or episode in episodes
     ]
-    return task.unseen_in(chosen)
+    return task.unseen_summary(chosen)
 
 
 def _physics(meta: Any, episodes: Collection[int] | None) -> Counter[str]:

@@ -21,7 +21,7 @@ from copolicy.dataset.outline_figure import (
     decimals,
     label_colours,
     obstacles_of,
-    places_text,
+    positions_text,
 )
 from copolicy.dataset.task_spec import TIMEOUT
 
@@ -150,7 +150,7 @@ def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[
             own = sizes if len(set(sizes)) > 1 else sizes[:1]
             wide = f" of {', '.join(own)} {outline.unit}" if several else ""
             some = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}"
-            name = f"{some}{wide} at {places_text(obstacles, outline)}"
+            name = f"{some}{wide} at {positions_text(obstacles, outline)}"
         polygons = [_polygon(outline, shape) for shape in shapes]
         listed.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
     return listed

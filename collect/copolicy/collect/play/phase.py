@@ -2,7 +2,7 @@
 
 from enum import Enum, auto
 
-from copolicy.dataset.outline import between
+from copolicy.dataset.outline import interpolate_pose
 
 from ..inputs import Press
 from ..screen import WORLD, Canvas
@@ -79,7 +79,7 @@ class Phase:
     def draw_world(self, canvas: Canvas, trial: Trial, share: float = 1.0, carrying: bool = True) -> None:
         """Draws the world and the bars around it; before the episode the bars say who sits where."""
         view = self.game.view(trial.map_config)
-        pose = between(trial.before, trial.pose, share)
+        pose = interpolate_pose(trial.before, trial.pose, share)
         trail = [*trial.trail, pose]
         view.draw(canvas.surface, canvas.rect(*WORLD), pose, trial.forces, trail)
         draw_hud(canvas, self.game.hud(trial, carrying))

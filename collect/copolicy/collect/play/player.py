@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.physics_text import physics_summary
+from copolicy.dataset.settings_text import describe_settings
 from copolicy.dataset.task import PairTask, get_task
 
 from ..agents import PersonAgent, PolicyAgent, ReplayAgent, ScriptedAgent, load_policy
@@ -134,7 +134,7 @@ def say_other_physics(players: Iterable[Player], physics: Any, task: PairTask | 
         if isinstance(player.agent, ReplayAgent):
             recorded = replace(player.agent.physics, step_limit=physics.step_limit)
             if recorded != physics:
-                words = (player.agent.name, physics_summary(recorded, task), physics_summary(physics, task))
+                words = (player.agent.name, describe_settings(recorded, task), describe_settings(physics, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", *words)
 
 

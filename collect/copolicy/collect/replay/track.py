@@ -8,8 +8,8 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.outline import Pose, between
-from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.outline import Pose, interpolate_pose
+from copolicy.dataset.recording.reader import Recording, read_recording
 from copolicy.dataset.task import PairTask, get_task
 
 
@@ -64,7 +64,7 @@ class Track:
         """The pose at a position between 0 and T, steps; between two states a way between them."""
         before = min(int(position), self.steps)
         after = min(before + 1, self.steps)
-        return between(self.poses[before], self.poses[after], position - before)
+        return interpolate_pose(self.poses[before], self.poses[after], position - before)
 
     def forces_at(self, position: float) -> tuple[float, float, float, float]:
         """The forces that act at a position."""

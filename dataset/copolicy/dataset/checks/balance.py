@@ -10,11 +10,11 @@ from scipy.stats import chi2_contingency, chisquare
 from ..scenarios import base_name
 from ..task import PairTask
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _maps(table: EpisodeTable) -> Iterator[Finding]:
+def _maps(table: EpisodeData) -> Iterator[Finding]:
     stated = _stated_weights(table)
     for name, counts in _by_set(table).items():
         weights = _weights(table.task, name, counts, stated)
@@ -36,7 +36,7 @@ def _maps(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding("", "balance", p, table.limit("balance.p"), "warning", message)
 
 
-def _pairs(table: EpisodeTable) -> Iterator[Finding]:
+def _pairs(table: EpisodeData) -> Iterator[Finding]:
     pairs, maps = table.columns["pair_id"], _base_maps(table)
     known = pairs != ""
     if not known.any():
@@ -61,18 +61,18 @@ def _pairs(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding("", "balance_pairs", float(result[1]), table.limit("balance.p"), "warning", message)  # pyright: ignore[reportArgumentType]
 
 
-def _by_set(table: EpisodeTable) -> dict[str, Counter[str]]:
+def _by_set(table: EpisodeData) -> dict[str, Counter[str]]:
     counts: dict[str, Counter[str]] = {}
     for name, map_id in zip(table.columns["map_set"].tolist(), _base_maps(table).tolist(), strict=True):
         counts.setdefault(name or "unnamed maps", Counter())[map_id] += 1
     return counts
 
 
-def _base_maps(table: EpisodeTable) -> np.ndarray:
+def _base_maps(table: EpisodeData) -> np.ndarray:
     return np.array([base_name(name) for name in table.columns["map_id"].tolist()], str)
 
 
-def _stated_weights(table: EpisodeTable) -> dict[str, int]:
+def _stated_weights(table: EpisodeData) -> dict[str, int]:
     """Of the maps of files, by map."""
     if "map_weight" not in table.columns:
         return {}

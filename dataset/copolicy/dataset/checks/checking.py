@@ -11,28 +11,28 @@ from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
 from ..task import PairTask
 from ..task_parts import Rule
-from . import balance, check_sums, inputs, leakage, loading, maps, mixtures, schema, timing
-from .episode_table import EpisodeTable
+from . import balance, episode_scenario, inputs, integrity, leakage, loading, provenance, schema, timing
+from .episode_data import EpisodeData
 from .finding import SEVERITIES, Finding
 from .read_recordings import read_recordings
 from .result import CheckResult
 
 RULES: tuple[Rule, ...] = (
     *schema.RULES,
-    *check_sums.RULES,
+    *integrity.RULES,
     *loading.RULES,
     *timing.RULES,
     *inputs.RULES,
     *timing.MOTION_RULES,
     *leakage.DUPLICATE_RULES,
-    *maps.RULES,
+    *episode_scenario.RULES,
     Rule("goal_contact", "rule for where successes end"),
     Rule("obstacle_contact", "rule for the obstacles on its way"),
     Rule("wall_contact", "rule for the walls around it"),
     *balance.RULES,
-    *mixtures.CONSENT_RULES,
+    *provenance.CONSENT_RULES,
     *leakage.RULES,
-    *mixtures.RULES,
+    *provenance.RULES,
 )
 """The generic rules in the order of the report, and the places of those that only a task can bring."""
 
@@ -43,18 +43,18 @@ def rules_of(task: PairTask) -> tuple[Rule, ...]:
     return (*(own.pop(rule.name, rule) for rule in RULES), *own.values())
 
 
-def of_recordings(rule: Rule) -> bool:
+def judges_one_recording(rule: Rule) -> bool:
     """Whether a rule says something of each recording, whatever else there is: any part of a folder can be held
     against such rules on its own, and the data set that the recordings became against the others."""
     return "recordings" in rule.kinds and not rule.whole
 
 
-def of_data_sets(rule: Rule) -> bool:
+def judges_data_set(rule: Rule) -> bool:
     """The others: both together leave no rule out."""
-    return not of_recordings(rule)
+    return not judges_one_recording(rule)
 
 
-def read_table(root: Path) -> EpisodeTable:
+def read_data(root: Path) -> EpisodeData:
     """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
 
     Raises:
@@ -79,7 +79,7 @@ def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
         root: a LeRobot data set or a folder of recordings.
         against: another one that must share no episode with it, for example the test data.
     """
-    result = check_table(read_table(root))
+    result = check_data(read_data(root))
     return result if against is None else add_leaks(result, root, against)
 
 
@@ -89,7 +89,7 @@ def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:
     Args:
         result: of the check of `root`.
     """
-    other = read_table(against)
+    other = read_data(against)
     shared = leakage.leaks(
         leakage.Part(root.name, result.table, range(len(result.table.labels))),
         leakage.Part(against.name, other, range(len(other.labels))),
@@ -98,7 +98,7 @@ def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:
     return CheckResult(result.table, findings, (*result.applied, "against"), result.not_applied)
 
 
-def check_table(table: EpisodeTable, wanted: Callable[[Rule], bool] = lambda rule: True) -> CheckResult:
+def check_data(table: EpisodeData, wanted: Callable[[Rule], bool] = lambda rule: True) -> CheckResult:
     """Applies every wanted rule that a table has the columns for and its task the part."""
     findings: list[Finding] = []
     applied: list[str] = []
@@ -123,7 +123,7 @@ def _worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
-def _why_not(rule: Rule, table: EpisodeTable) -> str:
+def _why_not(rule: Rule, table: EpisodeData) -> str:
     if table.kind not in rule.kinds:
         return f"says nothing about {table.kind}"
     missing = [name for name in rule.columns if name not in table.columns]

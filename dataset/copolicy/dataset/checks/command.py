@@ -13,9 +13,9 @@ from ..files.meta_files import CHECK_FILE
 from ..files.staging import replace_json
 from ..hub.local_copy import local_copy
 from ..task import TABLE, get_task
+from .check_report import check_document, content_hash
 from .limits import limits_of
 from .result import CheckResult
-from .stored_check import check_document, content_hash
 
 _EXAMPLE = """copolicy-dataset check recordings/session-1
   copolicy-dataset check datasets/train --against datasets/test --strict

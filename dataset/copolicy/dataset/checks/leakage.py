@@ -11,7 +11,7 @@ import numpy as np
 from ..features import ACTION, STATE
 from ..lerobot_folder.info import split_range
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding, Severity
 
 PEOPLE = ("pair_id", "player_0_id", "player_1_id")
@@ -22,11 +22,11 @@ class Part:
     """One side of a comparison: some episodes of a table, by their places."""
 
     name: str
-    table: EpisodeTable
+    table: EpisodeData
     places: Sequence[int]
 
 
-def splits(table: EpisodeTable) -> tuple[list[Part], list[Finding]]:
+def splits(table: EpisodeData) -> tuple[list[Part], list[Finding]]:
     """The splits of `meta/info.json` (`"train": "0:40"`), and what is wrong with their ranges."""
     parts: list[Part] = []
     findings: list[Finding] = []
@@ -71,7 +71,7 @@ def leaks(one: Part, other: Part) -> Iterator[Finding]:
             yield Finding("", "leakage_people", len(shared), 0, severity, message)
 
 
-def _between_splits(table: EpisodeTable) -> Iterator[Finding]:
+def _between_splits(table: EpisodeData) -> Iterator[Finding]:
     parts, findings = splits(table)
     yield from findings
     for one, other in combinations(parts, 2):
@@ -99,7 +99,7 @@ def _people(part: Part) -> bool:
     return sources is None or bool(np.isin(sources[list(part.places)], ("human", "upstream")).any())
 
 
-def motion_digests(table: EpisodeTable) -> list[str]:
+def motion_digests(table: EpisodeData) -> list[str]:
     """`(F,)` sha256 of each episode's states and actions, in single precision as a data set stores them."""
     rows = np.ascontiguousarray(np.hstack((table.frames[STATE], table.frames[ACTION])), np.float32)
     return [
@@ -108,13 +108,13 @@ def motion_digests(table: EpisodeTable) -> list[str]:
     ]
 
 
-def _by_column(table: EpisodeTable) -> Iterator[Finding]:
+def _by_column(table: EpisodeData) -> Iterator[Finding]:
     for column, what in (("episode_uuid", "the same episode_uuid as"), ("source_sha256", "made of the same file as")):
         if column in table.columns:
             yield from _repeated(table.columns[column].tolist(), list(table.labels), what)
 
 
-def _by_bits(table: EpisodeTable) -> Iterator[Finding]:
+def _by_bits(table: EpisodeData) -> Iterator[Finding]:
     labels = [table.labels[place] for place in table.framed]
     yield from _repeated(motion_digests(table), labels, "the same states and actions, bit for bit, as")
 

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ..interaction import IDENTICAL
+from ..shared_device import IDENTICAL
 from ..task import PairTask
 from ..task_parts import Limit
 

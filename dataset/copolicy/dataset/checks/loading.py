@@ -8,18 +8,18 @@ import numpy as np
 from ..exceptions import CopolicyError
 from ..features import features_of
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding, Severity
 
 
-def _files(table: EpisodeTable) -> Iterator[Finding]:
+def _files(table: EpisodeData) -> Iterator[Finding]:
     from ..lerobot_folder.loading import file_problems
 
     for problem in file_problems(table.root, table.info, table.episodes.to_pylist(), table.data_files):
         yield Finding(str(problem.episode), "loading", None, None, "error", problem.message)
 
 
-def _tasks(table: EpisodeTable) -> Iterator[Finding]:
+def _tasks(table: EpisodeData) -> Iterator[Finding]:
     from ..lerobot_folder.loading import task_problems
 
     used = np.unique(table.frames["task_index"]).tolist()
@@ -28,7 +28,7 @@ def _tasks(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding(label, "tasks", None, None, "error", problem.message)
 
 
-def _statistics(table: EpisodeTable) -> Iterator[Finding]:
+def _statistics(table: EpisodeData) -> Iterator[Finding]:
     from ..lerobot_folder.loading import read_statistics, statistics_problems
 
     problems = list(statistics_problems(table.root, table.info))
@@ -48,7 +48,7 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
             yield from _against_frames(table, name, stored[name], rows)
 
 
-def _against_frames(table: EpisodeTable, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
+def _against_frames(table: EpisodeData, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
     from ..lerobot_folder.loading import STATISTICS, numbers
 
     warning, error = (table.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))

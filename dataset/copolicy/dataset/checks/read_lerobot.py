@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set as an `EpisodeTable`, read with pyarrow; a damaged file becomes a finding."""
+"""A LeRobot v3 data set as an `EpisodeData`, read with pyarrow; a damaged file becomes a finding."""
 
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,14 @@ from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..lerobot_folder.folder import POSITIONS, other_task
 from ..lerobot_folder.info import read_info, require_episodes, task_of
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 CLOCK = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 """The columns of the frames that LeRobot itself adds."""
 
 
-def read_lerobot(root: Path) -> EpisodeTable:
+def read_lerobot(root: Path) -> EpisodeData:
     """Everything about a data set that the rules look at: numbers and flags, no pictures.
 
     Raises:
@@ -50,7 +50,7 @@ def read_lerobot(root: Path) -> EpisodeTable:
         if info[name] != number:
             message = f"meta/info.json has another {name} than the files"
             damage.append(Finding("", "rows", number, info[name], "error", message))
-    return EpisodeTable(
+    return EpisodeData(
         root, "lerobot", float(info["fps"]), labels, columns, frames, framed, starts, None, info, files,
         tuple(damage), meta.take(pa.array(order)), episodes_of_files, task_of(info),
     )  # fmt: skip

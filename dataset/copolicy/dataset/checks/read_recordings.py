@@ -1,4 +1,4 @@
-"""A folder of recordings, one MCAP file an episode, as an `EpisodeTable`."""
+"""A folder of recordings, one MCAP file an episode, as an `EpisodeData`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,13 +10,13 @@ from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, ForeignRecordingError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE
 from ..files.listing import broken_links, distinct_files
-from ..recording.log import read_episode
+from ..recording.reader import read_episode
 from ..task import get_task
-from .episode_table import COLUMN_TYPES, EpisodeTable
+from .episode_data import COLUMN_TYPES, EpisodeData
 from .finding import Finding
 
 
-def read_recordings(root: Path) -> EpisodeTable:
+def read_recordings(root: Path) -> EpisodeData:
     """Every `*.mcap` below a folder; a file that cannot be read becomes a finding, as does one that broke off."""
     paths = distinct_files(root, "*.mcap")
     episodes: list[Episode] = []
@@ -40,7 +40,7 @@ def read_recordings(root: Path) -> EpisodeTable:
             rule = "foreign" if isinstance(error, ForeignRecordingError) else "check_sum"
             damage.append(Finding(label, rule, None, None, "error", message))
             continue
-        damage += not_verified(label, episode)
+        damage += unverified_findings(label, episode)
         if episodes and episode.task != episodes[0].task:
             found = f"a recording of the task {episode.task!r} beside those of {episodes[0].task!r}"
             damage.append(Finding(label, "foreign", None, None, "error", found))
@@ -49,17 +49,17 @@ def read_recordings(root: Path) -> EpisodeTable:
             labels.append(label)
         else:
             damage.append(Finding(label, "empty", 0, 1, "error", "a recording without a single step"))
-    return recordings_table(root, labels, episodes, tuple(damage))
+    return data_of_recordings(root, labels, episodes, tuple(damage))
 
 
-def not_verified(label: str, episode: Episode) -> list[Finding]:
+def unverified_findings(label: str, episode: Episode) -> list[Finding]:
     """What of a recording carries no check sum, so that nobody can know whether it is what was written."""
     return [Finding(label, "not_verified", None, None, "warning", note) for note in episode.notes]
 
 
-def recordings_table(
+def data_of_recordings(
     root: Path, labels: Sequence[str], episodes: Sequence[Episode], damage: tuple[Finding, ...] = ()
-) -> EpisodeTable:
+) -> EpisodeData:
     """Recordings that are in memory already.
 
     Args:
@@ -82,7 +82,7 @@ def recordings_table(
             ENVIRONMENT_STATE: np.repeat(scenarios, lengths, axis=0),
         }
         final_states = np.array([episode.final_state for episode in episodes])
-    return EpisodeTable(
+    return EpisodeData(
         root,
         "recordings",
         float(task.spec.record_hz),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
@@ -16,7 +16,7 @@ class CheckResult:
         not_applied: the others, each with the reason.
     """
 
-    table: EpisodeTable
+    table: EpisodeData
     findings: tuple[Finding, ...]
     applied: tuple[str, ...]
     not_applied: dict[str, str]

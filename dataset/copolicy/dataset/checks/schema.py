@@ -9,7 +9,7 @@ from ..episode import EPISODE_COLUMNS, Source, termination_reasons
 from ..features import ACTION, HUMAN_ACTION, features_of
 from ..lerobot_folder.info import stripped_hint
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 CLOCK_FEATURES: dict[str, dict] = {
@@ -22,7 +22,7 @@ CLOCK_FEATURES: dict[str, dict] = {
 """The features that LeRobot adds to every data set."""
 
 
-def _format(table: EpisodeTable) -> Iterator[Finding]:
+def _format(table: EpisodeData) -> Iterator[Finding]:
     version = str(table.info.get("codebase_version"))
     if not version.startswith("v3."):
         yield Finding("", "schema", version, "v3.x", "error", "another version of LeRobot's format")
@@ -32,7 +32,7 @@ def _format(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding("", "schema", table.fps, f"a divisor of {record_hz}", "error", message)
 
 
-def _features(table: EpisodeTable) -> Iterator[Finding]:
+def _features(table: EpisodeData) -> Iterator[Finding]:
     features, ours = table.info["features"], features_of(table.task.spec)
     for name, expected in {**ours, **CLOCK_FEATURES}.items():
         entry = features.get(name)
@@ -61,7 +61,7 @@ def _features(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding("", "schema", f"{found_kind} x {found_width}", f"{kind} x {width}", "error", message)
 
 
-def _columns(table: EpisodeTable) -> Iterator[Finding]:
+def _columns(table: EpisodeData) -> Iterator[Finding]:
     missing = [name for name in EPISODE_COLUMNS if name not in table.columns]
     if missing:
         hint = stripped_hint(table.info, table.root) if "episode_uuid" in missing and table.kind == "lerobot" else ""
@@ -78,7 +78,7 @@ def _columns(table: EpisodeTable) -> Iterator[Finding]:
         yield from table.found("schema", uuids == "", uuids, "a name", "no episode_uuid")
 
 
-def _outcome(table: EpisodeTable) -> Iterator[Finding]:
+def _outcome(table: EpisodeData) -> Iterator[Finding]:
     reasons, successes = table.columns["termination_reason"], table.task.spec.successes
     reached, success = np.isin(reasons, successes), table.columns["success"]
     goal = " or ".join(successes)
@@ -89,19 +89,19 @@ def _outcome(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("outcome", ~reached & success, reasons, goal, message)
 
 
-def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:
+def _outcome_of_frames(table: EpisodeData) -> Iterator[Finding]:
     last = np.zeros(table.frame_count, bool)
     last[table.ends] = True
     for name, expected, message in (
         ("next.done", last, "next.done is not true at the last frame alone"),
-        ("next.success", last & np.repeat(table.of_framed("success"), table.counts),
+        ("next.success", last & np.repeat(table.framed_column("success"), table.counts),
          "next.success contradicts the episode's success"),
     ):  # fmt: skip
         marks = table.count(table.frames[name].reshape(-1).astype(bool) != expected)
         yield from table.found("outcome", marks > 0, marks, 0, message)
 
 
-def _alignment(table: EpisodeTable) -> Iterable[Finding]:
+def _alignment(table: EpisodeData) -> Iterable[Finding]:
     human, stored = np.split(table.frames[ACTION], 2, axis=1)[1], table.frames[HUMAN_ACTION]
     previous = np.zeros_like(human)
     previous[1:] = human[:-1]

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _late_ticks(table: EpisodeTable) -> Iterator[Finding]:
+def _late_ticks(table: EpisodeData) -> Iterator[Finding]:
     steps = np.maximum(np.rint(table.columns["duration_s"] * table.task.spec.record_hz), 1)
     yield from table.graded("late_ticks", table.columns["late_ticks"] / steps, "share of steps that began late")
 
 
-def _achieved_hz(table: EpisodeTable) -> Iterator[Finding]:
+def _achieved_hz(table: EpisodeData) -> Iterator[Finding]:
     kept, hz = table.columns["achieved_hz"], table.task.spec.record_hz
     yield from table.graded("achieved_hz", np.abs(kept / hz - 1), f"the loop's rate was this share away from {hz} Hz")
     unknown = np.isnan(kept) & (table.columns["source"] == "human")
@@ -23,7 +23,7 @@ def _achieved_hz(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding("", "achieved_hz", int(unknown.sum()), 0, "warning", message)
 
 
-def _timestamps(table: EpisodeTable) -> Iterator[Finding]:
+def _timestamps(table: EpisodeData) -> Iterator[Finding]:
     place = np.arange(table.frame_count) - np.repeat(table.starts, table.counts)
     stored = table.frames["timestamp"].reshape(-1).astype(float)
     # Single precision at 1000 s resolves 6e-5 s, within the tolerance.
@@ -32,14 +32,14 @@ def _timestamps(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.beyond("timestamp", off, message)
 
 
-def _duration(table: EpisodeTable) -> Iterator[Finding]:
+def _duration(table: EpisodeData) -> Iterator[Finding]:
     off = np.abs(table.columns["duration_s"] * table.fps - table.columns["length"])
     bound = table.limit("duration")
     message = "duration_s and the number of frames differ by this many frames"
     yield from table.found("duration", ~(off <= bound + 1e-6), off, bound, message)
 
 
-def _short(table: EpisodeTable) -> Iterator[Finding]:
+def _short(table: EpisodeData) -> Iterator[Finding]:
     seconds, bound = table.columns["length"] / table.fps, table.limit("short")
     yield from table.found("short", seconds < bound, seconds, bound, "the episode lasts this many s", "warning")
 

@@ -10,7 +10,7 @@ from ..task import PairTask
 from ..task_spec import Vector
 from .messages.copolicy_task_pb2 import Action, Measures, State
 from .task_messages import TaskMessages
-from .topics import Topic, of_player
+from .topics import Topic, player_metadata
 
 
 class GenericMessages(TaskMessages):
@@ -21,7 +21,7 @@ class GenericMessages(TaskMessages):
         self._task, self._hz, self._sizes = task, spec.record_hz, (len(spec.recorded), len(spec.action))
         self.state = Topic("/state", State, _meaning(spec.recorded))
         first, second = (
-            Topic(f"/player/{player}/action", Action, {**_meaning(spec.action), **of_player(player)})
+            Topic(f"/player/{player}/action", Action, {**_meaning(spec.action), **player_metadata(player)})
             for player in range(2)
         )
         self.actions = first, second

@@ -40,13 +40,13 @@ Record = tuple[Topic, bytes]
 """A serialised message and its topic."""
 
 
-def of_player(player: int) -> dict[str, str]:
+def player_metadata(player: int) -> dict[str, str]:
     """What the metadata of a channel says of a player."""
     return {"player": str(player), "seat": PLAYERS[player]}
 
 
 INPUTS = tuple(
-    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **of_player(player)})
+    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **player_metadata(player)})
     for player in range(2)
 )
 LOOP_TIMING = Topic("/loop/timing", LoopTiming, {"units": "ns on the monotonic clock"})
@@ -59,7 +59,7 @@ def schema_data(message: Any) -> bytes:
     return build_file_descriptor_set(message).SerializeToString(deterministic=True)
 
 
-def is_ours(channel: Channel, schema_name: str, topics: Iterable[Topic]) -> bool:
+def is_channel_of(channel: Channel, schema_name: str, topics: Iterable[Topic]) -> bool:
     """Whether a channel has one of some topics, its encoding and its schema."""
     names = {(topic.name, topic.schema_name) for topic in topics}
     return channel.message_encoding == ENCODING and (channel.topic, schema_name) in names

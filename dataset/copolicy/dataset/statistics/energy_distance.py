@@ -104,7 +104,7 @@ def _estimate(
     strata = blocks if within else np.zeros(episodes, dtype=int)
     draws = [energy_coefficient(distances, permuted_within(labels, strata, rng)) for _ in range(_PERMUTATIONS)]
     how = "whole episodes exchanged" + (" within each pair or configuration" if within else "")
-    null = Null.of(how, value, np.array(draws))
+    null = Null.from_draws(how, value, np.array(draws))
     return Estimate(value, "1", definition, episodes, bounds, "episodes of each part", null)
 
 

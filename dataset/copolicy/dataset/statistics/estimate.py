@@ -26,7 +26,7 @@ class Null:
     p: float
 
     @classmethod
-    def of(cls, how: str, value: float, draws: np.ndarray, two_sided: bool = False) -> "Null":
+    def from_draws(cls, how: str, value: float, draws: np.ndarray, two_sided: bool = False) -> "Null":
         """From the statistic under chance `(n,)`; one-sided means larger than chance."""
         centre = float(np.mean(draws))
         distance = np.abs(draws - centre) if two_sided else draws

@@ -26,7 +26,7 @@ _BIN = 0.01
 def force_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Size of the interaction measure, conflict, and asymmetry of effort."""
     episodes = len(data.rows)
-    effort = [data.per_episode(np.linalg.norm(data.force_of(player), axis=1)) for player in (0, 1)]
+    effort = [data.per_episode(np.linalg.norm(data.player_force(player), axis=1)) for player in (0, 1)]
     both = effort[0] + effort[1]
     definition = (
         "(E0 - E1) / (E0 + E1) with E the mean size of a player's force: 1 where player 0 does all, 0 (the null) where "
@@ -41,8 +41,8 @@ def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate
     names = ("interaction_force_mean", "interaction_force_p95")
     if not data.task.offers("interaction"):
         return left_out(data.task.missing("interaction measure"), *names)
-    size, episodes, words = np.abs(data.force), len(data.rows), data.task.statistics
-    signed = dict(zip(map(str, PERCENTILES), np.percentile(data.force, PERCENTILES).tolist(), strict=True))
+    size, episodes, words = np.abs(data.interaction), len(data.rows), data.task.statistics
+    signed = dict(zip(map(str, PERCENTILES), np.percentile(data.interaction, PERCENTILES).tolist(), strict=True))
     top, top_bounds = _percentile_95(data, size, bootstrap)
     mean_of = f"{words.interaction} Mean size; percentiles of the signed force in details."
     top_of, unit = f"{words.interaction} 95th percentile of its size.", words.interaction_unit
@@ -80,7 +80,7 @@ def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
         f"Share of frames in which one player's force works with the {noun}'s motion and the other's against it, of "
         f"those with the {noun} faster than {slow:g} {state.units[places[0]]} and both forces at least {MIN_EFFORT:g}."
     )
-    velocity, one, other = data.velocity, data.force_of(0), data.force_of(1)
+    velocity, one, other = data.velocity, data.player_force(0), data.player_force(1)
     opposed, tells = opposed_work(velocity, (one, other), slow)
     value, bounds = bootstrap.ratio(data.per_episode(opposed), data.per_episode(tells))
     if value is None:
@@ -91,7 +91,7 @@ def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
         apart, told = opposed_work(velocity, (one, other[order]), slow)
         draws.append(apart.sum() / max(told.sum(), 1))
     how = f"player 1 turned in time within each episode by at least {_MIN_SHIFT_S:g} s"
-    null = Null.of(how, value, np.array(draws), two_sided=True)
+    null = Null.from_draws(how, value, np.array(draws), two_sided=True)
     episodes = int((data.per_episode(tells) > 0).sum())
     return {name: Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null)}
 
@@ -113,7 +113,7 @@ def activity_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, E
     estimates = {}
     frames, episodes = data.lengths.astype(float), len(data.rows)
     for player, seat in enumerate(data.task.spec.players):
-        action = data.force_of(player)
+        action = data.player_force(player)
         idle = np.linalg.norm(action, axis=1) < IDLE_BELOW
         saturated = np.abs(action).max(axis=1) > SATURATED_ABOVE
         longest = longest_runs(idle, data.starts, data.lengths) / data.fps

@@ -32,7 +32,7 @@ def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.nda
         `(W,)` +1 where player 0 leads, -1 where player 1 does, 0 for none; `(W,)` episodes.
     """
     # A row an axis: contiguous, and no sum over an axis of two.
-    one, two = (_centred(data, data.force_of(player)).T.copy() for player in (0, 1))
+    one, two = (_centred(data, data.player_force(player)).T.copy() for player in (0, 1))
     two = two if order is None else two.take(order, axis=1)
     count = one.shape[1]
     window, reach = max(2, round(WINDOW_S * data.fps)), max(1, round(MAX_LAG_S * data.fps))
@@ -83,7 +83,7 @@ def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     noisy = switch_definition + " Noise switches often: hold it against its null."
     rate = bootstrap.estimate(switches, minutes, "1/min", noisy, episodes)
     return {
-        name: replace(estimate, null=Null.of(_NULL, estimate.value or 0.0, np.array(draws), two_sided=True))
+        name: replace(estimate, null=Null.from_draws(_NULL, estimate.value or 0.0, np.array(draws), two_sided=True))
         for name, estimate, draws in (("leadership_share", share, shares), ("leadership_switches", rate, rates))
     }
 

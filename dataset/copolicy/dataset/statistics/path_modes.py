@@ -81,7 +81,7 @@ def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int, resolution: 
 
 def path_mode_statistics(data: Trajectories, seed: int) -> dict[str, Estimate]:
     """Modes of the paths of each configuration, and their mean over configurations."""
-    reason, outline = data.without_places, data.task.outline
+    reason, outline = data.positions_missing, data.task.outline
     if reason or outline is None:
         return left_out(reason, "path_modes")
     resolution, succeeded = outline.size[0] * RESOLUTION, data.task.words.success

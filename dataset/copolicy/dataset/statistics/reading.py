@@ -54,7 +54,7 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
         kept_rows.append(_row(folder, row, frames[ENVIRONMENT_STATE][0], split_of[index]))
     if not kept:
         raise RunError(f"{root}: expected an episode to describe, found {len(rows)}, left out {left_out}")
-    return Trajectories.of(kept, kept_rows, int(info["fps"]), folder.task), {
+    return Trajectories.from_episodes(kept, kept_rows, int(info["fps"]), folder.task), {
         name: n for name, n in left_out.items() if n
     }
 
@@ -73,7 +73,7 @@ def _row(folder: LeRobotFolder, row: dict[str, Any], vector: np.ndarray, split: 
     except CopolicyError as error:
         raise FileFormatError(folder.root, f"a map in episode {row['episode_index']}", str(error)) from None
     names = ("episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class")
-    return EpisodeRow(**{name: row[name] for name in names}, map_config=scenario, split=split)
+    return EpisodeRow(**{name: row[name] for name in names}, scenario=scenario, split=split)
 
 
 def _splits(splits: Mapping[str, str], episodes: int) -> list[str]:

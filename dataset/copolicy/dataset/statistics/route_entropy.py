@@ -19,32 +19,32 @@ def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Ge
     """Strategy labels, and their entropy per configuration."""
     if not data.task.offers("strategy"):
         return left_out(data.task.missing("strategy labels"), "route_class", "route_entropy")
-    taken = labels_of(data)
+    taken = decided_labels(data)
     return {
-        "route_class": route_classes(data, taken, f"Episodes with a strategy label. {of_successes(data)}"),
+        "route_class": route_class_count(data, taken, f"Episodes with a strategy label. {success_condition(data)}"),
         "route_entropy": _conditional_entropy(data, taken, bootstrap, rng),
     }
 
 
-def of_successes(data: Trajectories) -> str:
+def success_condition(data: Trajectories) -> str:
     """The sentence of a definition that says which episodes have labels."""
     words = data.task.words
     return f"Of episodes that {words.success}: the {words.label} of an unfinished one is not decided."
 
 
-def labels_of(data: Trajectories) -> dict[int, str]:
+def decided_labels(data: Trajectories) -> dict[int, str]:
     """The strategy label of each episode that has one, by the episode."""
     return {index: word for index, word in enumerate(data.labels) if word is not None}
 
 
-def route_classes(data: Trajectories, taken: dict[int, str], definition: str) -> Estimate:
+def route_class_count(data: Trajectories, taken: dict[int, str], definition: str) -> Estimate:
     """How many episodes have a label, and how many of them another one than the column `route_class` says."""
     unlike = sum(data.rows[index].route_class not in ("", word) for index, word in taken.items())
     details = {"episodes_without": len(data.rows) - len(taken), "unlike_the_episode_column": unlike}
     return Estimate(len(taken), "episodes", definition, len(taken), details=details)
 
 
-def word_entropy(
+def label_entropy(
     counts: Counter[str], obstacles: int | None, rng: np.random.Generator, replicates: int = 1000
 ) -> dict[str, Any]:
     """Entropy and its relatives of the words of one group of episodes.
@@ -88,7 +88,7 @@ def _conditional_entropy(
     definition = (
         "H(route | configuration): the entropy of the route classes in each configuration (start, goal, obstacles), "
         "Miller-Madow, averaged over configurations by their episodes. Each configuration's own interval draws its "
-        f"episodes anew. {of_successes(data)}"
+        f"episodes anew. {success_condition(data)}"
     )
     names = sorted({str(data.configurations[index]) for index in taken})
     cells = sorted({(str(data.configurations[index]), taken[index]) for index in taken})
@@ -100,7 +100,7 @@ def _conditional_entropy(
     bits = data.task.statistics.label_bits
     for name in names:
         counts = Counter(taken[index] for index in taken if data.configurations[index] == name)
-        entry = word_entropy(counts, bits(next(iter(counts))) if bits else None, rng)
+        entry = label_entropy(counts, bits(next(iter(counts))) if bits else None, rng)
         per_configuration[name] = entry
         if entry["entropy_bits"] is not None:
             enough.append(name)

@@ -74,7 +74,7 @@ def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str,
     """Means over episodes; f95 for each player, smoothness of the speed of what moves."""
     names = ("action_f95_player_0", "action_f95_player_1", "sparc", "log_dimensionless_jerk")
     values = np.full((len(data.rows), len(names)), np.nan)
-    actions, speed = [data.force_of(player) for player in (0, 1)], np.linalg.norm(data.velocity, axis=1)
+    actions, speed = [data.player_force(player) for player in (0, 1)], np.linalg.norm(data.velocity, axis=1)
     for index, (start, end) in enumerate(zip(data.starts.tolist(), data.ends.tolist(), strict=True)):
         if end - start < MIN_S * data.fps or end - start < 4:
             continue

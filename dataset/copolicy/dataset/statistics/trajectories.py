@@ -21,7 +21,7 @@ class EpisodeRow:
     source: str
     success: bool
     duration_s: float
-    map_config: Any  # the scenario
+    scenario: Any
     route_class: str = ""
     split: str = ""
 
@@ -56,7 +56,7 @@ class Trajectories:
                 raise ShapeError(name, shape, array.shape)
 
     @classmethod
-    def of(
+    def from_episodes(
         cls,
         episodes: Sequence[tuple[np.ndarray, np.ndarray]],
         rows: Sequence[EpisodeRow],
@@ -89,7 +89,7 @@ class Trajectories:
         return np.repeat(np.arange(len(self.rows)), self.lengths)
 
     @cached_property
-    def force(self) -> np.ndarray:
+    def interaction(self) -> np.ndarray:
         """`(N,)` the task's interaction measure; of the table in units of a player's full force, positive pulls apart.
 
         Raises:
@@ -106,7 +106,7 @@ class Trajectories:
         count = len(self.task.spec.action)
         return {1: "", 2: ", both axes"}.get(count, f", all {count} axes")
 
-    def force_of(self, player: int) -> np.ndarray:
+    def player_force(self, player: int) -> np.ndarray:
         """`(N, m)` a player's action in units of its full force."""
         return np.split(self.task.spec.full_forces(self.actions), 2, axis=1)[player].copy()
 
@@ -120,7 +120,7 @@ class Trajectories:
         """The strategy label of each episode, recomputed from its frames; None without success or label."""
         spans = zip(self.rows, self.starts.tolist(), self.ends.tolist(), strict=True)
         return [
-            (row.success and self.task.strategy(row.map_config, self.states[start:end])) or None
+            (row.success and self.task.strategy(row.scenario, self.states[start:end])) or None
             for row, start, end in spans
         ]
 
@@ -132,14 +132,14 @@ class Trajectories:
     @cached_property
     def configurations(self) -> np.ndarray:
         """`(E,)` name of each episode's configuration: its map, and the obstacles where a name stands for several."""
-        names = [row.map_id or f"map-{row.map_config.digest}" for row in self.rows]
-        layouts = [self.task.layout(row.map_config) for row in self.rows]
+        names = [row.map_id or f"map-{row.scenario.digest}" for row in self.rows]
+        layouts = [self.task.layout(row.scenario) for row in self.rows]
         first: dict[str, Any] = {}
         for name, layout in zip(names, layouts, strict=True):
             first.setdefault(name, layout)
         return np.array(
             [
-                name if first[name] == layout else f"{name}-{row.map_config.digest}"
+                name if first[name] == layout else f"{name}-{row.scenario.digest}"
                 for name, layout, row in zip(names, layouts, self.rows, strict=True)
             ]
         )
@@ -153,7 +153,7 @@ class Trajectories:
         """Episodes that share a layout, and with `with_goal` the goal: the indices of each group."""
         members: dict[Any, list[int]] = {}
         for index, row in enumerate(self.rows):
-            members.setdefault(self.task.layout(row.map_config, with_goal), []).append(index)
+            members.setdefault(self.task.layout(row.scenario, with_goal), []).append(index)
         return [np.array(group) for _, group in sorted(members.items())]
 
     def path(self, index: int) -> np.ndarray:
@@ -169,7 +169,7 @@ class Trajectories:
         return np.concatenate([self.path(index) for index in range(len(self.rows))])
 
     @property
-    def without_places(self) -> str:
+    def positions_missing(self) -> str:
         """Why there are no statistics of places: the sentence for the part that the task lacks; empty where none."""
         if not self.task.offers("path"):
             return self.task.missing("tracked point")

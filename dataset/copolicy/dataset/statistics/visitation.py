@@ -32,7 +32,7 @@ class Grid:
     rows: int
 
     @classmethod
-    def over(cls, outline: Outline) -> "Grid":
+    def from_outline(cls, outline: Outline) -> "Grid":
         """As many columns as `COLUMNS`, and the rows that it takes."""
         side = outline.size[0] / COLUMNS
         return cls(side, outline.unit, max(1, math.ceil(outline.size[1] / side - 1e-9)))
@@ -65,16 +65,15 @@ class Grid:
 
 def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Entropy and coverage per set of obstacles, averaged over them by their frames, and divergence between pairs."""
-    reason, outline = data.without_places, data.task.outline
+    reason, outline = data.positions_missing, data.task.outline
     if reason or outline is None:
         return left_out(reason, *_NAMES)
-    grid = Grid.over(outline)
+    grid = Grid.from_outline(outline)
     counts = grid.counts(data)
     groups = data.groups(with_goal=False)
     weights = np.array([data.lengths[group].sum() for group in groups], dtype=float)
     obstacles = [
-        [shape for shape in outline.fixed(data.rows[group[0]].map_config) if shape.role == "obstacle"]
-        for group in groups
+        [shape for shape in outline.fixed(data.rows[group[0]].scenario) if shape.role == "obstacle"] for group in groups
     ]
     free = [grid.free(shapes) for shapes in obstacles]
     pooled = [np.asarray(counts[group].sum(axis=0)).ravel() for group in groups]
@@ -155,6 +154,6 @@ def _between_pairs(data: Trajectories, grid: Grid, counts: csr_matrix, groups, r
         note = "no configuration was carried by two pairs: no null"
         return Estimate(value, "bits", definition, episodes, bounds, "episodes of each pair", note=note)
     draws = [divergence(permuted_within(data.pairs, data.strata, rng), np.ones(episodes)) for _ in range(_PERMUTATIONS)]
-    null = Null.of("pairs shuffled among the episodes of each configuration", value, np.array(draws))
+    null = Null.from_draws("pairs shuffled among the episodes of each configuration", value, np.array(draws))
     details = {"excess_over_null_bits": value - null.mean, "shuffled_episodes": movable, "frames": frames}
     return Estimate(value, "bits", definition, episodes, bounds, "episodes of each pair", null, details=details)

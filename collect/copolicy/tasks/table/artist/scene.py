@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from copolicy.dataset.outline import placed
+from copolicy.dataset.outline import to_scene
 from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task_spec import PLAYERS
 
@@ -132,7 +132,7 @@ def metres(point: tuple[float, float]) -> tuple[float, float]:
 
 def _of_table(pose: Pose, point: tuple[float, float]) -> tuple[float, float]:
     """Where a point (u, v) of the table is in the scene."""
-    x, y = metres(placed(pose, point))
+    x, y = metres(to_scene(pose, point))
     return coarse(x), coarse(y)
 
 

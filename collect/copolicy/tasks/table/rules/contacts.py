@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.checks.finding import Finding
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.dataset.task_parts import Rule
@@ -18,10 +18,10 @@ from .geometry import INNER, OUTER, final_poses, separation
 _SIZES = (45, 50)  # of obstacles, where the data do not say which
 
 
-def _goal(table: EpisodeTable) -> Iterator[Finding]:
+def _goal(table: EpisodeData) -> Iterator[Finding]:
     margin = table.limit("contact_margin")
     maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
-    success = table.of_framed("success")
+    success = table.framed_column("success")
     gap, error = _final_gap(table, maps[:, 3:5], GOAL_SIZE / 2)
     bound = margin + error
     message = "a success, but the table ended this many px from the goal of its map"
@@ -31,7 +31,7 @@ def _goal(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("goal_contact", ~success & (depth > margin), depth, margin, message)
 
 
-def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
+def _obstacles(table: EpisodeData) -> Iterator[Finding]:
     margin = table.limit("contact_margin")
     maps = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     smallest, largest = _obstacle_sides(table)
@@ -48,53 +48,53 @@ def _obstacles(table: EpisodeTable) -> Iterator[Finding]:
         nearest = np.where(there, np.minimum(nearest, gap), nearest)
     message = "the table went this many px into an obstacle of its map before the episode ended"
     yield from table.found("obstacle_contact", deepest > margin, deepest, margin, message)
-    collided = table.of_framed("termination_reason") == "collision_obstacle"
+    collided = table.framed_column("termination_reason") == "collision_obstacle"
     bound = margin + error
     message = "ended by a collision, but this many px from every obstacle of its map"
     yield from table.found("obstacle_contact", collided & ~(nearest <= bound), nearest, bound, message)
 
 
-def _obstacle_sides(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
+def _obstacle_sides(table: EpisodeData) -> tuple[np.ndarray, np.ndarray]:
     """`(F, 3)` the smallest and the largest side that each obstacle can have, px."""
     shape = (len(table.starts), MAX_OBSTACLES)
     smallest, largest = (np.full(shape, float(size)) for size in _SIZES)
     if "obstacle_size" in table.columns:
-        stored = np.broadcast_to(table.of_framed("obstacle_size").astype(float)[:, None], shape)
+        stored = np.broadcast_to(table.framed_column("obstacle_size").astype(float)[:, None], shape)
         smallest, largest = (np.where(stored > 0, stored, guessed) for guessed in (smallest, largest))
     if "obstacle_sizes" in table.columns:
-        texts = table.of_framed("obstacle_sizes")
+        texts = table.framed_column("obstacle_sizes")
         for place in np.flatnonzero(texts != ""):
             own = sizes_of(str(texts[place]))[:MAX_OBSTACLES]
             smallest[place, : len(own)] = largest[place, : len(own)] = own
     return smallest, largest
 
 
-def _wall(table: EpisodeTable) -> Iterator[Finding]:
+def _wall(table: EpisodeData) -> Iterator[Finding]:
     positions, thetas, error = _final(table)
     cos, sin = np.abs(np.cos(thetas)), np.abs(np.sin(thetas))
     half = np.stack((OUTER[1] * cos + OUTER[2] * sin, OUTER[1] * sin + OUTER[2] * cos), axis=-1)
     room = np.minimum(positions - half, np.array(WINDOW, float) - positions - half).min(axis=(0, 2))
     bound = table.limit("contact_margin") + error
-    ended = table.of_framed("termination_reason") == "collision_wall"
+    ended = table.framed_column("termination_reason") == "collision_wall"
     message = "ended at the wall, but this many px from it"
     yield from table.found("wall_contact", ended & ~(room <= bound), room, bound, message)
 
 
-def _deepest(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
+def _deepest(table: EpisodeData, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
     """`(F,)` how deep the inner rectangle was in a square in any frame, px."""
     states = table.frames[STATE].astype(float)
     thetas = np.arctan2(states[:, 3], states[:, 2])
     return table.largest(-separation(states[:, :2], thetas, INNER, centres, half))
 
 
-def _final(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray, float]:
+def _final(table: EpisodeData) -> tuple[np.ndarray, np.ndarray, float]:
     if table.final_states is not None:
         final = table.final_states
         return final[None, :, :2], np.arctan2(final[:, 3], final[:, 2])[None], 0.0
     return final_poses(table.frames[STATE][table.ends].astype(float), table.fps, SPEC.record_hz)
 
 
-def _final_gap(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:
+def _final_gap(table: EpisodeData, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:
     """`(F,)` how far the outer rectangle ended from a square at least, px, and the error of that."""
     positions, thetas, error = _final(table)
     gaps = [separation(at, theta, OUTER, centres, half) for at, theta in zip(positions, thetas, strict=True)]

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.checks.finding import Finding
 from copolicy.dataset.features import STATE
 from copolicy.dataset.task_parts import Rule
 
 
-def _jumps(table: EpisodeTable) -> Iterator[Finding]:
+def _jumps(table: EpisodeData) -> Iterator[Finding]:
     moved, later = table.changes(table.frames[STATE][:, :2].astype(float))
     speed = np.zeros(table.frame_count)
     speed[later] = np.abs(moved).max(axis=1) * table.fps
@@ -18,7 +18,7 @@ def _jumps(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.beyond("jump", table.largest(speed), message)
 
 
-def _drift(table: EpisodeTable) -> Iterator[Finding]:
+def _drift(table: EpisodeData) -> Iterator[Finding]:
     drift = table.columns["replay_drift_px"]
     yield from table.graded("drift", drift, "the actions, played again, leave the recorded path by this many px")
     unknown = int(np.isnan(drift).sum())
@@ -27,7 +27,7 @@ def _drift(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding("", "drift", unknown, 0, "info", message)
 
 
-def _state_range(table: EpisodeTable) -> Iterator[Finding]:
+def _state_range(table: EpisodeData) -> Iterator[Finding]:
     states = table.frames[STATE].astype(float)
     low, high = table.task.spec.state.bounds
     worst = table.largest(np.maximum(low - states, states - high)[:, :2].max(axis=1))
@@ -37,7 +37,7 @@ def _state_range(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("state_range", off > bound, off, bound, "cos_theta and sin_theta are not of one angle")
 
 
-def _stuck(table: EpisodeTable) -> Iterator[Finding]:
+def _stuck(table: EpisodeData) -> Iterator[Finding]:
     states = table.frames[STATE].astype(float)
     still = np.hypot(states[:, 4], states[:, 5]) < table.limit("stuck_speed")
     seconds, bound = table.longest_run(still) / table.fps, table.limit("stuck")

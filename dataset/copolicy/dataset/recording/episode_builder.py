@@ -14,14 +14,15 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 
 from ..episode import Episode
 from ..exceptions import FileFormatError, ForeignRecordingError
-from ..physics_text import physics_text
+from ..settings_text import settings_text
 from ..task import PairTask
 from . import episode_records
 from .generic_messages import messages_of
 from .mcap_chunks import MESSAGE_HEAD, chunk_records, walk_chunk
 from .mcap_records import RecordWalk
 from .messages.copolicy_pb2 import EpisodeEvent
-from .soundness import (
+from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
+from .verification import (
     RECOVERY,
     UNVERIFIED,
     CheckSums,
@@ -31,10 +32,9 @@ from .soundness import (
     require_version,
     sole_records,
 )
-from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
 
 
-class RecordingContents:
+class EpisodeBuilder:
     """What a walk over a file has collected so far: states, actions and the events, whatever else the file holds.
 
     Attributes:
@@ -189,7 +189,7 @@ class RecordingContents:
         if not sums.data:
             sums.start = require_start_digest(path, records)
         scenario = task.scenario_of_json(*self._scenarios)
-        seen = {"physics": physics_text(settings), **task.columns_of(scenario)}
+        seen = {"physics": settings_text(settings), **task.columns_of(scenario)}
         meta = replace(meta, source_sha256=walk.sha256, **seen)
         # What a recovered file could not verify in its source, its own check sums do not vouch for.
         earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")

@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ..exceptions import InvalidValueError
-from ..physics_text import UNKNOWN, physics_of, physics_summary
+from ..settings_text import UNKNOWN, describe_settings, parse_settings_text
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _physics(table: EpisodeTable) -> Iterator[Finding]:
+def _physics(table: EpisodeData) -> Iterator[Finding]:
     counts: Counter[str] = Counter()
     for label, text in zip(table.labels, table.columns["physics"].tolist(), strict=True):
         try:
-            counts[physics_summary(physics_of(text, table.task), table.task)] += 1
+            counts[describe_settings(parse_settings_text(text, table.task), table.task)] += 1
         except InvalidValueError as error:
             yield Finding(label, "physics", None, None, "error", str(error))
     unknown = counts.pop(UNKNOWN, 0)
@@ -24,32 +24,32 @@ def _physics(table: EpisodeTable) -> Iterator[Finding]:
         message = "episodes do not say under which physics they were recorded; exports go on under the default"
         yield Finding("", "physics", unknown, 0, "info", message)
     if len(counts) > 1:
-        message = f"episodes of several physics, which move otherwise under the same forces: {listed(counts)}"
+        message = f"episodes of several physics, which move otherwise under the same forces: {counts_text(counts)}"
         yield Finding("", "physics", len(counts), 1, "warning", message)
 
 
-def _software(table: EpisodeTable) -> Iterator[Finding]:
+def _software(table: EpisodeData) -> Iterator[Finding]:
     yield from _several(table, "software_version", "recorded by several versions of the software")
 
 
-def _sources(table: EpisodeTable) -> Iterator[Finding]:
+def _sources(table: EpisodeData) -> Iterator[Finding]:
     yield from _several(table, "source", "of several sources")
 
 
-def _several(table: EpisodeTable, column: str, what: str) -> Iterator[Finding]:
+def _several(table: EpisodeData, column: str, what: str) -> Iterator[Finding]:
     values = table.columns[column]
     counts = Counter(values[np.char.strip(values) != ""].tolist())
     if len(counts) > 1:
-        yield Finding("", "mixture", len(counts), 1, "info", f"episodes {what}: {listed(counts)}")
+        yield Finding("", "mixture", len(counts), 1, "info", f"episodes {what}: {counts_text(counts)}")
 
 
-def listed(counts: Mapping[str, int]) -> str:
+def counts_text(counts: Mapping[str, int]) -> str:
     """The most frequent first: `3 of 45 px; 1 of 50 px`."""
     ordered = sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
     return "; ".join(f"{count} {name}" for name, count in ordered)
 
 
-def _consent(table: EpisodeTable) -> Iterator[Finding]:
+def _consent(table: EpisodeData) -> Iterator[Finding]:
     people = table.columns["source"] == "human"
     consent = table.columns["consent_id"]
     missing = people & (np.char.strip(consent) == "")
@@ -57,7 +57,7 @@ def _consent(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("consent", missing, consent, "a consent_id", message)
 
 
-def _license(table: EpisodeTable) -> Iterator[Finding]:
+def _license(table: EpisodeData) -> Iterator[Finding]:
     licenses = np.char.strip(table.columns["license"])
     missing = int((licenses == "").sum())
     if missing:

@@ -7,22 +7,22 @@ IDENTICAL = 0.99
 """Share of the frames with a force from which on the actions of both players count as one."""
 
 
-def pushing(actions: np.ndarray) -> np.ndarray:
+def any_force(actions: np.ndarray) -> np.ndarray:
     """`(...)` whether anybody does anything in joint actions `(..., 2 n)`."""
     return np.abs(actions).max(axis=-1, initial=0.0) > _ALIKE
 
 
-def alike(actions: np.ndarray) -> np.ndarray:
+def same_action(actions: np.ndarray) -> np.ndarray:
     """`(...)` whether somebody does something and both do the same, in joint actions `(..., 2 n)`."""
     robot, human = np.split(actions, 2, axis=-1)
     same = np.abs(robot - human).max(axis=-1) <= _ALIKE
-    return same & pushing(actions)
+    return same & any_force(actions)
 
 
-def identical(actions: np.ndarray) -> bool:
+def identical_actions(actions: np.ndarray) -> bool:
     """Both players gave the same joint actions `(T, 2 n)` throughout; two who gave none did not."""
-    pushed = np.count_nonzero(pushing(actions))
-    return bool(pushed and np.count_nonzero(alike(actions)) >= IDENTICAL * pushed)
+    pushed = np.count_nonzero(any_force(actions))
+    return bool(pushed and np.count_nonzero(same_action(actions)) >= IDENTICAL * pushed)
 
 
 def may_be_one_device(source: str, controller_0: str, controller_1: str) -> bool:

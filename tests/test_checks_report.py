@@ -10,9 +10,9 @@ import sys
 import pytest
 from checked_data import contents, make_data_set, make_recordings, set_columns
 
+from copolicy.dataset.checks.check_report import check_document, content_hash, validity
 from copolicy.dataset.checks.checking import check_dataset, rules_of
 from copolicy.dataset.checks.limits import RULES_VERSION, limits_of
-from copolicy.dataset.checks.stored_check import check_document, content_hash, validity
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.files.meta_files import CHECK_FILE

@@ -15,16 +15,16 @@ from .exceptions import InvalidValueError
 from .task import PairTask, get_task
 
 UNKNOWN = "unknown"
-"""What `physics_counts` calls the settings of episodes that state none."""
+"""What `count_settings` calls the settings of episodes that state none."""
 
 
-def physics_text(settings: Any) -> str:
+def settings_text(settings: Any) -> str:
     """The text of some settings."""
     return json.dumps(asdict(settings), sort_keys=True, allow_nan=False)
 
 
-def physics_of(text: str | None, task: PairTask | None = None) -> Any:
-    """The inverse of `physics_text` for a task, the table by default; None where nothing is stated (a merge with
+def parse_settings_text(text: str | None, task: PairTask | None = None) -> Any:
+    """The inverse of `settings_text` for a task, the table by default; None where nothing is stated (a merge with
     another tool leaves a null).
 
     Raises:
@@ -47,12 +47,12 @@ def physics_of(text: str | None, task: PairTask | None = None) -> Any:
     return task.settings_of(entries, "physics: {}")
 
 
-def physics_summary(settings: Any, task: PairTask | None = None) -> str:
+def describe_settings(settings: Any, task: PairTask | None = None) -> str:
     """Settings of a task, the table by default, in words."""
     return UNKNOWN if settings is None else (task or get_task()).settings_summary(settings)
 
 
-def physics_counts(texts: Iterable[str | None], task: PairTask | None = None) -> dict[str, int]:
+def count_settings(texts: Iterable[str | None], task: PairTask | None = None) -> dict[str, int]:
     """How many episodes of a task, the table by default, have which settings, in words, most frequent first.
 
     Raises:
@@ -60,5 +60,5 @@ def physics_counts(texts: Iterable[str | None], task: PairTask | None = None) ->
     """
     summed: Counter[str] = Counter()
     for text, count in Counter(texts).items():
-        summed[physics_summary(physics_of(text, task), task)] += count
+        summed[describe_settings(parse_settings_text(text, task), task)] += count
     return dict(sorted(summed.items(), key=lambda entry: (-entry[1], entry[0])))

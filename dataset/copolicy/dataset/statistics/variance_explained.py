@@ -10,7 +10,9 @@ _PERMUTATIONS = 999
 _ROUTE = "route_between_pair_share"
 
 
-def pair_share_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
+def variance_explained_statistics(
+    data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
+) -> dict[str, Estimate]:
     """Eta squared of route and duration by pair within configurations, and of duration by configuration."""
     words = data.labels
     decided = np.array([index for index, word in enumerate(words) if word is not None], dtype=int)
@@ -73,7 +75,7 @@ def _within_configurations(
     again = np.array([explained(values, pairs, strata, drawn_within(cells, rng)) for _ in range(_PERMUTATIONS)])
     bounds = interval(value, again[np.isfinite(again)], 0.0, 1.0)
     draws = np.array([explained(values, permuted_within(pairs, strata, rng), strata) for _ in range(_PERMUTATIONS)])
-    null = Null.of("pairs shuffled among the episodes of each configuration", value, draws)
+    null = Null.from_draws("pairs shuffled among the episodes of each configuration", value, draws)
     # As much as chance alone explains is taken off, and off the whole.
     details = {"adjusted": (value - null.mean) / (1 - null.mean) if null.mean < 1 else None}
     return Estimate(
@@ -103,5 +105,5 @@ def _by_configuration(
         len(chosen),
         interval(value, again[np.isfinite(again)], 0.0, 1.0),
         bootstrap.resampled,
-        Null.of("configurations shuffled among episodes", value, draws),
+        Null.from_draws("configurations shuffled among episodes", value, draws),
     )

@@ -17,7 +17,7 @@ COLUMN_TYPES: dict[str, type] = {"str": str, "float": float, "int": np.int64, "b
 
 
 @dataclass(frozen=True, repr=False)
-class EpisodeTable:
+class EpisodeData:
     """E episodes, and N frames of those F episodes whose frames are all there.
 
     Attributes:
@@ -68,7 +68,7 @@ class EpisodeTable:
         """`(F,)` last frame of each episode."""
         return self.starts + self.counts - 1
 
-    def of_framed(self, column: str) -> np.ndarray:
+    def framed_column(self, column: str) -> np.ndarray:
         """`(F,)` an episode column of the episodes that have frames."""
         return self.columns[column][self.framed]
 
@@ -84,7 +84,7 @@ class EpisodeTable:
         """`(F,)` largest of a value `(N,)` in each episode."""
         return np.maximum.reduceat(values, self.starts)
 
-    def force(self, player: int) -> np.ndarray:
+    def player_force(self, player: int) -> np.ndarray:
         """`(N, m)` a player's action in units of its full force."""
         return np.split(self.task.spec.full_forces(self.frames[ACTION]), 2, axis=1)[player]
 

@@ -8,17 +8,17 @@ from ..exceptions import CopolicyError
 from ..files.meta_files import CHECK_FILE, MANIFEST_FILE
 from ..task_parts import Rule
 from ..versions.manifest import Manifest
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _reading(table: EpisodeTable) -> Iterator[Finding]:
+def _reading(table: EpisodeData) -> Iterator[Finding]:
     yield from table.damage
 
 
-def _indices(table: EpisodeTable) -> Iterator[Finding]:
+def _indices(table: EpisodeData) -> Iterator[Finding]:
     expected = np.arange(table.frame_count) - np.repeat(table.starts, table.counts)
-    first = np.repeat(table.of_framed("dataset_from_index"), table.counts)
+    first = np.repeat(table.framed_column("dataset_from_index"), table.counts)
     for name, due, message in (
         ("frame_index", expected, "frame_index does not count from 0 in steps of 1"),
         ("index", expected + first, "index does not go on from the episode's dataset_from_index"),
@@ -27,7 +27,7 @@ def _indices(table: EpisodeTable) -> Iterator[Finding]:
         yield from table.found("rows", wrong > 0, wrong, 0, message)
 
 
-def _ranges(table: EpisodeTable) -> Iterator[Finding]:
+def _ranges(table: EpisodeData) -> Iterator[Finding]:
     first, end = table.columns["dataset_from_index"], table.columns["dataset_to_index"]
     message = "dataset_from_index and dataset_to_index span another length"
     yield from table.found("rows", end - first != table.columns["length"], end - first, "length", message)
@@ -36,7 +36,7 @@ def _ranges(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("rows", gap, first, "dataset_to_index", "begins where the episode before does not end")
 
 
-def _manifest(table: EpisodeTable) -> Iterator[Finding]:
+def _manifest(table: EpisodeData) -> Iterator[Finding]:
     path = table.root / MANIFEST_FILE
     if not path.is_file():
         return

@@ -17,7 +17,7 @@ from ..exceptions import CopolicyError, FileFormatError, ForeignRecordingError, 
 from ..files.file_kinds import kind_of
 from ..task import PairTask, get_task, installed_tasks
 from . import episode_records
-from .contents import RecordingContents
+from .episode_builder import EpisodeBuilder
 from .mcap_chunks import LARGEST_CHUNK, UnreadChunkError
 from .mcap_records import RecordWalk, metadata_records, walk_metadata
 from .messages.copolicy_pb2 import EpisodeEvent
@@ -62,7 +62,7 @@ def read_recording(path: Path | str) -> Recording:
     path = Path(path)
     with _as_format_error(path), path.open("rb") as file:
         walk = RecordWalk(path, file, path.stat().st_size)
-        contents = RecordingContents(path, recorded_task(path))
+        contents = EpisodeBuilder(path, recorded_task(path))
         unread = ""
         for opcode, body in walk.records(_LARGEST):
             try:

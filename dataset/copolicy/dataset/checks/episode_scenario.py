@@ -12,11 +12,11 @@ from ..features import ENVIRONMENT_STATE, STATE
 from ..scenarios import base_name
 from ..task import PairTask
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _constant(table: EpisodeTable) -> Iterator[Finding]:
+def _constant(table: EpisodeData) -> Iterator[Finding]:
     moved, later = table.changes(table.frames[ENVIRONMENT_STATE])
     changed = np.zeros(table.frame_count, int)
     changed[later] = (moved != 0).any(axis=1)
@@ -24,7 +24,7 @@ def _constant(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.found("map_constant", changes > 0, changes, 0, f"{ENVIRONMENT_STATE} changes within the episode")
 
 
-def _names(table: EpisodeTable) -> Iterator[Finding]:
+def _names(table: EpisodeData) -> Iterator[Finding]:
     columns = (table.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
     for label, name, group, digest in zip(table.labels, *columns, strict=True):
         known = _named(table.task).get(base_name(name))
@@ -36,7 +36,7 @@ def _names(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding(label, "map_name", group, known[0], "error", "map_set is not the set of map_id")
 
 
-def _files(table: EpisodeTable) -> Iterator[Finding]:
+def _files(table: EpisodeData) -> Iterator[Finding]:
     contents: dict[str, Counter[str]] = {}
     columns = (table.columns[name].tolist() for name in ("map_set", "map_set_version", "map_set_digest"))
     for group, version, digest in zip(*columns, strict=True):
@@ -48,7 +48,7 @@ def _files(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding("", "map_files", len(counts), 1, "warning", message)
 
 
-def _rows(table: EpisodeTable) -> Iterator[Finding]:
+def _rows(table: EpisodeData) -> Iterator[Finding]:
     rows, (low, high) = _scenarios(table), table.task.spec.scenario.bounds
     outside = (np.maximum(low - rows, rows - high) / (high - low)).max(axis=1)
     bound = table.limit("map_position")
@@ -70,7 +70,7 @@ def _rows(table: EpisodeTable) -> Iterator[Finding]:
                 yield Finding(table.labels[place], "map_rows", away, bound, "error", message)
 
 
-def _start(table: EpisodeTable) -> Iterator[Finding]:
+def _start(table: EpisodeData) -> Iterator[Finding]:
     task, (low, high) = table.task, table.task.spec.state.bounds
     away = np.zeros(len(table.framed))
     for number, (place, row) in enumerate(zip(table.framed, _scenarios(table), strict=True)):
@@ -83,7 +83,7 @@ def _start(table: EpisodeTable) -> Iterator[Finding]:
     yield from table.beyond("map_start", away, "the episode begins this far from its map's start")
 
 
-def _scenarios(table: EpisodeTable) -> np.ndarray:
+def _scenarios(table: EpisodeData) -> np.ndarray:
     return table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
 
 
