@@ -1,12 +1,12 @@
-"""What pair data is: read it, check it, count it.
+"""Data sets of two-player tasks: reading, checks, statistics, versions and publication.
 
     from copolicy.dataset import load_dataset
 
     dataset = load_dataset("outputs/quickstart/dataset")
     dataset.episodes[0].states  # (T, 7)
-    dataset.table.to_pandas()   # one row an episode
+    dataset.table.to_pandas()   # one row per episode
 
-Names are loaded when they are asked for.
+Names are imported on first access.
 """
 
 from typing import TYPE_CHECKING

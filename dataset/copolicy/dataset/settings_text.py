@@ -1,8 +1,8 @@
-"""The settings of an episode's world as one text: the episode column `physics` of a data set.
+"""The world settings of an episode as text: the episode column `physics` of a data set.
 
-Canonical JSON of all settings (`PairTask.settings_type`), keys sorted, numbers in exact digits, so that equal settings
-have equal texts; an empty text where nobody knows them. What led from state to state may differ from episode to
-episode, and whoever integrates an episode any further must take its own.
+Canonical JSON of all settings (`PairTask.settings_type`) with sorted keys and exact numbers, so that equal settings
+have equal texts; empty if the settings are unknown. Settings may differ between the episodes of a data set: integrate
+an episode under its own.
 """
 
 import json
@@ -15,20 +15,22 @@ from .exceptions import InvalidValueError
 from .task import PairTask, get_task
 
 UNKNOWN = "unknown"
-"""What `count_settings` calls the settings of episodes that state none."""
+"""Description of the settings of an episode that states none."""
 
 
 def settings_text(settings: Any) -> str:
-    """The text of some settings."""
+    """The canonical JSON of settings."""
     return json.dumps(asdict(settings), sort_keys=True, allow_nan=False)
 
 
 def parse_settings_text(text: str | None, task: PairTask | None = None) -> Any:
-    """The inverse of `settings_text` for a task, the table by default; None where nothing is stated (a merge with
-    another tool leaves a null).
+    """Settings from their text, the inverse of `settings_text`; None if the text is empty or None (null).
+
+    Args:
+        task: task of the settings; the table by default.
 
     Raises:
-        InvalidValueError: the text is not that of settings.
+        InvalidValueError: the text is not JSON of the settings of the task.
     """
     if not text:
         return None
@@ -38,7 +40,7 @@ def parse_settings_text(text: str | None, task: PairTask | None = None) -> Any:
         entries = json.loads(text)
     except (ValueError, TypeError, RecursionError):
         raise InvalidValueError("physics", expected, text) from None
-    names = {setting.name for setting in fields(task.settings_type)}
+    names = {field.name for field in fields(task.settings_type)}
     if not isinstance(entries, dict) or set(entries) != names:
         raise InvalidValueError("physics", f"{expected}: {', '.join(sorted(names))}", text)
     for name, value in entries.items():
@@ -48,17 +50,17 @@ def parse_settings_text(text: str | None, task: PairTask | None = None) -> Any:
 
 
 def describe_settings(settings: Any, task: PairTask | None = None) -> str:
-    """Settings of a task, the table by default, in words."""
+    """A readable summary of settings (`PairTask.settings_summary`); `unknown` for None. The table by default."""
     return UNKNOWN if settings is None else (task or get_task()).settings_summary(settings)
 
 
 def count_settings(texts: Iterable[str | None], task: PairTask | None = None) -> dict[str, int]:
-    """How many episodes of a task, the table by default, have which settings, in words, most frequent first.
+    """Number of episodes for each summary of settings, most frequent first. The table task by default.
 
     Raises:
-        InvalidValueError: a text is not that of settings.
+        InvalidValueError: a text is not JSON of the settings of the task.
     """
-    summed: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for text, count in Counter(texts).items():
-        summed[describe_settings(parse_settings_text(text, task), task)] += count
-    return dict(sorted(summed.items(), key=lambda entry: (-entry[1], entry[0])))
+        counts[describe_settings(parse_settings_text(text, task), task)] += count
+    return dict(sorted(counts.items(), key=lambda entry: (-entry[1], entry[0])))

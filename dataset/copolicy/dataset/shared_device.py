@@ -1,36 +1,32 @@
-"""Whether one device moved both players."""
+"""Detects that one input device controlled both players."""
 
 import numpy as np
 
-_ALIKE = 0.01  # of a full force: nearer to each other two actions are the same
+_TOLERANCE = 0.01  # full forces; differences up to this count as equal, forces up to this as zero
 IDENTICAL = 0.99
-"""Share of the frames with a force from which on the actions of both players count as one."""
+"""Proportion of the frames with a force from which on both players' actions count as identical."""
 
 
 def any_force(actions: np.ndarray) -> np.ndarray:
-    """`(...)` whether anybody does anything in joint actions `(..., 2 n)`."""
-    return np.abs(actions).max(axis=-1, initial=0.0) > _ALIKE
+    """`(...)` whether a player applies a force, from joint actions `(..., 2 n)`."""
+    return np.abs(actions).max(axis=-1, initial=0.0) > _TOLERANCE
 
 
 def same_action(actions: np.ndarray) -> np.ndarray:
-    """`(...)` whether somebody does something and both do the same, in joint actions `(..., 2 n)`."""
+    """`(...)` whether both players apply the same force, not zero, from joint actions `(..., 2 n)`."""
     robot, human = np.split(actions, 2, axis=-1)
-    same = np.abs(robot - human).max(axis=-1) <= _ALIKE
-    return same & any_force(actions)
+    return (np.abs(robot - human).max(axis=-1) <= _TOLERANCE) & any_force(actions)
 
 
 def identical_actions(actions: np.ndarray) -> bool:
-    """Both players gave the same joint actions `(T, 2 n)` throughout; two who gave none did not."""
-    pushed = np.count_nonzero(any_force(actions))
-    return bool(pushed and np.count_nonzero(same_action(actions)) >= IDENTICAL * pushed)
+    """Whether both players' actions are the same throughout `(T, 2 n)`; False if neither applies a force."""
+    active_frames = np.count_nonzero(any_force(actions))
+    return bool(active_frames and np.count_nonzero(same_action(actions)) >= IDENTICAL * active_frames)
 
 
 def may_be_one_device(source: str, controller_0: str, controller_1: str) -> bool:
-    """Two people may hold one device that the system lists twice: both have one of a kind that can be, no keyboard.
+    """Whether both people may use one device that the system lists twice: equal controller names, no keyboard.
 
-    Args:
-        source: of the episode.
-        controller_0: of the robot seat.
-        controller_1: of the human seat.
+    The arguments are the episode columns of these names.
     """
     return source == "human" and controller_0 == controller_1 and "keyboard" not in controller_0.lower()

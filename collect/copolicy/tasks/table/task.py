@@ -170,11 +170,11 @@ class TableTask(PairTask):
         """Of position and orientation; sums of a double stay below 1e-9."""
         return {"px": 0.01, "rad": 1e-4}
 
-    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def drift(self, recorded: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Of the position and of the orientation, the shorter way round."""
-        turn = recorded[:, 2] - other[:, 2]
+        turn = recorded[:, 2] - reference[:, 2]
         rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)
-        return np.column_stack((np.linalg.norm(recorded[:, :2] - other[:, :2], axis=1), rad))
+        return np.column_stack((np.linalg.norm(recorded[:, :2] - reference[:, :2], axis=1), rad))
 
     def displaced(self, scenario: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
         """See `displaced_start`."""
@@ -236,6 +236,6 @@ class TableTask(PairTask):
 
         return MapFiles()
 
-    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
+    def turned(self, scenario_set: ScenarioSet) -> ScenarioSet:
         """See `maps.turned`."""
-        return turned(chosen)
+        return turned(scenario_set)

@@ -24,9 +24,7 @@ MAX_FRAMES = 200_000
 """Frames that are searched; of a larger data set, an even selection."""
 
 
-def action_variance_statistics(
-    data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
-) -> dict[str, Estimate]:
+def variance_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """The ratio of variances for both players together and for each."""
     kept = np.unique(np.linspace(0, len(data.states) - 1, min(MAX_FRAMES, len(data.states))).astype(int))
     chosen = np.zeros(len(data.states), dtype=bool)

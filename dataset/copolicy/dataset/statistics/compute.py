@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..command_line.commands import progress
-from .action_variance import action_variance_statistics
+from .action_variance import variance_statistics
 from .energy_distance import energy_statistics
 from .estimate import rounded
 from .forces import activity_statistics, force_statistics
@@ -17,7 +17,7 @@ from .resampling import MIN_CLUSTERS, Bootstrap
 from .route_entropy import route_statistics
 from .smoothness import smoothness_statistics
 from .trajectories import Trajectories
-from .variance_explained import variance_explained_statistics
+from .variance_explained import eta_squared_statistics
 from .visitation import visitation_statistics
 
 DEFINITION_VERSION = "2.0.0"
@@ -45,14 +45,14 @@ def compute_statistics(
     families = {
         "routes": lambda rng: route_statistics(data, bootstrap, rng),
         "paths": lambda rng: path_mode_statistics(data, seed),
-        "actions": lambda rng: action_variance_statistics(data, bootstrap, rng),
+        "actions": lambda rng: variance_statistics(data, bootstrap, rng),
         "visitation": lambda rng: visitation_statistics(data, bootstrap, rng),
         "leadership": lambda rng: leadership_statistics(data, bootstrap, rng),
         "forces": lambda rng: force_statistics(data, bootstrap, rng),
         "activity": lambda rng: activity_statistics(data, bootstrap),
         "smoothness": lambda rng: smoothness_statistics(data, bootstrap),
         "distances": lambda rng: energy_statistics(data, rng),
-        "pairs": lambda rng: variance_explained_statistics(data, bootstrap, rng),
+        "pairs": lambda rng: eta_squared_statistics(data, bootstrap, rng),
     }
     own = data.task.statistics
     families |= {name: lambda rng: {} for name in own.families if name not in families}

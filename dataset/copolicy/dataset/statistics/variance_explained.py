@@ -10,9 +10,7 @@ _PERMUTATIONS = 999
 _ROUTE = "route_between_pair_share"
 
 
-def variance_explained_statistics(
-    data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
-) -> dict[str, Estimate]:
+def eta_squared_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Eta squared of route and duration by pair within configurations, and of duration by configuration."""
     words = data.labels
     decided = np.array([index for index, word in enumerate(words) if word is not None], dtype=int)
