@@ -123,7 +123,7 @@ def test_sentences_that_are_no_index_are_not_found_by_lerobot(root):
         (lambda path: path.write_text("{}", encoding="utf-8"), "says nothing of"),
         (lambda path: _set_statistic(path, "mean", [math.nan] * 4), "no usable mean of action"),
         (lambda path: _set_statistic(path, "std", [1.0]), "no usable std of action"),
-        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json is not that"),
+        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json differs from"),
     ],
 )
 def test_no_broken_or_foreign_statistics(root, change, message):

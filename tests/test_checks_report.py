@@ -88,7 +88,7 @@ def test_a_folder_that_refuses_the_file_gives_one_warning_and_the_same_status(ro
     assert main(["check", str(root)]) == status
     warnings = [record.getMessage() for record in caplog.records]
     assert len(warnings) == 1
-    assert warnings[0].startswith(f"warning: {root / CHECK_FILE}: the findings were not kept there: ")
+    assert warnings[0].startswith(f"warning: {root / CHECK_FILE}: the findings were not written: ")
     assert warnings[0].endswith("; --no-save does not try")
     out = capsys.readouterr().out
     assert "passed       " + str(not status) in out
@@ -107,7 +107,7 @@ def test_a_read_only_folder_is_checked(root):
         done = subprocess.run([*prefix, sys.executable, "-c", code, str(root)], capture_output=True, text=True)
     finally:
         (root / "meta").chmod(0o700)
-    where = f"warning: {root / CHECK_FILE}: the findings were not kept there"
+    where = f"warning: {root / CHECK_FILE}: the findings were not written"
     assert done.stderr == f"{where}: Permission denied; --no-save does not try\n"
     assert done.returncode == 0
     assert not (root / CHECK_FILE).exists()

@@ -48,7 +48,7 @@ def test_longest_run_does_not_cross_episodes(sound):
     marks = np.array([0, 1, 1, 1, 1, 1, 0, 1], bool)
     assert small.longest_run(marks).tolist() == [2, 1, 2]
     assert small.longest_run(~marks).tolist() == [1, 0, 1]
-    assert small.share(marks).tolist() == [2 / 3, 1.0, 0.75]
+    assert small.proportion(marks).tolist() == [2 / 3, 1.0, 0.75]
 
 
 def test_a_wrong_feature_table(sound):

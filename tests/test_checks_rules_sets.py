@@ -159,7 +159,7 @@ def test_leakage_between_splits(sound):
     table = replace(sound, info=info)
     for column in ("pair_id", "player_0_id", "player_1_id"):
         table = with_column(table, column, apart)
-    assert [finding.message for finding in find(table, "leakage")] == ["split odd is no range"]
+    assert [finding.message for finding in find(table, "leakage")] == ["split odd is not a range"]
     shared = with_entry(with_column(table, "source", ["human"] * 6), "pair_id", 5, "p1")
     shared = with_entry(shared, "source_sha256", 5, shared.columns["source_sha256"][2])
     found = find(replace(shared, info={"splits": {"train": "0:4", "test": "4:6"}}), "leakage")
@@ -186,7 +186,7 @@ def test_two_files_of_maps_with_one_name(sound):
     digests = np.array(["a" * 16, *["b" * 16] * (count - 1)])
     found = find(with_column(of_file, "map_set_digest", digests), "map_files")
     assert [f.message for f in found] == [
-        f"episodes of several files of maps that are all named lab: {count - 1} of version 1, digest {'b' * 16}; 1 of "
+        f"episodes from several map files with the same name lab: {count - 1} of version 1, digest {'b' * 16}; 1 of "
         f"version 1, digest {'a' * 16}"
     ]
     elsewhere = with_entry(of_file, "map_id", 0, "other-01")

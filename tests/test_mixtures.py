@@ -101,7 +101,7 @@ def test_a_conversion_in_shards_says_so_too(made, tmp_path, run):
     flags = ("--shard-episodes", 2, "--workers", 1)
     summary, _ = run("mcap", made / "raw", "--root", tmp_path / "set", "--repo-id", "lab/table", *flags)
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
-    assert any(line.startswith("warning: physics: episodes of several physics") for line in summary["findings"])
+    assert any(line.startswith("warning: physics: episodes with different physics") for line in summary["findings"])
     assert physics_in(tmp_path / "set") == physics_in(made / "both")
 
 

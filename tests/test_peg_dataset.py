@@ -100,13 +100,13 @@ def test_damage_fails_the_command(root, capsys):
     assert main(["check", str(root)]) == 1
     out = capsys.readouterr().out
     assert "error: state_range: episode 0: position is this far outside its bounds, in m" in out
-    assert "error: achieved_hz: episode 0: the loop's rate was this share away from 20 Hz (0.25; limit 0.05)" in out
+    assert "error: achieved_hz: episode 0: relative deviation of the loop's rate from 20 Hz (0.25; limit 0.05)" in out
 
 
 def test_a_task_brings_rules_of_its_own(peg, root, monkeypatch):
     def slow(table):
-        speed = table.largest(np.abs(table.frames[STATE][:, 1]))
-        return table.beyond("jump", speed, "faster than a peg")
+        speed = table.maximum(np.abs(table.frames[STATE][:, 1]))
+        return table.over_limit("jump", speed, "faster than a peg")
 
     rules = Rule("jumps", "no faster than a peg", slow, (STATE,)), Rule("last", "nothing", lambda table: ())
     monkeypatch.setattr(type(peg), "rules", TaskRules(rules, {"jump": Limit(0.1, "m/s", "pegs are slow")}))

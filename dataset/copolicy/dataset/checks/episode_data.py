@@ -1,4 +1,4 @@
-"""All that the rules look at: the episodes of a data set side by side, their frames in one run of rows."""
+"""The input of the rules: episode columns, and the frames of all episodes concatenated."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,28 +13,28 @@ from .finding import Figure, Finding, Severity
 from .limits import limits_of
 
 COLUMN_TYPES: dict[str, type] = {"str": str, "float": float, "int": np.int64, "bool": bool}
-"""How the kinds of episode columns are held in arrays."""
+"""Array type of each type of episode column."""
 
 
 @dataclass(frozen=True, repr=False)
 class EpisodeData:
-    """E episodes, and N frames of those F episodes whose frames are all there.
+    """E episodes, and the N frames of the F episodes whose frames are complete.
 
     Attributes:
         kind: `lerobot` or `recordings`.
-        fps: frames a second; 0 where it is not known.
-        labels: `(E,)` how findings name the episodes.
-        columns: the episode columns that are there, `(E,)` each.
-        frames: the columns of the frames that are there, `(N, n)` or `(N,)` each.
-        framed: `(F,)` places in `labels` of the episodes that have frames, in the order of their frames.
-        starts: `(F,)` first frame of each.
-        final_states: `(F, n)` the state after the last action, where it was stored.
+        fps: frames per second; 0 if unknown.
+        labels: `(E,)` names of the episodes in findings.
+        columns: the available episode columns, `(E,)` each.
+        frames: the available frame columns, `(N, n)` or `(N,)` each.
+        framed: `(F,)` indices into `labels` of the episodes with frames, in the order of their frames.
+        starts: `(F,)` first frame of each of these episodes.
+        final_states: `(F, n)` state after the last action, if stored.
         info: `meta/info.json` of a LeRobot data set.
-        files: how the data files describe the columns of the frames: name to (type, width).
-        damage: what kept a part of the data from being read, or contradicts the rest of it.
-        episodes: the rows of meta/episodes in the order of `labels`, as they are stored.
-        data_files: the episodes that each data file has rows of, by its path below the folder.
-        task: that they are of.
+        files: type and width of each frame column in the schema of the data files.
+        damage: findings for unreadable or contradictory parts of the data.
+        episodes: the rows of meta/episodes as stored, in the order of `labels`.
+        data_files: for each data file (path below the folder), the episodes with rows in it.
+        task: task of the episodes.
     """
 
     root: Path
@@ -55,12 +55,12 @@ class EpisodeData:
 
     @property
     def frame_count(self) -> int:
-        """N."""
+        """Number of frames, N."""
         return len(next(iter(self.frames.values()))) if self.frames else 0
 
     @property
     def counts(self) -> np.ndarray:
-        """`(F,)` frames of each episode."""
+        """`(F,)` number of frames of each episode."""
         return np.diff(np.append(self.starts, self.frame_count))
 
     @property
@@ -69,19 +69,19 @@ class EpisodeData:
         return self.starts + self.counts - 1
 
     def framed_column(self, column: str) -> np.ndarray:
-        """`(F,)` an episode column of the episodes that have frames."""
+        """`(F,)` an episode column, for the episodes with frames."""
         return self.columns[column][self.framed]
 
-    def share(self, marks: np.ndarray) -> np.ndarray:
-        """`(F,)` share of each episode's frames that a mask `(N,)` marks."""
+    def proportion(self, marks: np.ndarray) -> np.ndarray:
+        """`(F,)` proportion of each episode's frames that a mask `(N,)` selects."""
         return np.add.reduceat(marks.astype(np.int64), self.starts) / self.counts
 
     def count(self, marks: np.ndarray) -> np.ndarray:
-        """`(F,)` frames of each episode that a mask `(N,)` marks."""
+        """`(F,)` number of each episode's frames that a mask `(N,)` selects."""
         return np.add.reduceat(marks.astype(int), self.starts)
 
-    def largest(self, values: np.ndarray) -> np.ndarray:
-        """`(F,)` largest of a value `(N,)` in each episode."""
+    def maximum(self, values: np.ndarray) -> np.ndarray:
+        """`(F,)` maximum of `(N,)` values in each episode."""
         return np.maximum.reduceat(values, self.starts)
 
     def player_force(self, player: int) -> np.ndarray:
@@ -89,42 +89,44 @@ class EpisodeData:
         return np.split(self.task.spec.full_forces(self.frames[ACTION]), 2, axis=1)[player]
 
     def longest_run(self, marks: np.ndarray) -> np.ndarray:
-        """`(F,)` frames of the longest unbroken run of a mask `(N,)` within each episode."""
+        """`(F,)` length of the longest run of a mask `(N,)` in each episode, frames."""
         order = np.arange(len(marks))
-        # The last place before each frame where a run cannot have been going on.
-        broken = np.where(marks, -1, order)
-        broken[self.starts] = np.where(marks[self.starts], self.starts - 1, self.starts)
-        return np.maximum.reduceat(order - np.maximum.accumulate(broken), self.starts)
+        # The last frame up to each frame that is not part of a run.
+        last_break = np.where(marks, -1, order)
+        last_break[self.starts] = np.where(marks[self.starts], self.starts - 1, self.starts)
+        return np.maximum.reduceat(order - np.maximum.accumulate(last_break), self.starts)
 
     def changes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Differences of successive frames of the same episode `(M, ...)`, and the later frame of each `(M,)`."""
+        """Differences `(M, ...)` of successive frames of an episode, and the index of the later frame `(M,)`."""
         inside = np.ones(len(values), bool)
         inside[self.starts] = False
         later = np.flatnonzero(inside)
         return values[later] - values[later - 1], later
 
     def limit(self, name: str) -> float:
-        """The number of a rule's limit, of the task or a generic one."""
+        """The value of a limit for the task."""
         return limits_of(self.task)[name].value
 
-    def found(
+    def findings(
         self, rule: str, where: np.ndarray, figures: np.ndarray, limit: Figure, message: str,
         severity: Severity = "error",
     ) -> Iterator[Finding]:  # fmt: skip
-        """One finding for every episode that a mask `(E,)` or `(F,)` marks, with its own figure."""
-        places = self.framed if len(where) == len(self.framed) else range(len(self.labels))
-        for place in np.flatnonzero(where):
-            figure: Any = figures[place]
-            plain = figure.item() if isinstance(figure, np.generic) else figure
-            yield Finding(self.labels[places[place]], rule, plain, limit, severity, message)
+        """A finding for every episode that a mask `(E,)` or `(F,)` selects, with its entry of `figures`."""
+        indices = self.framed if len(where) == len(self.framed) else range(len(self.labels))
+        for index in np.flatnonzero(where):
+            value: Any = figures[index]
+            figure = value.item() if isinstance(value, np.generic) else value
+            yield Finding(self.labels[indices[index]], rule, figure, limit, severity, message)
 
-    def beyond(self, rule: str, figures: np.ndarray, message: str, severity: Severity = "error") -> Iterator[Finding]:
-        """A finding for every episode whose figure `(E,)` or `(F,)` is over the limit of the rule, or is none."""
+    def over_limit(
+        self, rule: str, figures: np.ndarray, message: str, severity: Severity = "error"
+    ) -> Iterator[Finding]:
+        """A finding for every episode whose figure `(E,)` or `(F,)` is above the limit of the rule, or NaN."""
         bound = self.limit(rule)
-        return self.found(rule, ~(figures <= bound), figures, bound, message, severity)
+        return self.findings(rule, ~(figures <= bound), figures, bound, message, severity)
 
     def graded(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
-        """An error over the limit `RULE.error`, a warning over `RULE.warning`."""
+        """Errors for figures above the limit `RULE.error`, warnings for those above `RULE.warning`."""
         warning, error = self.limit(f"{rule}.warning"), self.limit(f"{rule}.error")
-        yield from self.found(rule, figures > error, figures, error, message)
-        yield from self.found(rule, (figures > warning) & ~(figures > error), figures, warning, message, "warning")
+        yield from self.findings(rule, figures > error, figures, error, message)
+        yield from self.findings(rule, (figures > warning) & ~(figures > error), figures, warning, message, "warning")

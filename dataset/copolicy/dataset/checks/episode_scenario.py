@@ -1,4 +1,4 @@
-"""Whether an episode has one scenario throughout, the one that it names, and begins at its start."""
+"""Rules on the scenario of an episode: constant, the named one, within bounds, and the start state."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -16,82 +16,82 @@ from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _constant(table: EpisodeData) -> Iterator[Finding]:
-    moved, later = table.changes(table.frames[ENVIRONMENT_STATE])
-    changed = np.zeros(table.frame_count, int)
+def _constant(data: EpisodeData) -> Iterator[Finding]:
+    moved, later = data.changes(data.frames[ENVIRONMENT_STATE])
+    changed = np.zeros(data.frame_count, int)
     changed[later] = (moved != 0).any(axis=1)
-    changes = table.count(changed)
-    yield from table.found("map_constant", changes > 0, changes, 0, f"{ENVIRONMENT_STATE} changes within the episode")
+    changes = data.count(changed)
+    yield from data.findings("map_constant", changes > 0, changes, 0, f"{ENVIRONMENT_STATE} changes within the episode")
 
 
-def _names(table: EpisodeData) -> Iterator[Finding]:
-    columns = (table.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
-    for label, name, group, digest in zip(table.labels, *columns, strict=True):
-        known = _named(table.task).get(base_name(name))
+def _names(data: EpisodeData) -> Iterator[Finding]:
+    columns = (data.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
+    for label, name, map_set, digest in zip(data.labels, *columns, strict=True):
+        named = _named(data.task).get(base_name(name))
         if not name:
             yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
-        elif known is None and not digest and not name.startswith("custom-"):
+        elif named is None and not digest and not name.startswith("custom-"):
             yield Finding(label, "map_name", name, "a map of a set", "error", "map_id is not the name of a known map")
-        elif known is not None and group != known[0]:
-            yield Finding(label, "map_name", group, known[0], "error", "map_set is not the set of map_id")
+        elif named is not None and map_set != named[0]:
+            yield Finding(label, "map_name", map_set, named[0], "error", "map_set is not the set of map_id")
 
 
-def _files(table: EpisodeData) -> Iterator[Finding]:
+def _files(data: EpisodeData) -> Iterator[Finding]:
     contents: dict[str, Counter[str]] = {}
-    columns = (table.columns[name].tolist() for name in ("map_set", "map_set_version", "map_set_digest"))
-    for group, version, digest in zip(*columns, strict=True):
-        contents.setdefault(group, Counter())[f"version {version or 'none'}, digest {digest or 'none'}"] += 1
-    for group, counts in contents.items():
+    columns = (data.columns[name].tolist() for name in ("map_set", "map_set_version", "map_set_digest"))
+    for map_set, version, digest in zip(*columns, strict=True):
+        contents.setdefault(map_set, Counter())[f"version {version or 'none'}, digest {digest or 'none'}"] += 1
+    for map_set, counts in contents.items():
         if len(counts) > 1:
             listed = "; ".join(f"{count} of {text}" for text, count in counts.most_common())
-            message = f"episodes of several files of maps that are all named {group}: {listed}"
+            message = f"episodes from several map files with the same name {map_set}: {listed}"
             yield Finding("", "map_files", len(counts), 1, "warning", message)
 
 
-def _rows(table: EpisodeData) -> Iterator[Finding]:
-    rows, (low, high) = _scenarios(table), table.task.spec.scenario.bounds
+def _rows(data: EpisodeData) -> Iterator[Finding]:
+    rows, (low, high) = _scenarios(data), data.task.spec.scenario.bounds
     outside = (np.maximum(low - rows, rows - high) / (high - low)).max(axis=1)
-    bound = table.limit("map_position")
-    yield from table.found(
+    bound = data.limit("map_position")
+    yield from data.findings(
         "map_rows", ~(outside <= bound), outside, bound, f"{ENVIRONMENT_STATE} is outside its bounds"
     )
-    for place, row in zip(table.framed, rows, strict=True):
-        name = str(table.columns["map_id"][place])
-        _, expected = _named(table.task).get(name, ("", None))
+    for index, row in zip(data.framed, rows, strict=True):
+        name = str(data.columns["map_id"][index])
+        _, expected = _named(data.task).get(name, ("", None))
         try:
-            table.task.scenario_of_vector(row, {name: values[place] for name, values in table.columns.items()})
+            data.task.scenario_of_vector(row, {name: values[index] for name, values in data.columns.items()})
         except CopolicyError as error:
-            yield Finding(table.labels[place], "map_rows", None, None, "error", str(error))
+            yield Finding(data.labels[index], "map_rows", None, None, "error", str(error))
             continue
         if expected is not None:
-            away = float((np.abs(row - table.task.scenario_vector(expected)) / (high - low)).max())
-            if not away <= bound:
-                message = f"{ENVIRONMENT_STATE} is not that of {name}"
-                yield Finding(table.labels[place], "map_rows", away, bound, "error", message)
+            distance = float((np.abs(row - data.task.scenario_vector(expected)) / (high - low)).max())
+            if not distance <= bound:
+                message = f"{ENVIRONMENT_STATE} differs from that of {name}"
+                yield Finding(data.labels[index], "map_rows", distance, bound, "error", message)
 
 
-def _start(table: EpisodeData) -> Iterator[Finding]:
-    task, (low, high) = table.task, table.task.spec.state.bounds
-    away = np.zeros(len(table.framed))
-    for number, (place, row) in enumerate(zip(table.framed, _scenarios(table), strict=True)):
+def _start(data: EpisodeData) -> Iterator[Finding]:
+    task, (low, high) = data.task, data.task.spec.state.bounds
+    distances = np.zeros(len(data.framed))
+    for position, (index, row) in enumerate(zip(data.framed, _scenarios(data), strict=True)):
         try:
-            columns = {name: values[place] for name, values in table.columns.items()}
+            columns = {name: values[index] for name, values in data.columns.items()}
             start = task.states_of(np.array([task.start_of(task.scenario_of_vector(row, columns))]))[0]
         except CopolicyError:
-            continue  # said by `map_rows`
-        away[number] = (np.abs(table.frames[STATE][table.starts[number]] - start) / (high - low)).max()
-    yield from table.beyond("map_start", away, "the episode begins this far from its map's start")
+            continue  # a finding of `map_rows`
+        distances[position] = (np.abs(data.frames[STATE][data.starts[position]] - start) / (high - low)).max()
+    yield from data.over_limit("map_start", distances, "the episode begins at this distance from its map's start")
 
 
-def _scenarios(table: EpisodeData) -> np.ndarray:
-    return table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
+def _scenarios(data: EpisodeData) -> np.ndarray:
+    return data.frames[ENVIRONMENT_STATE][data.starts].astype(float)
 
 
 @cache
 def _named(task: PairTask) -> Mapping[str, tuple[str, Any]]:
-    """Set and scenario by name, of all sets that come with a task."""
-    known = [scenario for scenarios in task.scenario_sets.values() for scenario in scenarios]
-    return {name: (group, scenario) for scenario in known for name, group in [task.identify(scenario)]}
+    """Set and scenario by scenario name, for all sets of a task."""
+    scenarios_of_sets = [scenario for scenarios in task.scenario_sets.values() for scenario in scenarios]
+    return {name: (map_set, scenario) for scenario in scenarios_of_sets for name, map_set in [task.identify(scenario)]}
 
 
 RULES = (

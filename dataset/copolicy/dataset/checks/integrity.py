@@ -1,4 +1,4 @@
-"""Whether the files are what was written: rows, indices, and the manifest of a release."""
+"""Rules on the integrity of the files: reading, indices, row ranges, and the manifest of a release."""
 
 from collections.abc import Iterator
 
@@ -12,43 +12,43 @@ from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _reading(table: EpisodeData) -> Iterator[Finding]:
-    yield from table.damage
+def _reading(data: EpisodeData) -> Iterator[Finding]:
+    yield from data.damage
 
 
-def _indices(table: EpisodeData) -> Iterator[Finding]:
-    expected = np.arange(table.frame_count) - np.repeat(table.starts, table.counts)
-    first = np.repeat(table.framed_column("dataset_from_index"), table.counts)
-    for name, due, message in (
+def _indices(data: EpisodeData) -> Iterator[Finding]:
+    expected = np.arange(data.frame_count) - np.repeat(data.starts, data.counts)
+    first = np.repeat(data.framed_column("dataset_from_index"), data.counts)
+    for name, target, message in (
         ("frame_index", expected, "frame_index does not count from 0 in steps of 1"),
-        ("index", expected + first, "index does not go on from the episode's dataset_from_index"),
+        ("index", expected + first, "index does not count from the episode's dataset_from_index"),
     ):
-        wrong = table.count(table.frames[name] != due)
-        yield from table.found("rows", wrong > 0, wrong, 0, message)
+        wrong = data.count(data.frames[name] != target)
+        yield from data.findings("rows", wrong > 0, wrong, 0, message)
 
 
-def _ranges(table: EpisodeData) -> Iterator[Finding]:
-    first, end = table.columns["dataset_from_index"], table.columns["dataset_to_index"]
-    message = "dataset_from_index and dataset_to_index span another length"
-    yield from table.found("rows", end - first != table.columns["length"], end - first, "length", message)
+def _ranges(data: EpisodeData) -> Iterator[Finding]:
+    first, end = data.columns["dataset_from_index"], data.columns["dataset_to_index"]
+    message = "dataset_from_index and dataset_to_index do not span the episode's length"
+    yield from data.findings("rows", end - first != data.columns["length"], end - first, "length", message)
     gap = np.zeros(len(first), bool)
     gap[1:] = first[1:] != end[:-1]
-    yield from table.found("rows", gap, first, "dataset_to_index", "begins where the episode before does not end")
+    yield from data.findings("rows", gap, first, "dataset_to_index", "does not begin where the previous episode ends")
 
 
-def _manifest(table: EpisodeData) -> Iterator[Finding]:
-    path = table.root / MANIFEST_FILE
+def _manifest(data: EpisodeData) -> Iterator[Finding]:
+    path = data.root / MANIFEST_FILE
     if not path.is_file():
         return
     try:
-        # The findings are written by this very command, after every release as well.
-        differences = Manifest.read(path).differences(Manifest.of_folder(table.root), without={CHECK_FILE})
+        # This command writes the check report, also after a release.
+        differences = Manifest.read(path).differences(Manifest.of_folder(data.root), without={CHECK_FILE})
     except CopolicyError as error:
         yield Finding("", "check_sum", None, None, "error", str(error).replace(str(path), MANIFEST_FILE))
         return
     for line in differences:
-        # A change after a release is how the next one begins; damage looks the same, so that a person must look.
-        message = f"{line}; meant: copolicy-dataset release makes the next version, not meant: the file is damaged"
+        # An intended change after a release cannot be distinguished from damage here; a person must decide.
+        message = f"{line}; if intended, make a new version with copolicy-dataset release, else the file is damaged"
         yield Finding("", "check_sum", None, None, "error", message)
 
 

@@ -1,4 +1,4 @@
-"""A folder of recordings, one MCAP file an episode, as an `EpisodeData`."""
+"""Reads a folder of recordings, one MCAP file per episode, as `EpisodeData`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,13 +17,13 @@ from .finding import Finding
 
 
 def read_recordings(root: Path) -> EpisodeData:
-    """Every `*.mcap` below a folder; a file that cannot be read becomes a finding, as does one that broke off."""
+    """Reads every `*.mcap` below a folder; unreadable and unfinished files become findings."""
     paths = distinct_files(root, "*.mcap")
     episodes: list[Episode] = []
     labels: list[str] = []
     damage = [
         Finding(path.relative_to(root).as_posix(), "unfinished", None, None, "warning",
-                "a recording that broke off; copolicy-collect recover makes it readable")
+                "an unfinished recording; copolicy-collect recover makes it readable")
         for path in distinct_files(root, "*.mcap.part")
     ]  # fmt: skip
     damage += [
@@ -42,8 +42,8 @@ def read_recordings(root: Path) -> EpisodeData:
             continue
         damage += unverified_findings(label, episode)
         if episodes and episode.task != episodes[0].task:
-            found = f"a recording of the task {episode.task!r} beside those of {episodes[0].task!r}"
-            damage.append(Finding(label, "foreign", None, None, "error", found))
+            message = f"a recording of the task {episode.task!r} beside those of {episodes[0].task!r}"
+            damage.append(Finding(label, "foreign", None, None, "error", message))
         elif len(episode.actions):
             episodes.append(episode)
             labels.append(label)
@@ -53,18 +53,18 @@ def read_recordings(root: Path) -> EpisodeData:
 
 
 def unverified_findings(label: str, episode: Episode) -> list[Finding]:
-    """What of a recording carries no check sum, so that nobody can know whether it is what was written."""
+    """Findings for the parts of a recording without a check sum, whose integrity cannot be verified."""
     return [Finding(label, "not_verified", None, None, "warning", note) for note in episode.notes]
 
 
 def data_of_recordings(
     root: Path, labels: Sequence[str], episodes: Sequence[Episode], damage: tuple[Finding, ...] = ()
 ) -> EpisodeData:
-    """Recordings that are in memory already.
+    """`EpisodeData` of recordings in memory.
 
     Args:
-        labels: how findings name them.
-        episodes: of one task, of at least one step each.
+        labels: names of the episodes in findings.
+        episodes: episodes of one task with at least one step each.
     """
     task = get_task(episodes[0].task) if episodes else get_task()
     lengths = np.array([len(episode.actions) for episode in episodes], np.int64)

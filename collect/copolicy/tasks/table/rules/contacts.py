@@ -25,10 +25,10 @@ def _goal(table: EpisodeData) -> Iterator[Finding]:
     gap, error = _final_gap(table, maps[:, 3:5], GOAL_SIZE / 2)
     bound = margin + error
     message = "a success, but the table ended this many px from the goal of its map"
-    yield from table.found("goal_contact", success & ~(gap <= bound), gap, bound, message)
+    yield from table.findings("goal_contact", success & ~(gap <= bound), gap, bound, message)
     depth = _deepest(table, np.repeat(maps[:, 3:5], table.counts, axis=0), GOAL_SIZE / 2)
     message = "no success, but the table was this many px inside the goal of its map"
-    yield from table.found("goal_contact", ~success & (depth > margin), depth, margin, message)
+    yield from table.findings("goal_contact", ~success & (depth > margin), depth, margin, message)
 
 
 def _obstacles(table: EpisodeData) -> Iterator[Finding]:
@@ -47,11 +47,11 @@ def _obstacles(table: EpisodeData) -> Iterator[Finding]:
         deepest = np.where(there, np.maximum(deepest, depth), deepest)
         nearest = np.where(there, np.minimum(nearest, gap), nearest)
     message = "the table went this many px into an obstacle of its map before the episode ended"
-    yield from table.found("obstacle_contact", deepest > margin, deepest, margin, message)
+    yield from table.findings("obstacle_contact", deepest > margin, deepest, margin, message)
     collided = table.framed_column("termination_reason") == "collision_obstacle"
     bound = margin + error
     message = "ended by a collision, but this many px from every obstacle of its map"
-    yield from table.found("obstacle_contact", collided & ~(nearest <= bound), nearest, bound, message)
+    yield from table.findings("obstacle_contact", collided & ~(nearest <= bound), nearest, bound, message)
 
 
 def _obstacle_sides(table: EpisodeData) -> tuple[np.ndarray, np.ndarray]:
@@ -77,14 +77,14 @@ def _wall(table: EpisodeData) -> Iterator[Finding]:
     bound = table.limit("contact_margin") + error
     ended = table.framed_column("termination_reason") == "collision_wall"
     message = "ended at the wall, but this many px from it"
-    yield from table.found("wall_contact", ended & ~(room <= bound), room, bound, message)
+    yield from table.findings("wall_contact", ended & ~(room <= bound), room, bound, message)
 
 
 def _deepest(table: EpisodeData, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
     """`(F,)` how deep the inner rectangle was in a square in any frame, px."""
     states = table.frames[STATE].astype(float)
     thetas = np.arctan2(states[:, 3], states[:, 2])
-    return table.largest(-separation(states[:, :2], thetas, INNER, centres, half))
+    return table.maximum(-separation(states[:, :2], thetas, INNER, centres, half))
 
 
 def _final(table: EpisodeData) -> tuple[np.ndarray, np.ndarray, float]:

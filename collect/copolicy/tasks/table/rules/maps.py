@@ -79,7 +79,7 @@ def _start(table: EpisodeData) -> Iterator[Finding]:
     away = np.linalg.norm(first[:, :2] - start[:, :2], axis=1)
     bound = table.limit("map_start")
     message = "the episode begins this many px from its map's start"
-    yield from table.found("map_start", ~(away <= bound), away, bound, message)
+    yield from table.findings("map_start", ~(away <= bound), away, bound, message)
 
 
 def _obstacle_sizes(table: EpisodeData) -> Iterator[Finding]:
