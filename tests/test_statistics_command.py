@@ -162,7 +162,7 @@ def test_the_summary_is_one_line_a_value():
         "human_reference": {"routes": {}},
     }
     lines = list(_lines(summary(document)))
-    assert "  name  0.5 [0.4, 0.6] bits; by chance 0.1 [0, 0.2], p = 0.01" in lines
+    assert "  name  0.5 [0.4, 0.6] bits; null 0.1 [0, 0.2], p = 0.01" in lines
     assert "  none  - (too few)" in lines
     assert "  left_out  2 discarded" in lines
 

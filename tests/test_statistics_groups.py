@@ -4,7 +4,7 @@ from constructed_pairs import FREE, ONE, carried, row, still, trajectories
 
 from copolicy.dataset.statistics.energy_distance import energy_coefficient, energy_statistics, episode_distances
 from copolicy.dataset.statistics.resampling import Bootstrap, circular_shift, exchangeable, permuted_within
-from copolicy.dataset.statistics.variance_explained import eta_squared_statistics, explained
+from copolicy.dataset.statistics.variance_explained import eta_squared, eta_squared_statistics
 from copolicy.dataset.statistics.visitation import Grid, visitation_statistics
 from copolicy.tasks.table.scene_outline import TableOutline
 
@@ -143,15 +143,15 @@ def test_splits_are_compared_where_there_are_some():
     estimates = energy_statistics(data, np.random.default_rng(0))
     assert estimates["energy_between_splits"].value == pytest.approx(1.0)
     assert "energy_between_halves" not in estimates
-    assert estimates["energy_between_pairs"].note == "there is only one"
+    assert estimates["energy_between_pairs"].note == "there is only one part"
 
 
 def test_explained_share_of_known_values():
     pairs, strata = np.array([0, 0, 1, 1]), np.zeros(4, dtype=int)
-    assert explained(np.array([[1.0], [1], [3], [3]]), pairs, strata) == pytest.approx(1.0)
-    assert explained(np.array([[1.0], [3], [1], [3]]), pairs, strata) == pytest.approx(0.0)
+    assert eta_squared(np.array([[1.0], [1], [3], [3]]), pairs, strata) == pytest.approx(1.0)
+    assert eta_squared(np.array([[1.0], [3], [1], [3]]), pairs, strata) == pytest.approx(0.0)
     # Means 1 and 3, deviations of 1 about them: 1 of 2.
-    assert explained(np.array([[0.0], [2], [2], [4]]), pairs, strata) == pytest.approx(0.5)
+    assert eta_squared(np.array([[0.0], [2], [2], [4]]), pairs, strata) == pytest.approx(0.5)
 
 
 def test_routes_that_each_pair_always_takes_are_the_pairs():
@@ -192,6 +192,6 @@ def test_the_share_of_durations_is_that_of_their_variance():
 def test_one_pair_has_nobody_to_be_compared_with():
     data = trajectories([(carried("L", ONE), None)] * 6, [row()] * 6)
     estimates = eta_squared_statistics(data, _bootstrap(data), np.random.default_rng(0))
-    assert estimates["route_between_pair_share"].note == "no configuration was carried by two pairs"
+    assert estimates["route_between_pair_share"].note == "no configuration has episodes of two pairs"
     estimates = visitation_statistics(data, _bootstrap(data), np.random.default_rng(0))
     assert estimates["visitation_divergence_between_pairs"].note == "one pair only"

@@ -1,10 +1,9 @@
-"""How far the action is settled by the state: its variance among the nearest states of other episodes.
+"""k-nearest-neighbour conditional action variance: the variance of the action among similar states of other episodes.
 
-Two things would make that variance another one than that of the action given the state. Neighbouring frames of one
-episode have neighbouring actions, so that many of them vary too little: each other episode gives one frame, its
-nearest. And neighbours lie beside a state, not on it, so that what the action does from state to state adds to its
-variance: to first order by the mean square of the neighbours' own spread, which is measured, so that the variance is
-found for several numbers of neighbours and followed to a spread of zero.
+It estimates Var(action | state), with two corrections. Frames of one episode have similar actions, which biases the
+variance down: only the nearest frame of each other episode is used. Neighbours differ from the query state, and the
+change of the action with the state biases the variance up, to first order in proportion to the mean square spread of
+the neighbours: the variance is computed for several numbers of neighbours and extrapolated to a spread of zero.
 """
 
 import numpy as np
@@ -14,46 +13,46 @@ from .estimate import Estimate
 from .resampling import Bootstrap, interval
 from .trajectories import Trajectories
 
-NEIGHBOURS = (2, 4, 8)
-"""The variance is followed along these numbers of other episodes; the last must be there."""
+NEIGHBOUR_COUNTS = (2, 4, 8)
+"""Numbers of neighbouring episodes from which the variance is extrapolated; a query needs the largest number."""
 
-_BLOCK = 2000
-_FIRST_REACH = 64
+_BLOCK_SIZE = 2000
+_FIRST_K = 64
 MAX_QUERIES = 20_000
 MAX_FRAMES = 200_000
-"""Frames that are searched; of a larger data set, an even selection."""
+"""Frames that are searched for neighbours; a larger data set is subsampled evenly."""
 
 
 def variance_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """The ratio of variances for both players together and for each."""
-    kept = np.unique(np.linspace(0, len(data.states) - 1, min(MAX_FRAMES, len(data.states))).astype(int))
-    chosen = np.zeros(len(data.states), dtype=bool)
-    chosen[rng.choice(kept, min(MAX_QUERIES, len(kept)), replace=False)] = True
+    """Ratio of the conditional to the total action variance, for both players together and for each."""
+    searched = np.unique(np.linspace(0, len(data.states) - 1, min(MAX_FRAMES, len(data.states))).astype(int))
+    is_query = np.zeros(len(data.states), dtype=bool)
+    is_query[rng.choice(searched, min(MAX_QUERIES, len(searched)), replace=False)] = True
     low, high = data.task.spec.state.bounds
     scaled = (2 * (data.states - low) / (high - low) - 1).astype(np.float32)
     # Sums over the queries of each episode, for each number of neighbours.
     width = len(data.task.spec.action)
-    variances = np.zeros((len(NEIGHBOURS), len(data.rows), 2 * width))
-    spreads = np.zeros((len(NEIGHBOURS), len(data.rows)))
+    variances = np.zeros((len(NEIGHBOUR_COUNTS), len(data.rows), 2 * width))
+    spreads = np.zeros((len(NEIGHBOUR_COUNTS), len(data.rows)))
     queries = np.zeros(len(data.rows))
-    keep_frame = np.zeros(len(data.states), dtype=bool)
-    keep_frame[kept] = True
+    is_searched = np.zeros(len(data.states), dtype=bool)
+    is_searched[searched] = True
     for group in data.groups(with_goal=True):
-        member = np.isin(data.episode, group)
-        frames, asked = np.flatnonzero(member & keep_frame), np.flatnonzero(member & chosen)
-        if len(group) < 2 or not len(asked):
+        in_group = np.isin(data.episode, group)
+        frames, query_indices = np.flatnonzero(in_group & is_searched), np.flatnonzero(in_group & is_query)
+        if len(group) < 2 or not len(query_indices):
             continue
-        neighbours = _others(scaled, data.episode, frames, asked)
-        found = (neighbours >= 0).all(axis=1)
-        of = data.episode[asked[found]]
-        for place, count in enumerate(NEIGHBOURS):
-            near = neighbours[found, :count]
-            np.add.at(variances[place], of, _variance(data.actions, near))
-            np.add.at(spreads[place], of, _variance(scaled, near).sum(axis=1))
-        np.add.at(queries, of, 1)
+        neighbours = _nearest_frames(scaled, data.episode, frames, query_indices)
+        complete = (neighbours >= 0).all(axis=1)
+        query_episodes = data.episode[query_indices[complete]]
+        for row, count in enumerate(NEIGHBOUR_COUNTS):
+            nearest = neighbours[complete, :count]
+            np.add.at(variances[row], query_episodes, _variance(data.actions, nearest))
+            np.add.at(spreads[row], query_episodes, _variance(scaled, nearest).sum(axis=1))
+        np.add.at(queries, query_episodes, 1)
     return {
-        name: _ratio(data, bootstrap, variances, spreads, queries, columns, who)
-        for name, columns, who in (
+        name: _ratio(data, bootstrap, variances, spreads, queries, columns, description)
+        for name, columns, description in (
             ("action_variance_ratio", slice(0, 2 * width), "both players' actions"),
             ("action_variance_ratio_player_0", slice(0, width), "player 0's action"),
             ("action_variance_ratio_player_1", slice(width, 2 * width), "player 1's action"),
@@ -61,83 +60,84 @@ def variance_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random
     }
 
 
-def _others(scaled: np.ndarray, episode: np.ndarray, frames: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """`(len(asked), k)` nearest frame of each of the k nearest other episodes; -1 where a group has too few of them."""
-    most = NEIGHBOURS[-1]
-    result = np.full((len(asked), most), -1)
-    if len(frames) < most:
+def _nearest_frames(scaled: np.ndarray, episode: np.ndarray, frames: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """`(Q, k)` nearest frame of each of the k nearest other episodes, for each query `(Q,)`; -1 if there are fewer."""
+    count = NEIGHBOUR_COUNTS[-1]
+    result = np.full((len(queries), count), -1)
+    if len(frames) < count:
         return result
     tree = KDTree(scaled[frames])
-    for begin in range(0, len(asked), _BLOCK):
-        missing = np.arange(begin, min(begin + _BLOCK, len(asked)))
-        reach = min(_FIRST_REACH, len(frames))
-        while len(missing):
-            near = frames[tree.query(scaled[asked[missing]], k=reach)[1].reshape(len(missing), -1)]
-            places = _first_of_each(episode[near], episode[asked[missing]])[:, :most]
-            enough = places[:, -1] < reach
-            result[missing[enough]] = np.take_along_axis(near[enough], places[enough], axis=1)
-            missing = missing[~enough]
-            if reach == len(frames):
+    for begin in range(0, len(queries), _BLOCK_SIZE):
+        pending = np.arange(begin, min(begin + _BLOCK_SIZE, len(queries)))
+        k = min(_FIRST_K, len(frames))
+        while len(pending):
+            nearest = frames[tree.query(scaled[queries[pending]], k=k)[1].reshape(len(pending), -1)]
+            columns = _first_per_episode(episode[nearest], episode[queries[pending]])[:, :count]
+            complete = columns[:, -1] < k
+            result[pending[complete]] = np.take_along_axis(nearest[complete], columns[complete], axis=1)
+            pending = pending[~complete]
+            if k == len(frames):
                 break
-            reach = min(4 * reach, len(frames))
+            k = min(4 * k, len(frames))
     return result
 
 
-def _first_of_each(episodes: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """`(Q, k)` places in the rows `(Q, k)` where an episode other than `own` `(Q,)` comes first, then k for none."""
+def _first_per_episode(episodes: np.ndarray, own_episodes: np.ndarray) -> np.ndarray:
+    """`(Q, k)` columns of `episodes` `(Q, k)` where an episode other than the own `(Q,)` comes first, padded with k."""
     order = np.argsort(episodes, axis=1, kind="stable")
     ordered = np.take_along_axis(episodes, order, axis=1)
-    first = ordered != own[:, None]
+    first = ordered != own_episodes[:, None]
     first[:, 1:] &= ordered[:, 1:] != ordered[:, :-1]
     return np.sort(np.where(first, order, episodes.shape[1]), axis=1)
 
 
-def _variance(values: np.ndarray, near: np.ndarray) -> np.ndarray:
+def _variance(values: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """`(Q, n)` variance of each column of `(N, n)` among the neighbours `(Q, k)` of each query."""
-    # Column by column: all at once would hold Q k n numbers.
-    return np.column_stack([values[:, axis][near].var(axis=1, ddof=1) for axis in range(values.shape[1])])
+    # Column by column, to save the memory of Q k n numbers.
+    return np.column_stack([values[:, axis][neighbours].var(axis=1, ddof=1) for axis in range(values.shape[1])])
 
 
-def _at_no_spread(variances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
-    """`(B,)` variance where a line through `(K, B)` variances over `(K, B)` spreads meets a spread of zero."""
-    away = spreads - spreads.mean(axis=0)
-    square = (away**2).sum(axis=0)
-    slope = np.divide((away * variances).sum(axis=0), square, out=np.zeros_like(square), where=square > 1e-18)
+def _at_zero_spread(variances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+    """`(B,)` intercepts of linear fits of `(K, B)` variances over `(K, B)` spreads, at least 0."""
+    deviations = spreads - spreads.mean(axis=0)
+    squares = (deviations**2).sum(axis=0)
+    slope = np.divide((deviations * variances).sum(axis=0), squares, out=np.zeros_like(squares), where=squares > 1e-18)
     return np.maximum(0.0, variances.mean(axis=0) - slope * spreads.mean(axis=0))
 
 
-def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries, columns: slice, who: str) -> Estimate:
-    numbers = ", ".join(map(str, NEIGHBOURS))
+def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries, columns, whose: str) -> Estimate:
+    numbers = ", ".join(map(str, NEIGHBOUR_COUNTS))
     definition = (
-        f"Mean variance of {who} among the nearest states of other episodes with the same goal and obstacles, one of "
-        "each episode, over their variance in all: 0 where the state settles the action, 1 (the null, by construction) "
-        f"where it tells nothing. States in the task's bounds scaled to [-1, 1]. The variance among {numbers} of them "
-        "is followed along a line in the mean square of their spread to a spread of zero, since neighbours lie beside "
-        "the state, not on it; with few episodes the ratio still leans to that of far neighbours."
+        f"k-nearest-neighbour conditional action variance: mean variance of {whose} among the nearest states of other "
+        "episodes with the same goal and obstacles, one per episode, divided by their total variance: 0 if the state "
+        "determines the action, 1 (the null, by construction) if they are independent. States are scaled from the "
+        f"task's bounds to [-1, 1]. The variance among {numbers} neighbours is extrapolated linearly in their mean "
+        "square spread to a spread of zero; with few episodes a bias towards that of distant neighbours remains."
     )
     episodes = int((queries > 0).sum())
     if not episodes:
-        note = f"no goal and obstacles with {NEIGHBOURS[-1] + 1} episodes"
+        note = f"no goal and obstacles with {NEIGHBOUR_COUNTS[-1] + 1} episodes"
         return Estimate(None, "1", definition, 0, note=note)
     actions = data.actions[:, columns]
     sums = np.column_stack([data.per_episode(actions[:, axis]) for axis in range(actions.shape[1])])
     squares = data.per_episode((actions.astype(float) ** 2).sum(axis=1))
-    within = variances[:, :, columns].sum(axis=2)
+    sums_within = variances[:, :, columns].sum(axis=2)
 
     def ratios(weights: np.ndarray) -> np.ndarray:
-        """`(1 + K, B)` followed to no spread, and as it is among each number of neighbours."""
+        """`(1 + K, B)` ratio extrapolated to zero spread, and the ratio for each number of neighbours."""
         frames = weights @ data.lengths
         total = (weights @ squares) / frames - (((weights @ sums) / frames[:, None]) ** 2).sum(axis=1)
-        asked = weights @ queries
-        among = within @ weights.T / asked
-        return np.vstack((_at_no_spread(among, spreads @ weights.T / asked), among)) / total
+        total_queries = weights @ queries
+        within_variances = sums_within @ weights.T / total_queries
+        extrapolated = _at_zero_spread(within_variances, spreads @ weights.T / total_queries)
+        return np.vstack((extrapolated, within_variances)) / total
 
-    everything = np.ones((1, len(data.rows)))
+    all_episodes = np.ones((1, len(data.rows)))
     drawn = bootstrap.weights[(bootstrap.weights @ queries) > 0]
     frames = len(data.actions)
     if not squares.sum() / frames - ((sums.sum(axis=0) / frames) ** 2).sum() > 1e-12:
         return Estimate(None, "1", definition, episodes, note="the actions never change")
-    value, *among = ratios(everything)[:, 0].tolist()
+    value, *within_variances = ratios(all_episodes)[:, 0].tolist()
     bounds = interval(value, ratios(drawn.astype(float))[0], 0.0)
-    details = {"among_episodes": {str(count): ratio for count, ratio in zip(NEIGHBOURS, among, strict=True)}}
+    details = {"among_episodes": dict(zip(map(str, NEIGHBOUR_COUNTS), within_variances, strict=True))}
     return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, details=details)

@@ -1,4 +1,4 @@
-"""Whether "multimodality" is just who carried: the share of routes and durations that the pair explains."""
+"""Variance explained by the pair (eta squared): how much of the variation of routes and durations is between pairs."""
 
 import numpy as np
 
@@ -11,16 +11,16 @@ _ROUTE = "route_between_pair_share"
 
 
 def eta_squared_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """Eta squared of route and duration by pair within configurations, and of duration by configuration."""
-    words = data.labels
-    decided = np.array([index for index, word in enumerate(words) if word is not None], dtype=int)
-    vocabulary = sorted({word for word in words if word is not None})
-    onehot = np.array([[words[index] == word for word in vocabulary] for index in decided], dtype=float)
+    """Eta squared of route and duration by pair, within configurations, and of duration by configuration."""
+    labels = data.labels
+    labelled = np.array([index for index, label in enumerate(labels) if label is not None], dtype=int)
+    classes = sorted({label for label in labels if label is not None})
+    onehot = np.array([[labels[index] == label for label in classes] for index in labelled], dtype=float)
     success = np.flatnonzero([row.success for row in data.rows])
     duration = np.array([[data.rows[index].duration_s] for index in success])
     if data.task.offers("strategy"):
-        what = "route class (chance that two differ, Light and Margolin 1971)"
-        route = {_ROUTE: _within_configurations(data, decided, onehot, what, rng)}
+        description = "route class (probability that two differ, Light and Margolin 1971)"
+        route = {_ROUTE: _within_configurations(data, labelled, onehot, description, rng)}
     else:
         route = left_out(data.task.missing("strategy labels"), _ROUTE)
     return {
@@ -30,13 +30,13 @@ def eta_squared_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.ran
     }
 
 
-def explained(values: np.ndarray, labels: np.ndarray, strata: np.ndarray, weights: np.ndarray | None = None) -> float:
-    """Share of the sum of squares within strata that lies between the labels in them; nan where nothing varies.
+def eta_squared(values: np.ndarray, labels: np.ndarray, strata: np.ndarray, weights: np.ndarray | None = None) -> float:
+    """Proportion of the sum of squares within strata that lies between labels; NaN if the values do not vary.
 
     Args:
-        values: `(E, n)`; of a class, one column each with 0 and 1.
+        values: `(E, n)`; a categorical variable is one-hot encoded.
         labels, strata: `(E,)`.
-        weights: `(E,)` how often each is counted, once by default.
+        weights: `(E,)` multiplicity of each episode, 1 by default.
     """
     weights = np.ones(len(values)) if weights is None else weights
     cells = strata * (int(labels.max()) + 1) + labels
@@ -46,62 +46,62 @@ def explained(values: np.ndarray, labels: np.ndarray, strata: np.ndarray, weight
 
 def _squares(values: np.ndarray, groups: np.ndarray, weights: np.ndarray) -> float:
     count = np.maximum(np.bincount(groups, weights), 1e-12)
-    result = 0.0
+    total = 0.0
     for column in values.T:
         mean = np.bincount(groups, weights * column) / count
-        result += float((weights * (column - mean[groups]) ** 2).sum())
-    return result
+        total += float((weights * (column - mean[groups]) ** 2).sum())
+    return total
 
 
 def _within_configurations(
-    data: Trajectories, chosen: np.ndarray, values: np.ndarray, what: str, rng: np.random.Generator
+    data: Trajectories, episodes: np.ndarray, values: np.ndarray, description: str, rng: np.random.Generator
 ) -> Estimate:
     definition = (
-        f"Eta squared: the share of the variation of {what} within configurations that lies between the pairs in "
-        f"each, of episodes that {data.task.words.success}. With few episodes a pair and configuration it is large by "
-        "chance: hold it against its null."
+        f"Eta squared: the proportion of the variation of {description} within configurations that lies between pairs, "
+        f"of episodes that {data.task.words.success}. With few episodes per pair and configuration it is biased "
+        "upward: compare it with its null distribution."
     )
-    pairs, strata = data.pairs[chosen], data.strata[chosen]
-    movable = exchangeable(pairs, strata) if len(chosen) else 0
-    if not movable:
-        note = "no configuration was carried by two pairs"
-        return Estimate(None, "1", definition, len(chosen), note=note)
-    value = explained(values, pairs, strata)
+    pairs, strata = data.pairs[episodes], data.strata[episodes]
+    exchangeable_episodes = exchangeable(pairs, strata) if len(episodes) else 0
+    if not exchangeable_episodes:
+        note = "no configuration has episodes of two pairs"
+        return Estimate(None, "1", definition, len(episodes), note=note)
+    value = eta_squared(values, pairs, strata)
     if not np.isfinite(value):
-        return Estimate(None, "1", definition, len(chosen), note="nothing varies within a configuration")
+        return Estimate(None, "1", definition, len(episodes), note="nothing varies within a configuration")
     cells = np.unique(np.column_stack((strata, pairs)), axis=0, return_inverse=True)[1].ravel()
-    again = np.array([explained(values, pairs, strata, drawn_within(cells, rng)) for _ in range(_PERMUTATIONS)])
-    bounds = interval(value, again[np.isfinite(again)], 0.0, 1.0)
-    draws = np.array([explained(values, permuted_within(pairs, strata, rng), strata) for _ in range(_PERMUTATIONS)])
+    replicates = np.array([eta_squared(values, pairs, strata, drawn_within(cells, rng)) for _ in range(_PERMUTATIONS)])
+    bounds = interval(value, replicates[np.isfinite(replicates)], 0.0, 1.0)
+    draws = np.array([eta_squared(values, permuted_within(pairs, strata, rng), strata) for _ in range(_PERMUTATIONS)])
     null = Null.from_draws("pairs shuffled among the episodes of each configuration", value, draws)
-    # As much as chance alone explains is taken off, and off the whole.
+    # Adjusted for the expectation under the null, as the adjusted R squared is.
     details = {"adjusted": (value - null.mean) / (1 - null.mean) if null.mean < 1 else None}
     return Estimate(
-        value, "1", definition, len(chosen), bounds, "episodes of each pair and configuration", null, details=details
+        value, "1", definition, len(episodes), bounds, "episodes of each pair and configuration", null, details=details
     )
 
 
 def _by_configuration(
-    data: Trajectories, chosen: np.ndarray, values: np.ndarray, bootstrap: Bootstrap, rng: np.random.Generator
+    data: Trajectories, episodes: np.ndarray, values: np.ndarray, bootstrap: Bootstrap, rng: np.random.Generator
 ) -> Estimate:
     definition = (
-        "Eta squared: the share of the variation of duration that lies between configurations, of episodes that "
+        "Eta squared: the proportion of the variation of duration that lies between configurations, of episodes that "
         f"{data.task.words.success}."
     )
-    strata = data.strata[chosen]
-    one = np.zeros(len(chosen), dtype=int)
-    value = explained(values, strata, one) if len(chosen) else float("nan")
+    strata = data.strata[episodes]
+    single_stratum = np.zeros(len(episodes), dtype=int)
+    value = eta_squared(values, strata, single_stratum) if len(episodes) else float("nan")
     if len(np.unique(strata)) < 2 or not np.isfinite(value):
-        return Estimate(None, "1", definition, len(chosen), note="one configuration, or nothing varies")
-    weights = bootstrap.weights[:_PERMUTATIONS, chosen].astype(float)
-    again = np.array([explained(values, strata, one, row) for row in weights])
-    draws = np.array([explained(values, rng.permutation(strata), one) for _ in range(_PERMUTATIONS)])
+        return Estimate(None, "1", definition, len(episodes), note="one configuration, or nothing varies")
+    weights = bootstrap.weights[:_PERMUTATIONS, episodes].astype(float)
+    replicates = np.array([eta_squared(values, strata, single_stratum, row) for row in weights])
+    draws = np.array([eta_squared(values, rng.permutation(strata), single_stratum) for _ in range(_PERMUTATIONS)])
     return Estimate(
         value,
         "1",
         definition,
-        len(chosen),
-        interval(value, again[np.isfinite(again)], 0.0, 1.0),
+        len(episodes),
+        interval(value, replicates[np.isfinite(replicates)], 0.0, 1.0),
         bootstrap.resampled,
         Null.from_draws("configurations shuffled among episodes", value, draws),
     )
