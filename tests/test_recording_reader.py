@@ -188,7 +188,7 @@ def test_appended_bytes_are_refused(recording, tmp_path):
     path, *_ = recording
     longer = tmp_path / "longer.mcap"
     longer.write_bytes(path.read_bytes() + b"\0")
-    assert "found another end" in refusal(longer)
+    assert "found a wrong end of the file" in refusal(longer)
 
 
 @pytest.mark.parametrize("kind", ["bit", "byte", "zeros", "removed", "repeated", "exchanged"])
@@ -290,7 +290,7 @@ def single_precision(record, topic):
         (edit_metadata("dataset_info", fps="10"), "a recording at 30 Hz, found fps '10'"),
         (
             edit_metadata("dataset_info", schema_version="2"),
-            "schema version 1, the latest known here, found schema version '2'",
+            "schema version 1, the latest supported, found schema version '2'",
         ),
         (edit_metadata("episode", seed="x"), "metadata entry 'seed': expected int, found 'x'"),
         (edit_metadata("episode_result", success="yes"), "metadata entry 'success': expected bool, found 'yes'"),

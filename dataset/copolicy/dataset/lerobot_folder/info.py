@@ -116,7 +116,7 @@ def require_episodes(root: Path, info: dict[str, Any]) -> None:
         raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
 
 
-def is_channel_of(info: Mapping[str, Any]) -> bool:
+def is_ours(info: Mapping[str, Any]) -> bool:
     """Whether `copolicy-convert` wrote a data set, by the marks in `meta/info.json` that LeRobot's tools keep."""
     features = info.get("features")
     action = features.get("action") if isinstance(features, dict) else None
@@ -129,7 +129,7 @@ def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
 
     LeRobot's delete and split write meta/episodes without them.
     """
-    if not is_channel_of(info):
+    if not is_ours(info):
         return ""
     return (
         f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "

@@ -1,4 +1,4 @@
-"""How a task is recorded that brings no messages of its own."""
+"""Generic messages for recordings of tasks without message types of their own."""
 
 import functools
 import json
@@ -14,7 +14,7 @@ from .topics import Topic, player_metadata
 
 
 class GenericMessages(TaskMessages):
-    """How a task is recorded that brings no messages of its own: numbers, whose meaning stands in the channels."""
+    """Messages of plain numbers; the channel metadata state their names and units."""
 
     def __init__(self, task: PairTask):
         spec = task.spec
@@ -54,7 +54,7 @@ class GenericMessages(TaskMessages):
 
 @functools.cache
 def messages_of(task: PairTask) -> TaskMessages:
-    """How a task is recorded: in messages of its own, or in the generic ones."""
+    """The messages of a task: its own, or the generic ones."""
     return task.recording or GenericMessages(task)
 
 
@@ -62,7 +62,7 @@ def _meaning(vector: Vector) -> dict[str, str]:
     return {"names": json.dumps(vector.names), "units": json.dumps(vector.units)}
 
 
-def _sized(values: Sequence[float], size: int, what: str) -> Sequence[float]:
+def _sized(values: Sequence[float], size: int, label: str) -> Sequence[float]:
     if len(values) != size:
-        raise ValueError(f"a {what} of {len(values)} numbers instead of {size}")
+        raise ValueError(f"a {label} of {len(values)} numbers instead of {size}")
     return values
