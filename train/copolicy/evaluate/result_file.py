@@ -1,4 +1,4 @@
-"""Result files of studies: written whole or not at all, and overwritten only when asked."""
+"""Writes the result files of studies atomically."""
 
 import json
 from collections.abc import Mapping
@@ -9,5 +9,5 @@ from copolicy.dataset.files.staging import replace_text
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Writes a JSON object, whole or not at all; makes the folder."""
+    """Writes a JSON object atomically; creates the parent folder."""
     replace_text(path, json.dumps(content, indent=1) + "\n")
