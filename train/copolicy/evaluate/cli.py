@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_whole_number(coplan, "--repeats", "episodes per map (default: 1)", 1, 1, 10_000)
     add_whole_number(coplan, "--limit", "use only the first N maps; recorded in the result")
     coplan.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
-    add_study_flags(coplan, actions_per_plan=8)
+    add_study_flags(coplan, n_action_steps=8)
     add_partner_command(commands)
     add_human_command(commands)
     add_compare_command(commands)

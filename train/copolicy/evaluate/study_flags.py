@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
 
 
-def add_study_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
+def add_study_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
     """Adds the flags of a simulated study other than its maps and its output."""
     add_whole_number(command, "--fps", "actions per second (default: the rate of the policy's training data)")
     command.add_argument("--device", default="cpu", help="default: cpu")
-    add_protocol_flags(command, actions_per_plan)
+    add_protocol_flags(command, n_action_steps)
 
 
-def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
+def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
     """Adds the flags of inference, of the world's settings, `--seed` and `--overwrite`."""
-    meaning = f"actions executed of each action chunk (default: {actions_per_plan})"
-    add_whole_number(command, "--actions-per-plan", meaning, actions_per_plan)
+    meaning = f"actions executed of each action chunk (default: {n_action_steps})"
+    add_whole_number(command, "--n-action-steps", meaning, n_action_steps)
     add_whole_number(
         command, "--step-limit", "steps until a time-out (default: the task's; for the table 2000 steps of 1/30 s)"
     )
@@ -160,7 +160,7 @@ def study_settings(arguments: argparse.Namespace, protocol: Protocol, scenarios:
     flagged, unusual = recorded_settings(protocol.task, protocol.settings)
     return {
         **task_entry(protocol.task),
-        "actions_per_plan": arguments.actions_per_plan,
+        "actions_per_plan": arguments.n_action_steps,
         "fps": protocol.fps,
         "hold": stride(protocol.fps, protocol.task.spec.record_hz),
         **flagged,
@@ -195,8 +195,8 @@ def load_study_policy(path: Path | str, arguments: argparse.Namespace) -> "Check
     from copolicy.train.checkpoint import Checkpoint  # torch
 
     policy = Checkpoint(path, arguments.device, policy_settings(arguments))
-    if arguments.actions_per_plan > policy.chunk_size:
+    if arguments.n_action_steps > policy.chunk_size:
         expected = f"1 to {policy.chunk_size}, the actions of a chunk"
-        raise InvalidValueError("--actions-per-plan", expected, arguments.actions_per_plan)
-    policy.n_action_steps = policy.n_predicted_actions = arguments.actions_per_plan
+        raise InvalidValueError("--n-action-steps", expected, arguments.n_action_steps)
+    policy.n_action_steps = policy.n_predicted_actions = arguments.n_action_steps
     return policy

@@ -72,7 +72,7 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
         10_000,
     )
     command.add_argument("--out", required=True, type=Path, help="plan to write; it names the robots: keep it secret")
-    add_protocol_flags(command, actions_per_plan=1)
+    add_protocol_flags(command, n_action_steps=1)
 
 
 def _add_run(steps: argparse._SubParsersAction) -> None:
@@ -144,7 +144,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
         arguments.participants,
         min(12, len(starts)) if arguments.episodes_per_robot is None else arguments.episodes_per_robot,
         arguments.seed,
-        actions_per_plan=arguments.actions_per_plan,
+        actions_per_plan=arguments.n_action_steps,
         world={**flagged, **unusual},
         settings=policy_settings(arguments),
         task_name=protocol.task.spec.name,

@@ -71,7 +71,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
     add_whole_number(command, "--repeats", "partners of each kind for each start (default: 1)", 1, 1, 10_000)
     add_whole_number(command, "--partner-seed", "seed of the partners (default: 0)", 0, None, LARGEST_SEED)
     command.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
-    add_study_flags(command, actions_per_plan=1)
+    add_study_flags(command, n_action_steps=1)
 
 
 def _partner(arguments: argparse.Namespace) -> dict:

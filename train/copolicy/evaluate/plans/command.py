@@ -49,7 +49,7 @@ def add_plans_command(commands: argparse._SubParsersAction) -> None:
         help="time of the state in an episode of the policy, s (default: 0)",
     )
     command.add_argument("--out", required=True, type=Path, help="figure to write, a PNG")
-    add_study_flags(command, actions_per_plan=8)
+    add_study_flags(command, n_action_steps=8)
 
 
 def _plans(arguments: argparse.Namespace) -> dict:
