@@ -16,6 +16,7 @@ from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.session import recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.recording.log import read_episode
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
@@ -25,7 +26,6 @@ from copolicy.evaluate.human_study.schedule import BlindPolicy
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
 from copolicy.evaluate.partner_study.configurations import study_configurations
-from copolicy.evaluate.result_file import write_json
 from copolicy.tasks.table.map_config import MapConfig
 
 SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
@@ -74,7 +74,7 @@ def test_a_plan_pairs_starts_within_a_person_and_counterbalances_robots():
 def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):
     plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
     path = tmp_path / "plan.json"
-    write_json(path, plan.to_json())
+    replace_json(path, plan.to_json())
     assert StudyPlan.read(path) == plan
     content = json.loads(path.read_text(encoding="utf-8"))
     content["trials"]["P01"][0]["robot"] = "CoDP"
@@ -227,7 +227,7 @@ def study(tmp_path_factory) -> Path:
         torch.manual_seed(len(robots))
         robots.append(Robot.from_checkpoint(name, str(save_untrained_policy(folder / name))))
     plan = make_plan(robots, "custom", SHORT, 1, 2, 0, settings={"num_inference_steps": 2})
-    write_json(folder / "plan.json", plan.to_json())
+    replace_json(folder / "plan.json", plan.to_json())
     return folder
 
 

@@ -129,7 +129,7 @@ def test_a_moment_within_a_plan_is_reached_by_a_shorter_plan(left):
 
 
 def test_a_moment_after_the_end_is_refused(left):
-    with pytest.raises(RunError, match=r"^--seconds: expected a moment before the end, found one at 1\d\.\d s$"):
+    with pytest.raises(RunError, match=r"^--seconds: expected less than 1\d\.\d, when the episode ended, found"):
         decide(Replayed(left), seconds=60.0)
 
 
@@ -233,7 +233,7 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         (["--samples", "0"], 2, "--samples: expected at least 1, found 0"),
         (["--seconds", "-1"], 2, "--seconds: expected a number of at least 0, found -1.0"),
         (["--seconds", "nan"], 2, "--seconds: expected a number of at least 0, found nan"),
-        (["--seconds", "5"], 1, "--seconds: expected a moment before the end, found one at 2.0 s"),
+        (["--seconds", "5"], 1, "--seconds: expected less than 2.0, when the episode ended, found 5"),
         (["--n-action-steps", "11"], 2, "--n-action-steps: expected 1 to 10, the actions of a chunk, found 11"),
     ],
 )

@@ -7,21 +7,13 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
-from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.files.staging import replace_json, require_new
 
 from .comparison import add_compare_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
-from .result_file import write_json
-from .study_flags import (
-    add_study_flags,
-    load_study_policy,
-    study_needs,
-    study_protocol,
-    study_settings,
-    task_of_checkpoint,
-)
+from .study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol, study_settings
 
 _DEFAULT_MAPS = "holdout"
 
@@ -54,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _coplan(arguments: argparse.Namespace) -> dict:
     figure = arguments.out.with_suffix(".png")
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
-    task = task_of_checkpoint(arguments.policy)
+    task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(set_name(task, arguments.maps, _DEFAULT_MAPS))
     if arguments.orientations:
         chosen = task.turned(chosen)
@@ -64,7 +56,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     from .coplan.rollouts import coplan
     from .summary import not_measured, percent, summarise
 
-    policy = load_study_policy(arguments.policy, arguments)
+    policy = study_policy(arguments.policy, arguments)
     protocol = study_protocol(arguments, [(str(arguments.policy), policy.conditions)])
     with progress_bar(len(scenarios) * arguments.repeats, "episodes") as bar:
         episodes = coplan(
@@ -99,7 +91,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     title = f"co-planning on {chosen.label}: {percent(success)} of {success['episodes']} episodes"
     if task.outline is not None:
         save_path_figure(episodes, figure, title)
-    write_json(arguments.out, result)  # last, so that an existing result is always complete
+    replace_json(arguments.out, result, indent=1)  # last, so that an existing result is always complete
     return {
         "success": percent(success),
         "episodes": success["episodes"],

@@ -60,7 +60,7 @@ def policy_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(arguments, name) for name in _POLICY_SETTINGS if getattr(arguments, name) is not None}
 
 
-def task_of_checkpoint(path: Path | str) -> PairTask:
+def checkpoint_task(path: Path | str) -> PairTask:
     """The task of a checkpoint, read from its files without loading the weights.
 
     Raises:
@@ -185,7 +185,7 @@ def unseen_entry(task: PairTask, scenarios: Sequence[Any]) -> dict[str, str]:
     return {"unseen": text} if text else {}
 
 
-def load_study_policy(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint":
+def study_policy(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint":
     """Loads a checkpoint with the settings that the flags override.
 
     Raises:

@@ -23,18 +23,10 @@ def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
     export.add_argument("checkpoint", help="checkpoint folder, or the folder of a run (its last checkpoint)")
     export.add_argument("--out", type=Path, required=True, help="folder to write")
     export.add_argument(
-        "--eval",
-        action="append",
-        type=Path,
-        default=[],
-        metavar="FILE",
-        help="a result of copolicy-eval to include; repeatable",
+        "--eval", action="append", type=Path, default=[], metavar="FILE", help="result of copolicy-eval to include"
     )
     export.add_argument(
-        "--commands",
-        type=Path,
-        metavar="FILE",
-        help="text file of the commands that made data and policy, one per line",
+        "--commands", type=Path, metavar="FILE", help="text file of the commands that made the policy, one per line"
     )
     export.add_argument("--overwrite", action="store_true", help="replace the policy at --out, with its card")
     add_command(

@@ -12,11 +12,10 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.file_kinds import kind_of
 from copolicy.dataset.files.listing import visible_files
-from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.publication.licences import checked_licence
 
 from ..partner_study.configurations import DEFAULT_MAPS, study_configurations
-from ..result_file import write_json
 from ..study_flags import (
     add_protocol_flags,
     policy_settings,
@@ -149,7 +148,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
         settings=policy_settings(arguments),
         task_name=protocol.task.spec.name,
     )
-    write_json(arguments.out, plan.to_json())
+    replace_json(arguments.out, plan.to_json(), indent=1)
     orders = len(williams_square(len(robots)))
     return {
         "plan": str(arguments.out),
@@ -223,10 +222,8 @@ def _summarise(arguments: argparse.Namespace) -> dict:
                 "step_limit": plan.world_settings.step_limit,
             }
         )
-        write_json(
-            arguments.out,
-            {"study": "human", "settings": settings, **summary, **counts, "rows": rows, "answers": ratings},
-        )
+        result = {"study": "human", "settings": settings, **summary, **counts, "rows": rows, "answers": ratings}
+        replace_json(arguments.out, result, indent=1)
         counts["result"] = str(arguments.out)
     if arguments.json:
         return {**summary, **counts}

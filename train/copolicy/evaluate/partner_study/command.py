@@ -11,23 +11,15 @@ from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
 
-from ..result_file import write_json
-from ..study_flags import (
-    add_study_flags,
-    load_study_policy,
-    study_needs,
-    study_protocol,
-    study_settings,
-    task_of_checkpoint,
-)
+from ..study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol, study_settings
 from ..summary import not_measured, percent
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
 
 if TYPE_CHECKING:
-    from .robots import EvaluatedRobot
+    from .robots import StudyRobot
 
 _LABEL = "human-in-the-loop protocol with SIMULATED partners: "
 _PARTNERS = "scripted players sit at the human seat, no person took part"
@@ -43,9 +35,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
         study_needs,
     )
-    command.add_argument(
-        "policy", metavar="[NAME=]CKPT", help="checkpoint folder, optionally with a name for the result"
-    )
+    command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, and its name in the result")
     command.add_argument(
         "--baseline",
         nargs="+",
@@ -80,7 +70,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     _, path = split_name(arguments.policy)
-    task = task_of_checkpoint(path)
+    task = checkpoint_task(path)
     profiles = simulated_players(task).partners
     partners = list(dict.fromkeys(profiles if arguments.partners is None else arguments.partners))
     for kind in partners:
@@ -123,9 +113,8 @@ def _partner(arguments: argparse.Namespace) -> dict:
                 on_step=lambda finished, done=index * episodes_per_robot: bar.update(done + finished - bar.n),
             )
             by_robot.append(episodes)
-    summaries = [
-        summarise_with_partners(episodes, robot.policy) for robot, episodes in zip(robots, by_robot, strict=True)
-    ]
+    pairs = list(zip(robots, by_robot, strict=True))
+    summaries = [summarise_with_partners(episodes, robot.policy) for robot, episodes in pairs]
     described = [
         {
             "name": robot.name,
@@ -133,7 +122,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
             "summary": summary,
             "episodes": [episode.to_json() for episode in episodes],
         }
-        for robot, summary, episodes in zip(robots, summaries, by_robot, strict=True)
+        for (robot, episodes), summary in zip(pairs, summaries, strict=True)
     ]
     paired = {name: differences(by_robot[0], baseline) for name, baseline in zip(names[1:], by_robot[1:], strict=True)}
     result = {
@@ -162,7 +151,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     size = f"{len(scenarios)} starts, {episodes_per_robot} episodes per robot"
     title = f"simulated partners on {chosen.label}: {size}, no person"
     save_partner_figure(by_name, figure, title)
-    write_json(arguments.out, result)
+    replace_json(arguments.out, result, indent=1)
     return {
         "label": "simulated partners, no person took part",
         "episodes_per_robot": episodes_per_robot,
@@ -176,7 +165,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     }
 
 
-def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "EvaluatedRobot"]) -> "EvaluatedRobot":
+def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "StudyRobot"]) -> "StudyRobot":
     """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
 
     Raises:
@@ -188,7 +177,7 @@ def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, 
     if text in scripted:
         return scripted[text]
     name, path = split_name(text)
-    policy = load_study_policy(path, arguments)
+    policy = study_policy(path, arguments)
     return policy_robot(name or policy.name, policy)
 
 

@@ -18,7 +18,7 @@ PASSIVE = "passive"
 
 
 @dataclass(frozen=True)
-class EvaluatedRobot:
+class StudyRobot:
     """A robot of a study.
 
     Attributes:
@@ -34,25 +34,23 @@ class EvaluatedRobot:
     policy: "Checkpoint | None" = None
 
 
-def policy_robot(name: str, policy: "Checkpoint") -> EvaluatedRobot:
+def policy_robot(name: str, policy: "Checkpoint") -> StudyRobot:
     """A robot that executes its half of a policy's joint action chunks."""
     task = get_task(policy.task)
-    return EvaluatedRobot(
-        name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy
-    )
+    return StudyRobot(name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy)
 
 
-def scripted_robots(task: PairTask) -> dict[str, EvaluatedRobot]:
+def scripted_robots(task: PairTask) -> dict[str, StudyRobot]:
     """The robots that `--baseline` takes by name: zero force, and the task's scripted robots."""
     zero = np.zeros(len(task.spec.action))
-    passive = EvaluatedRobot(
+    passive = StudyRobot(
         PASSIVE, lambda seed, fps: HeldAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
     )
     names = task.agents.robots if task.agents is not None else ()
     return {PASSIVE: passive, **{name: _scripted(task, name) for name in names}}
 
 
-def _scripted(task: PairTask, name: str) -> EvaluatedRobot:
+def _scripted(task: PairTask, name: str) -> StudyRobot:
     players = simulated_players(task)
     profile, description = players.robots[name]
 
@@ -64,6 +62,4 @@ def _scripted(task: PairTask, name: str) -> EvaluatedRobot:
 
         return ScriptedAgent(name, make)
 
-    return EvaluatedRobot(
-        name, agent, lambda: {"type": "scripted", "description": description, "habits": asdict(profile)}
-    )
+    return StudyRobot(name, agent, lambda: {"type": "scripted", "description": description, "habits": asdict(profile)})

@@ -13,11 +13,11 @@ from copolicy.dataset.task import PairTask, get_task
 
 from ..coplan.rollouts import episode_measures, run_traced
 from .episode_result import PartnerEpisodeResult
-from .robots import EvaluatedRobot
+from .robots import StudyRobot
 
 
 def run_with_partners(
-    robot: EvaluatedRobot,
+    robot: StudyRobot,
     scenarios: Sequence[Any],
     partners: Sequence[str],
     settings: Any,

@@ -13,7 +13,7 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 
-from ..study_flags import add_study_flags, load_study_policy, study_needs, study_protocol, task_of_checkpoint
+from ..study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol
 
 if TYPE_CHECKING:
     from .sampling import BranchPoint
@@ -56,7 +56,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
-    task = task_of_checkpoint(arguments.policy)
+    task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(set_name(task, arguments.maps, _DEFAULT_MAPS))
     scenarios = chosen.scenarios
     if not 0 <= arguments.map < len(scenarios):
@@ -67,7 +67,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     from .figure import save_chunk_figure
     from .sampling import sample_chunks
 
-    policy = load_study_policy(arguments.policy, arguments)
+    policy = study_policy(arguments.policy, arguments)
     protocol = study_protocol(arguments, [(str(arguments.policy), policy.conditions)])
     branch_point = sample_chunks(
         policy,

@@ -87,7 +87,8 @@ def sample_chunks(
     trace = Trace(rollout)
     rollout.run(round(seconds * rate) * hold)
     if rollout.outcomes[0].done:
-        raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / record_hz:.1f} s")
+        expected = f"less than {rollout.ends[0] / record_hz:.1f}, when the episode ended"
+        raise RunError(f"--seconds: expected {expected}, found {seconds:g}")
     if seconds and policy.keeps_history:
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
     world, scenarios = rollout.worlds[0], [scenario] * samples
