@@ -126,5 +126,5 @@ def test_pictures_are_no_columns(dataset, tmp_path):
 
 def test_it_must_be_said_where_the_data_are(dataset, capsys):
     assert main(["dataset", str(dataset), "--croissant", "--no-figures", "--overwrite"]) == 2
-    expected = "--repo-id: expected user/name with --croissant, which says where the data are, found None"
+    expected = "--repo-id: expected user/name with --croissant, which states the data's location, found None"
     assert capsys.readouterr().err == f"copolicy-cards: {expected}\n"

@@ -61,7 +61,7 @@ def test_a_card_states_what_the_metadata_holds(dataset):
     assert f"| frames | {info['total_frames']:,} |" in text
     assert "| reached the goal | 5 of 6 (83.3 %) |" in text
     assert "| collision_obstacle | 1 of 6 (16.7 %) |" in text
-    assert "Those files do not say who or what held the sticks." in text
+    assert "Those files do not state who or what played." in text
     assert "No person took part" not in text
     assert 'LeRobotDataset("lab/table")' in text
     assert "| `observation.human_action` | float32 | 2 | human_fx, human_fy |" in text
@@ -75,7 +75,7 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
         "Motivation", "Composition", "Collection: who played, and how it was recorded", "Preprocessing", "Uses",
         "Distribution and licence", "Maintenance", "Consent and withdrawal", "Citation",
     ]  # fmt: skip
-    assert "No episode is marked as played by people, so there is no consent to state." in text
+    assert "No episode is marked as played by people, so no consent is stated." in text
     assert "- Converted by `copolicy-convert upstream` " in text
     assert "- The action of a frame is the mean of the recorded actions until the next frame" in text
     assert "eprint  = {2305.12171}" in text
@@ -210,7 +210,7 @@ def test_a_mixture_names_each_source(dataset):
     _set_column(dataset, "source", ["simulated"] * 2 + ["human"] * 4)
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "human (4), simulated (2)" in text
-    assert "Consent: 0 of 4 (0.0 %) episodes played by people name a consent record" in text
+    assert "Consent: 0 of 4 (0.0 %) episodes played by people state the identifier of a consent record" in text
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
     assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
     assert dataset_command(["exclude", str(dataset), "--episodes", "1", "3", "--reason", "stick unplugged"]) == 0
     text = render(DatasetFacts.read(dataset), "lab/table")
-    assert "2 of 6 episodes are kept and marked as not to be used" in text
+    assert "2 of 6 episodes are stored but marked as excluded" in text
     assert "| 3 | stick unplugged |" in text
     assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text
     assert "its own trainer and loader take every episode unless they" in text

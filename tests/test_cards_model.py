@@ -163,7 +163,7 @@ def test_a_study_with_partners_has_a_table_of_its_own(exported):
     assert main(["model", str(exported)]) == 0
     text = (exported / "README.md").read_text(encoding="utf-8")
     assert "**With SIMULATED partners, no person took part.**" in text
-    assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) a plan, ddim, 10 steps" in text
+    assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) per chunk, ddim, 10 steps" in text
     assert "| CoDP-H | 90.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0.48 | 95.0 |" in text
     assert "| passive | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0 | - |" in text
     assert "The partners of the study above are simulated too" in text
@@ -175,7 +175,7 @@ def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert "copolicy-collect play --pilots keyboard policy:pretrained\n" in text
     assert "copolicy-eval coplan --policy pretrained --maps holdout --out eval.json\n" in text
-    assert "`copolicy-train pretrained` says where it is" in text
+    assert "`copolicy-train pretrained` prints its folder" in text
 
 
 def test_what_is_not_at_hand_is_not_stated(run):

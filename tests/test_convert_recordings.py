@@ -112,7 +112,7 @@ def test_a_damaged_file_stops_all(recordings, tmp_path, capsys):
     assert convert(recordings, tmp_path / "set") == 1
     captured = capsys.readouterr()
     assert captured.err.startswith(f"copolicy-convert: {path}: expected an intact and complete MCAP file, found ")
-    assert captured.err.endswith("; nothing was written (--skip-damaged leaves such files out)\n")
+    assert captured.err.endswith("; nothing was written (--skip-damaged skips such files)\n")
     assert captured.err.count("\n") == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["recordings"]
 

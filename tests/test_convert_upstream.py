@@ -256,7 +256,7 @@ def test_damaged_files_stop_the_conversion_or_are_left_out(examples, tmp_path, c
     assert convert(tmp_path / "raw", tmp_path / "set") == 1
     assert capsys.readouterr().err == (
         f"copolicy-convert: {path}: expected a pickle of NumPy arrays and plain values, found pickle data was "
-        "truncated; nothing was written (--skip-damaged leaves such files out)\n"
+        "truncated; nothing was written (--skip-damaged skips such files)\n"
     )
     assert not (tmp_path / "set").exists()
     assert convert(tmp_path / "raw", tmp_path / "set", "--skip-damaged", "--json") == 0

@@ -156,8 +156,8 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
     assert converted(linked, tmp_path / "set") == 0
     captured = capsys.readouterr()
     assert json.loads(captured.out)["episodes"] == 2
-    message = f"{linked / 'b'}: a link that leads nowhere"
-    assert f"warning: {message}; what it led to is left out" in caplog.text
+    message = f"{linked / 'b'}: a broken link"
+    assert f"warning: {message}; its target is skipped" in caplog.text
     found = [(f.episode, f.message) for f in check_dataset(linked).findings if f.severity == "error"]
     assert found == [("b", "a link that leads nowhere")]
     assert len(list(recordings(linked))) == 2
@@ -167,7 +167,7 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
     assert dataset(["check", str(tmp_path / "empty")]) == 2
     assert "found a link that leads nowhere, session" in capsys.readouterr().err
     assert converted(tmp_path / "empty" / "session", tmp_path / "other") == 2
-    assert "session: expected a folder of recordings, found a link that leads nowhere" in capsys.readouterr().err
+    assert "session: expected a folder of recordings, found a broken link" in capsys.readouterr().err
 
 
 def test_a_file_of_a_data_set_whose_link_leads_nowhere_is_named(made, tmp_path, capsys):
@@ -178,6 +178,6 @@ def test_a_file_of_a_data_set_whose_link_leads_nowhere_is_named(made, tmp_path, 
     before = set(os.listdir(root / "meta"))
     make_recordings(tmp_path / "raw", 1, seed=9)
     assert converted(tmp_path / "raw", root, "--append") == 2
-    assert "notes.txt: expected a file of the data set, found a link that leads nowhere" in capsys.readouterr().err
+    assert "notes.txt: expected a file of the data set, found a broken link" in capsys.readouterr().err
     assert set(os.listdir(root / "meta")) == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["raw", "set"]

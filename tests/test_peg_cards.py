@@ -131,7 +131,7 @@ def test_a_model_card_speaks_of_the_task_of_its_policy(peg, tmp_path, capsys):
     assert main(["model", str(folder), "--eval", str(tmp_path / "eval.json")]) == 0
     card = (folder / "README.md").read_text(encoding="utf-8")
     assert OF_THE_TABLE.findall(re.sub(r"```.*?```", "", card, flags=re.DOTALL)) == []  # but for flags of commands
-    assert "acts together with a partner, in simulation: it plans the next actions of both players" in card
+    assert "acts together with a partner, in simulation: it predicts the next actions of both players" in card
     assert "Left out: the task 'peg' has no interaction measure." in card
     assert "pushing a peg, coplan (simulation)" in card
     assert "| study | scenarios | sampler |" in card

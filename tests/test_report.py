@@ -39,7 +39,7 @@ def test_filters_choose_episodes_for_the_whole_page(visit, report, report_set):
     page.get_by_role("searchbox", name="Find").fill(f"#{chosen[0]['episode_index']} {chosen[0]['map_id']}")
     assert column(page, 1) == [str(chosen[0]["episode_index"])]
     page.get_by_role("searchbox", name="Find").fill("nothing has this name")
-    expect(page.locator("#episode-count")).to_have_text("No episode fits what is chosen above.")
+    expect(page.locator("#episode-count")).to_have_text("No episode matches the filters above.")
     page.get_by_role("button", name="Show all").click()
     expect(page.locator("#filter-count")).to_have_text(f"{EPISODES} of {EPISODES} episodes")
 

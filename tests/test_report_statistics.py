@@ -62,12 +62,12 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     distance = routes["human_distance_2_obstacles"]
     low, high = distance["interval"]
     expect(figures.nth(1)).to_contain_text(f"2 obstacles: {distance['value']:.3f} bits ({low:.3f} to {high:.3f})")
-    expect(figures.nth(1)).to_contain_text("40 episodes of simulated pairs, 171 of people.")
+    expect(figures.nth(1)).to_contain_text("40 episodes of simulated pairs, 171 human demonstrations.")
     label = figures.nth(1).locator("svg").get_attribute("aria-label")
     assert label is not None
     human = distance["details"]["human"]["counts"]
     word = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
-    assert f"RL 10 here, {human[word]} of people" in label
+    assert f"RL 10 in this data set, {human[word]} of people" in label
 
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     cells = section.locator("#configuration-table tbody tr").first.locator("th, td").all_inner_texts()
