@@ -155,7 +155,7 @@ def _usage(checkpoint: CheckpointFacts, name: str, evaluations: Sequence[dict[st
     elif _on_hub(name):
         commands.append(f"hf download {name} --local-dir checkpoint")
     commands += [
-        f"copolicy-collect play --pilots keyboard policy:{policy}",
+        f"copolicy-collect play --players keyboard policy:{policy}",
         f"copolicy-eval coplan --policy {policy} --maps {maps} --out eval.json",
     ]
     text = "## Usage\n\n```bash\n" + "\n".join(commands) + "\n```"

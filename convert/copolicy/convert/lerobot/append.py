@@ -49,7 +49,7 @@ def stored_sampling(root: Path, fps: int | None, downsampling: Hold | None) -> t
         stored = int(info["fps"]), info["features"]["action"]["hold"]
     except (KeyError, TypeError, ValueError):
         raise FileFormatError(root / INFO_FILE, "a data set of copolicy-convert", "another") from None
-    for flag, value, expected in (("--fps", fps, stored[0]), ("--hold", downsampling, stored[1])):
+    for flag, value, expected in (("--fps", fps, stored[0]), ("--downsampling", downsampling, stored[1])):
         if value is not None and value != expected:
             raise InvalidValueError(flag, f"{expected!r}, as {root} has it", value)
     return stored
