@@ -120,7 +120,7 @@ def test_a_video_is_merged_with_the_same_content(unsharded, tmp_path):
             "--sbatch: expected KEY=VALUE, such as account=lab, found '--account'",
         ),
         (("--shard-episodes", "0"), "shard-episodes: expected at least 1, found 0"),
-        (("--shards", "x", "--append"), "--append: expected without shards, whose flags stand beside it, found True"),
+        (("--shards", "x", "--append"), "--append: expected no flag of a conversion in shards beside it, found True"),
     ],
 )
 def test_a_wrong_call(unsharded, tmp_path, capsys, monkeypatch, flags, message):

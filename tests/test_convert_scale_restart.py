@@ -29,8 +29,8 @@ def test_a_finished_shard_is_not_made_again(unsharded, tmp_path, capsys):
     error = capsys.readouterr().err
     assert error.startswith(f"copolicy-convert: {broken}: expected an intact and complete MCAP file, found ")
     assert error.endswith(
-        f" (and 1 more, in {shards / 'damaged'}); 2 of 3 shards are finished and kept in {shards}: mend or remove such "
-        "files, or add --skip-damaged, and run again\n"
+        f" (and 1 more, in {shards / 'damaged'}); 2 of 3 shards are finished and kept in {shards}: repair or remove "
+        "such files, or add --skip-damaged, and run again\n"
     )
     assert error.count("\n") == 1
     assert not (tmp_path / "set").exists()
@@ -112,8 +112,8 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
         out, error = command.communicate(timeout=60)
     assert (command.returncode, out) == (1, "")
     assert error == (
-        f"copolicy-convert: {shards}: a process was killed, perhaps for want of memory; 2 of 3 shards are finished and "
-        f"kept in {shards}: run the same again\n"
+        f"copolicy-convert: {shards}: a process was killed, perhaps out of memory; 2 of 3 shards are finished and "
+        f"kept in {shards}: run the command again\n"
     )
     assert times_of(shards) == finished
     assert half_written()
@@ -189,6 +189,6 @@ def test_two_calls_do_not_work_in_one_folder(unsharded, tmp_path, capsys):
         process.stdout.readline()
         assert main(call(unsharded / "recordings", tmp_path / "set", "--shards", str(shards))) == 1
         process.kill()
-    expected = f"copolicy-convert: {shards}: expected shards that nobody works on, found another call at work\n"
+    expected = f"copolicy-convert: {shards}: expected shards that no other call works on, found one at work\n"
     assert capsys.readouterr().err == expected
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shards", str(shards))) == 0

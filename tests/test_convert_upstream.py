@@ -139,7 +139,7 @@ def test_rows_that_tell_no_angular_limit_leave_the_physics_unknown(tmp_path):
     path = write_raw(tmp_path, *play(np.hstack((forces, forces))))  # without torque
     episode = read_raw(path, OPTIONS)
     assert (episode.meta.physics, episode.meta.quality_flags) == ("", "")
-    assert episode.notes[0].endswith("angular limit pi/2, which the rows do not tell")
+    assert episode.notes[0].endswith("angular limit pi/2, which the rows do not determine")
     stated = read_raw(path, UpstreamOptions("pi/8"))
     assert physics_of(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
 
@@ -167,7 +167,7 @@ def test_a_success_flag_that_the_contact_test_denies_is_flagged(tmp_path):
     episode = read_raw(write_raw(tmp_path, states, actions, success=True), OPTIONS)
     assert (episode.meta.success, episode.meta.termination_reason) == (False, "unknown")
     assert episode.meta.quality_flags == "outcome_differs"
-    assert episode.notes[-1] == "the file says success=True, the contact test False"
+    assert episode.notes[-1] == "the file states success=True, the contact test gives False"
 
 
 @pytest.mark.parametrize(
@@ -244,7 +244,8 @@ def test_a_store_has_one_rate_and_one_hold(examples, tmp_path, capsys):
     assert convert(store, tmp_path / "set", "--downsampling", "mean") == 2
     assert capsys.readouterr().err.splitlines() == [
         "copolicy-convert: fps: expected 10: the store holds every third step only, found 30",
-        "copolicy-convert: hold: expected 'first': the store holds the first of three actions only, found 'mean'",
+        "copolicy-convert: downsampling: expected 'first': the store holds the first of three actions only, "
+        "found 'mean'",
     ]
     assert list(tmp_path.iterdir()) == []
 

@@ -38,7 +38,7 @@ def test_a_processed_file_with_another_map_is_noticed_and_set_right(examples):
     assert episode.meta.map_id == raw(examples, 1).meta.map_id
     assert episode.notes[1] == (
         "stored map is not the one played: its start is 120 px from the path's; goal (960.0, 420.0) and obstacles "
-        "((720.0, 420.0),) recovered from the rewards; others far from the path may have stood there too"
+        "((720.0, 420.0),) recovered from the rewards; there may have been further obstacles far from the path"
     )
     assert [processed(examples, number).meta.quality_flags for number in EPISODES[1:]] == [""] * 5
 
@@ -59,7 +59,7 @@ def test_rewards_that_no_known_map_gives_are_said(tmp_path):
     write_processed(tmp_path / "p" / "p.npz", pose, actions, np.tile([*CONFIG.start, *CONFIG.goal, 1, 1, 1], (60, 1)))
     episode = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
     assert episode.meta.quality_flags == "map_mismatch,excluded: map_mismatch"
-    assert "no known map gives the rewards, goal and obstacles kept" in episode.notes[1]
+    assert "no known map gives the rewards, goal and obstacles unchanged" in episode.notes[1]
     assert episode.map_config == CONFIG
 
 
@@ -86,7 +86,7 @@ def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples):
     elsewhere = check(replace(played, goal=(960.0, 420.0)))
     assert elsewhere.flags == ("map_mismatch", "goal_recovered")
     assert elsewhere.config == played
-    assert "the path ends where nothing of it is touched; goal (960.0, 180.0) recovered" in elsewhere.notes[0]
+    assert "the path ends without contact with it; goal (960.0, 180.0) recovered" in elsewhere.notes[0]
     # A table that ends between two goals touches both.
     between = ZarrStore(examples / "table_10Hz.zarr").read(zarr_places(examples)[4], OPTIONS)
     stored = replace(between.map_config, goal=(960.0, 420.0))
@@ -122,7 +122,7 @@ def test_map_files_are_matched_by_their_whole_name(tmp_path):
     states, actions = play(held(20))
     write_raw(tmp_path, states, actions, name="ep_11", map_config=MAP_SETS["training"][50])
     episode = read_raw(write_raw(tmp_path, states, actions, name="ep_1"), OPTIONS)
-    assert episode.notes[1:] == ("no map file of this name: start found by undoing the first step",)
+    assert episode.notes[1:] == ("no map file of this name: start computed by inverting the first step",)
     assert episode.map_config == CONFIG
 
 
