@@ -111,7 +111,7 @@ def test_every_file_of_the_data_has_its_check_sum(dataset):
         assert entry["sha256"] == hashlib.sha256((dataset / name).read_bytes()).hexdigest()
 
 
-def test_pictures_are_no_columns(dataset, tmp_path):
+def test_images_are_no_columns(dataset, tmp_path):
     from copolicy.cards.croissant import croissant_metadata
     from copolicy.cards.facts import DatasetFacts
 

@@ -100,15 +100,15 @@ def test_arrays_are_what_the_reader_copies_byte_for_byte(store):
 
 def test_chunks_are_complete_and_none_is_too_many(store):
     for name, array in arrays(store).items():
-        about = metadata(array)
-        count = math.ceil(about["shape"][0] / about["chunks"][0])
+        fields = metadata(array)
+        count = math.ceil(fields["shape"][0] / fields["chunks"][0])
         assert count > 1 or name == "meta/episode_ends"
-        rest = ["0"] * (len(about["shape"]) - 1)
-        wanted = {".".join([str(number), *rest]) for number in range(count)}
-        assert {path.name for path in array.iterdir()} == {".zarray", *wanted}
-        whole = int(np.prod(about["chunks"])) * np.dtype(about["dtype"]).itemsize
-        codec: Any = get_codec(about["compressor"])
-        assert {len(codec.decode((array / chunk).read_bytes())) for chunk in wanted} == {whole}
+        further_indices = ["0"] * (len(fields["shape"]) - 1)
+        names = {".".join([str(number), *further_indices]) for number in range(count)}
+        assert {path.name for path in array.iterdir()} == {".zarray", *names}
+        size = int(np.prod(fields["chunks"])) * np.dtype(fields["dtype"]).itemsize
+        codec: Any = get_codec(fields["compressor"])
+        assert {len(codec.decode((array / chunk).read_bytes())) for chunk in names} == {size}
 
 
 def test_an_episode_appended_by_resizing_leaves_the_rest_alone(store):

@@ -79,8 +79,8 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
     assert max(rows["replay_drift_px"]) < 1e-6
     episode = read_episode(recordings / "a" / "episode_1.mcap")
     for name, column in frame_columns(episode, 10).items():
-        found = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
-        assert np.array_equal(found, column), name
+        stored = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
+        assert np.array_equal(stored, column), name
     for name in EPISODE_COLUMNS:
         if name not in ("license", "replay_drift_px", "achieved_hz"):
             assert rows[1][name] == getattr(episode.meta, name)

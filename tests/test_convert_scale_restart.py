@@ -66,7 +66,9 @@ def halted_at_work(
                 assert command.poll() is None, f"it ended first: {command.communicate()}"
                 if not workers:
                     children = psutil.Process(command.pid).children()
-                    workers = [child for child in children if any("spawn_main" in part for part in child.cmdline())]
+                    workers = [
+                        child for child in children if any("spawn_main" in argument for argument in child.cmdline())
+                    ]
                 time.sleep(0.005)
             workers[0].suspend()
             yield command, workers[0]
@@ -129,9 +131,9 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
 
 
 def test_what_a_killed_merge_left_goes_away(unsharded, tmp_path):
-    left = tmp_path / ".set.merging"
-    left.mkdir()
-    (left / "half").write_text("", encoding="utf-8")
+    leftover = tmp_path / ".set.merging"
+    leftover.mkdir()
+    (leftover / "half").write_text("", encoding="utf-8")
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "4")) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
@@ -142,17 +144,17 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
     assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
     before = times_of(shards)
     assert main(call(unsharded / "recordings", tmp_path / "other", *flags, "--fps", "30")) == 2
-    other = tmp_path / "photographs"
-    other.mkdir()
-    (other / "one.jpg").write_text("", encoding="utf-8")
-    assert main(call(unsharded / "recordings", tmp_path / "other", "--shards", str(other))) == 2
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    (folder / "one.jpg").write_text("", encoding="utf-8")
+    assert main(call(unsharded / "recordings", tmp_path / "other", "--shards", str(folder))) == 2
     assert capsys.readouterr().err.splitlines() == [
         f"copolicy-convert: fps of the shards in {shards}: expected 30 (finish that call first, or give another "
         "--shards), found 10",
-        f"copolicy-convert: {other}: expected a new folder, or one with the shards of this call, found another",
+        f"copolicy-convert: {folder}: expected a new folder, or one with the shards of this call, found another",
     ]
     assert times_of(shards) == before
-    assert list(other.iterdir()) == [other / "one.jpg"]
+    assert list(folder.iterdir()) == [folder / "one.jpg"]
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", "null", '{"digest": 1, "episodes": 3}', "{"])

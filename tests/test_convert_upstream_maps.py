@@ -9,9 +9,9 @@ from upstream_files import (
     CONFIG,
     EPISODES,
     OPTIONS,
-    held,
     play,
     processed,
+    random_forces,
     raw,
     write_processed,
     write_raw,
@@ -54,7 +54,7 @@ def test_a_zarr_episode_with_another_map_is_noticed(examples):
 
 
 def test_rewards_that_no_known_map_gives_are_said(tmp_path):
-    states, actions = play(held(60))
+    states, actions = play(random_forces(60))
     pose = np.hstack((states[1:, :2], np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])))
     write_processed(tmp_path / "p" / "p.npz", pose, actions, np.tile([*CONFIG.start, *CONFIG.goal, 1, 1, 1], (60, 1)))
     episode = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
@@ -108,7 +108,7 @@ def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples):
     ],
 )
 def test_raw_rows_win_over_a_map_file(tmp_path, changes, says):
-    states, actions = play(held(40))
+    states, actions = play(random_forces(40))
     stored = MapConfig(**{"start": CONFIG.start, "goal": CONFIG.goal, "obstacles": CONFIG.obstacles, **changes})
     episode = read_raw(write_raw(tmp_path, states, actions, map_config=stored), OPTIONS)
     assert episode.meta.quality_flags == "map_mismatch,map_recovered"
@@ -119,7 +119,7 @@ def test_raw_rows_win_over_a_map_file(tmp_path, changes, says):
 
 
 def test_map_files_are_matched_by_their_whole_name(tmp_path):
-    states, actions = play(held(20))
+    states, actions = play(random_forces(20))
     write_raw(tmp_path, states, actions, name="ep_11", map_config=MAP_SETS["training"][50])
     episode = read_raw(write_raw(tmp_path, states, actions, name="ep_1"), OPTIONS)
     assert episode.notes[1:] == ("no map file of this name: start computed by inverting the first step",)
@@ -127,8 +127,8 @@ def test_map_files_are_matched_by_their_whole_name(tmp_path):
 
 
 def map_findings(root: Path) -> list[tuple[str, str, str]]:
-    found = check_dataset(root).findings
-    return [(one.episode, one.severity, one.message) for one in found if one.rule == "map_name"]
+    findings = check_dataset(root).findings
+    return [(finding.episode, finding.severity, finding.message) for finding in findings if finding.rule == "map_name"]
 
 
 def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, capsys):
@@ -136,12 +136,14 @@ def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, ca
     store = str(examples / "table_10Hz.zarr")
     assert main(["upstream", store, "--out", str(root), "--repo-id", "me/table", "--json"]) == 0
     capsys.readouterr()
-    place = zarr_places(examples)[1]
-    assert [(entry.episode, entry.reason) for entry in excluded_episodes(root)] == [(place, "map_mismatch")]
-    told = "the importer found another map in the file than was played (map_mismatch): the one in the rows may be wrong"
-    assert map_findings(root) == [(str(place), "warning", f"{told}; excluded from training")]
-    include(root, [str(place)])
-    assert map_findings(root) == [(str(place), "warning", told)]
+    index = zarr_places(examples)[1]
+    assert [(entry.episode, entry.reason) for entry in excluded_episodes(root)] == [(index, "map_mismatch")]
+    message = (
+        "the importer found another map in the file than was played (map_mismatch): the one in the rows may be wrong"
+    )
+    assert map_findings(root) == [(str(index), "warning", f"{message}; excluded from training")]
+    include(root, [str(index)])
+    assert map_findings(root) == [(str(index), "warning", message)]
 
 
 def test_an_episode_whose_map_was_recovered_is_used(examples, tmp_path, capsys):

@@ -22,7 +22,7 @@ from copolicy.train.cli import main as train
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
+def folders(tmp_path_factory) -> Path:
     """Recordings and two data sets."""
     folder = tmp_path_factory.mktemp("made")
     for seed, name in ((0, "one"), (1, "two")):
@@ -58,12 +58,12 @@ NEW = {  # what makes a new file or folder, and how many bytes a file may have
 NAMES = {"png": "x.png", "gif": "x.gif", "minari": "x-v0", "robomimic": "x.hdf5", "report": "x.html"}
 
 
-@pytest.mark.parametrize("what", NEW)
-def test_what_is_new_is_not_there_at_all(what, made, tmp_path, capsys):
-    command, arguments, limit = NEW[what]
-    (recording,) = (made / "one-recordings").glob("*.mcap")
-    filled = [part.format(made=made, recording=recording) for part in arguments]
-    out = tmp_path / NAMES.get(what, "out")
+@pytest.mark.parametrize("name", NEW)
+def test_what_is_new_is_not_there_at_all(name, folders, tmp_path, capsys):
+    command, arguments, limit = NEW[name]
+    (recording,) = (folders / "one-recordings").glob("*.mcap")
+    filled = [argument.format(made=folders, recording=recording) for argument in arguments]
+    out = tmp_path / NAMES.get(name, "out")
     capsys.readouterr()
     with full_disk(limit):
         status = command([*filled, str(out)])
@@ -86,13 +86,13 @@ CHANGED = {  # what changes a data set
 }
 
 
-@pytest.mark.parametrize("what", CHANGED)
-def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
-    command, arguments, limit = CHANGED[what]
-    root = Path(shutil.copytree(made / "one", tmp_path / "set"))
+@pytest.mark.parametrize("name", CHANGED)
+def test_a_data_set_stays_as_it_was(name, folders, tmp_path, capsys):
+    command, arguments, limit = CHANGED[name]
+    root = Path(shutil.copytree(folders / "one", tmp_path / "set"))
     before = _files(tmp_path)
     with full_disk(limit):
-        status = command([part.format(set=root, made=made) for part in arguments])
+        status = command([argument.format(set=root, made=folders) for argument in arguments])
     error = capsys.readouterr().err
     lines = [line for line in error.splitlines() if line.startswith("copolicy-")]
     assert (status, len(lines)) == (1, 1)
@@ -101,18 +101,18 @@ def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
     assert _files(tmp_path) == before
 
 
-def test_a_check_says_that_its_findings_were_not_kept(made, tmp_path, capsys):
-    root = Path(shutil.copytree(made / "one", tmp_path / "set"))
+def test_a_check_says_that_its_findings_were_not_kept(folders, tmp_path, capsys):
+    root = Path(shutil.copytree(folders / "one", tmp_path / "set"))
     before = _files(tmp_path)
     with full_disk(500):
         assert dataset(["check", str(root)]) == 0
     assert _files(tmp_path) == before
 
 
-def test_a_training_that_comes_to_no_checkpoint_leaves_none(made, tmp_path, capfd):
+def test_a_training_that_comes_to_no_checkpoint_leaves_none(folders, tmp_path, capfd):
     flags = ["--policy.preset=small", "--policy.device=cpu", "--steps=1", "--batch_size=2", "--env_eval_freq=0"]
     with full_disk(100_000):
-        status = train([f"--dataset.root={made / 'one'}", f"--output_dir={tmp_path / 'run'}", *flags])
+        status = train([f"--dataset.root={folders / 'one'}", f"--output_dir={tmp_path / 'run'}", *flags])
     lines = [line for line in capfd.readouterr().err.splitlines() if line.startswith("copolicy-")]
     assert status == 1
     assert len(lines) == 1
