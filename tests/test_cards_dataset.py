@@ -77,7 +77,7 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
     ]  # fmt: skip
     assert "No episode is marked as played by people, so no consent is stated." in text
     assert "- Converted by `copolicy-convert upstream` " in text
-    assert "- The action of a frame is the mean of the recorded actions until the next frame" in text
+    assert "- Downsampling: the mean of the recorded actions until the next frame" in text
     assert "eprint  = {2305.12171}" in text
     for name in ("trajectories", "routes"):
         assert f"](figures/{name}.png)" in text
@@ -150,7 +150,7 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
         f"Checked on {kept['date'][:10]} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}"
         in text
     )
-    assert "| severity | rule | findings | the first |" in text
+    assert "| severity | rule | findings | first finding |" in text
     assert "**Stale.**" not in text
     _set_column(dataset, "discarded", [True] * 6)
     text = render(DatasetFacts.read(dataset), "lab/table")
@@ -176,7 +176,7 @@ def test_routes_are_set_beside_those_of_people(dataset):
     distance = routes["human_distance_2_obstacles"]
     low, high = distance["interval"]
     caption = f"2 obstacles: {distance['value']:.3f} bits (95 % interval {low:.3f} to {high:.3f})."
-    assert "*Routes of this data set (simulated pairs) beside those of human-human demonstrations" in text
+    assert "*Routes of this data set (simulated pairs) and of human-human demonstrations" in text
     assert caption in text
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     assert "<details><summary>Routes of simulated pairs in each of 1 configurations</summary>" in text
@@ -275,7 +275,7 @@ def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
     assert "2 of 6 episodes are stored but marked as excluded" in text
     assert "| 3 | stick unplugged |" in text
     assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text
-    assert "its own trainer and loader take every episode unless they" in text
+    assert "its trainer and loader use every episode unless a list is given" in text
 
 
 def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):

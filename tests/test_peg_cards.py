@@ -37,7 +37,7 @@ def test_a_card_speaks_of_its_own_task(peg_set, capsys):
         "| `action` | float32 | 2 | robot_push, human_push |",
         "| right | 3 | 4 | 4 of 4 (100.0 %) |",
         "Left out: the task 'peg' has no strategy labels.",
-        "taken from a recording at 20 Hz",
+        "from a recording at 20 Hz",
     ):
         assert text in card
     assert [path.name for path in (peg_set / "figures").iterdir()] == ["trajectories.png"]

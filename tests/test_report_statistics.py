@@ -41,7 +41,7 @@ def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
     assert summary["findings"] == "copolicy-dataset check was not run"
     assert summary["statistics"] == "copolicy-dataset stats was not run"
     page = visit.open(root / "report.html")
-    expect(page.locator("#finding-list")).to_contain_text("copolicy-dataset check was not run on this data set")
+    expect(page.locator("#finding-list")).to_contain_text("There are no stored findings of copolicy-dataset check")
     for place in ("#statistic-list", "#route-statistics"):
         expect(page.locator(place)).to_contain_text("copolicy-dataset stats was not run on this data set")
 
@@ -54,7 +54,7 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     routes = document["statistics"]["routes"]
     page = visit.open(root / "report.html", width=375)
     section = page.locator("#route-mix")
-    expect(section).to_contain_text("The episodes are of simulated pairs.")
+    expect(section).to_contain_text("The episodes were played by simulated pairs.")
     expect(section).not_to_contain_text("stale")
     figures = section.locator("figure")
     assert figures.count() == 3

@@ -132,7 +132,7 @@ def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, 
     size = [("parameters", f"{parameters:,}") for parameters in sizes]
     weights = [("sha256 of the weights", f"`{checkpoint.weights_sha256}`")]
     if averaged:
-        weights.insert(0, ("weights", "moving average of the training (EMA) only"))
+        weights.insert(0, ("weights", "moving average over the training only"))
     text = table(("setting", "value"), [*rows, *size, *training, *weights])
     if not checkpoint.training:
         text += "\n\nThe training settings are not stated (no `train_config.json` or `recipe.json`)."

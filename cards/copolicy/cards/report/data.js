@@ -40,7 +40,7 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const offered = (entries) => entries.filter(([part]) => !MISSING[part]).map(([, entry]) => entry);
 
 /** A paragraph that states why a content is left out. */
-const missingNote = (part) => make("p", { class: "absent" }, MISSING[part]);
+const missingNote = (part) => make("p", { class: "missing" }, MISSING[part]);
 
 /** A coordinate in the scene as text. */
 const placeText = (value) => value.toFixed(OUTLINE.decimals);

@@ -7,7 +7,7 @@ function showFindings(selected) {
   const container = byId("finding-list");
   if (!data.check) {
     container.replaceChildren(
-      make("p", { class: "absent" }, "There are no stored findings of copolicy-dataset check for this data set, so its quality is unknown. " +
+      make("p", { class: "missing" }, "There are no stored findings of copolicy-dataset check for this data set, so its quality is unknown. " +
         "To check it and store the findings: copolicy-dataset check FOLDER"),
     );
     return;
@@ -18,7 +18,7 @@ function showFindings(selected) {
   const count = (severity) => shown.filter((finding) => finding.severity === severity).length;
   const summary = SEVERITIES.map((severity) => `${count(severity)} ${severity}${severity === "info" || count(severity) === 1 ? "" : "s"}`);
   const rules = data.check.rules ? `${formatNumber(data.check.rules)} rules were applied: ` : "";
-  const nodes = data.check.state === "current" ? [] : [make("p", { class: "doubt", role: "note" }, make("strong", {}, `${STATES[data.check.state]} `), data.check.reason)];
+  const nodes = data.check.state === "current" ? [] : [make("p", { class: "stale", role: "note" }, make("strong", {}, `${STATES[data.check.state]} `), data.check.reason)];
   if (data.check.date) {
     nodes.push(make("p", {}, `Checked on ${data.check.date.slice(0, 10)} by version ${data.check.rules_version} of the rules.`));
   }

@@ -8,7 +8,7 @@ function showRouteStatistics() {
     const reason = data.statistics
       ? "The stored statistics hold no route statistics; copolicy-dataset stats FOLDER computes them."
       : "copolicy-dataset stats was not run on this data set: no entropy of routes, and no distance from human routes.";
-    container.replaceChildren(make("p", { class: "absent" }, reason));
+    container.replaceChildren(make("p", { class: "missing" }, reason));
     return;
   }
   container.replaceChildren(

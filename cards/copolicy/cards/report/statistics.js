@@ -4,7 +4,7 @@ function showStatistics() {
   const container = byId("statistic-list");
   if (!data.statistics) {
     container.replaceChildren(
-      make("p", { class: "absent" }, "copolicy-dataset stats was not run on this data set: no multimodality statistics."),
+      make("p", { class: "missing" }, "copolicy-dataset stats was not run on this data set: no multimodality statistics."),
     );
     return;
   }
@@ -34,5 +34,5 @@ function showStatistics() {
 /** A note if the stored statistics do not describe the data set, as a list of at most one paragraph. */
 function staleStatisticsNote() {
   if (!data.statistics_doubt) return [];
-  return [make("p", { class: "doubt", role: "note" }, make("strong", {}, "These statistics are stale. "), data.statistics_doubt)];
+  return [make("p", { class: "stale", role: "note" }, make("strong", {}, "These statistics are stale. "), data.statistics_doubt)];
 }
