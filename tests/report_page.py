@@ -50,10 +50,10 @@ STATISTICS = {
 }  # fmt: skip
 
 
-def route_document(words: list[str], episodes: int) -> dict[str, Any]:
+def route_document(labels: list[str], episodes: int) -> dict[str, Any]:
     """Stored statistics of routes past two obstacles, as those of a data set with so many simulated episodes."""
     rng = np.random.default_rng(0)
-    data = carried_set(words, TWO, rng)
+    data = carried_set(labels, TWO, rng)
     bootstrap = Bootstrap(data.pairs, 200, rng)
     estimates = route_statistics(data, bootstrap, rng) | routes_of_tables(data, bootstrap, rng)
     return {
@@ -125,12 +125,12 @@ def visiting(browser: BrowserContext) -> Iterator[Visit]:
     visit.page.close()
 
 
-def picture(page: Page, selector: str) -> bytes:
+def canvas_pixels(page: Page, selector: str) -> bytes:
     """The pixels of a canvas."""
     url = page.eval_on_selector(selector, "canvas => canvas.toDataURL()")
     return base64.b64decode(url.partition(",")[2])
 
 
-def column(page: Page, place: int) -> list[str]:
+def column(page: Page, index: int) -> list[str]:
     """The texts of a column of the table of episodes, from 1."""
-    return page.locator(f"#episode-table tbody tr > :nth-child({place})").all_inner_texts()
+    return page.locator(f"#episode-table tbody tr > :nth-child({index})").all_inner_texts()

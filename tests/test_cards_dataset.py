@@ -143,13 +143,11 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
     assert dataset_command(["check", str(dataset)]) == 0
-    kept = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
+    stored = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
     text = render(DatasetFacts.read(dataset), "lab/table")
-    counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
-    assert (
-        f"Checked on {kept['date'][:10]} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}"
-        in text
-    )
+    counts = f"0 errors, {stored['counts']['warning']} warnings, {stored['counts']['info']} remarks."
+    date = stored["date"][:10]
+    assert f"Checked on {date} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}" in text
     assert "| severity | rule | findings | first finding |" in text
     assert "**Stale.**" not in text
     _set_column(dataset, "discarded", [True] * 6)
@@ -288,7 +286,8 @@ def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):
     assert dataset_command(["stats", str(root)]) == 0
     stored = json.loads((root / "meta" / "copolicy_stats.json").read_text(encoding="utf-8"))["statistics"]
     estimates = [estimate for family in stored.values() for estimate in family.values()]
-    details = [entry for one in estimates for entry in one.get("details", {}).get("configurations", {}).values()]
+    all_details = [estimate.get("details", {}) for estimate in estimates]
+    details = [entry for detail in all_details for entry in detail.get("configurations", {}).values()]
     assert any("counts" in entry for entry in details)
     assert any("counts" not in entry for entry in details)
     capsys.readouterr()

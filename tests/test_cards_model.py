@@ -144,10 +144,12 @@ def exported(run) -> Path:
 
 def test_the_card_of_an_exported_policy_comes_from_its_own_files(exported, capsys):
     assert main(["model", str(exported), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["evaluations"], said["trained_on"]) == (2, {"simulated": 18})
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["evaluations"], summary["trained_on"]) == (2, {"simulated": 18})
     text = (exported / "README.md").read_text(encoding="utf-8")
-    assert "Input: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
+    assert (
+        "Input: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
+    )
     assert "Training data: **No person took part.**" in text
     assert "- Data set: `local/pairs` (a local name, not one on the Hub)" in text
     assert "- Episodes used: 18 of 20 (90.0 %)\n- Frames: 3,400 at 10 Hz\n- Pairs: S01 (18)\n" in text
@@ -188,9 +190,9 @@ def test_what_is_not_at_hand_is_not_stated(run):
 
 
 def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
-    other = _evaluation()
-    other["policy"]["weights_sha256"] = "0" * 64
-    path = _write(tmp_path / "eval.json", other)
+    evaluation = _evaluation()
+    evaluation["policy"]["weights_sha256"] = "0" * 64
+    path = _write(tmp_path / "eval.json", evaluation)
     assert main(["model", str(run), "--eval", path]) == 2
     digest = hashlib.sha256(WEIGHTS).hexdigest()[:12]
     assert capsys.readouterr().err == (

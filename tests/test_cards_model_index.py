@@ -83,7 +83,7 @@ def test_the_shipped_card_is_what_the_command_writes(tmp_path):
     ],
 )  # fmt: skip
 def test_no_two_results_are_merged_whatever_tells_them_apart(changes, configs):
-    evaluations = [_evaluation(mean=0.1 * (place + 1), **change) for place, change in enumerate(changes)]
+    evaluations = [_evaluation(mean=0.1 * (index + 1), **change) for index, change in enumerate(changes)]
     results = _read_back(evaluations)
     assert len({result.unique_identifier for result in results}) == len(evaluations)
     assert [result.dataset_config for result in results] == configs
@@ -97,9 +97,9 @@ def test_no_two_results_are_merged_whatever_tells_them_apart(changes, configs):
 
 
 def test_a_part_of_the_maps_is_a_split_of_its_own():
-    whole, part = _read_back([_evaluation(), _evaluation(complete_set=False, map_count=5)])
-    assert (whole.dataset_split, part.dataset_split) == ("all", "5-maps")
-    assert part.dataset_name == "unseen maps, a part of them"
+    complete, incomplete = _read_back([_evaluation(), _evaluation(complete_set=False, map_count=5)])
+    assert (complete.dataset_split, incomplete.dataset_split) == ("all", "5-maps")
+    assert incomplete.dataset_name == "unseen maps, a part of them"
     (starts,) = _read_back([_evaluation("partner", complete_set=False, configurations=60)])
     assert starts.dataset_split == "60-starts"
 

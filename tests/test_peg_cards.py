@@ -70,8 +70,8 @@ def test_the_page_draws_the_outline_and_leaves_out_what_is_lacking(peg_set, visi
     assert main(["report", str(peg_set), "--out", str(out)]) == 0
     page = visit.open(out)
     text = page.locator("body").inner_text()
-    words = {match[0].lower() for match in OF_THE_TABLE.findall(text.replace("Heat maps", ""))}
-    assert words <= {"obstacles", "obstacle"}  # panels are by sets of obstacles, whatever the task
+    table_words = {match[0].lower() for match in OF_THE_TABLE.findall(text.replace("Heat maps", ""))}
+    assert table_words <= {"obstacles", "obstacle"}  # panels are by sets of obstacles, whatever the task
     for part in ("strategy labels", "interaction measure", "tracked point"):
         assert f"Left out: the task 'peg' has no {part}." in text
     assert [head.inner_text() for head in page.locator("#pair-table th[scope=col]").all()] == [

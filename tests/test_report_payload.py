@@ -23,13 +23,13 @@ def test_frames_survive_their_packing(report_set):
     values = np.frombuffer(base64.b64decode(payload["frames"]), "<i2").reshape(-1, len(FRAME_SCALES))
     table = values / list(FRAME_SCALES.values())
     for row, frames in zip(payload["episodes"], read_frames(facts), strict=True):
-        part = table[row["from"] : row["from"] + row["frames"]]
-        np.testing.assert_allclose(part[:, :2], frames.states[:, :2], atol=0.0251)
-        np.testing.assert_allclose(np.cos(part[:, 2]), frames.states[:, 2], atol=1e-4)
-        np.testing.assert_allclose(np.sin(part[:, 2]), frames.states[:, 3], atol=1e-4)
-        np.testing.assert_allclose(part[:, 3:7], frames.actions, atol=2e-5)
+        columns = table[row["from"] : row["from"] + row["frames"]]
+        np.testing.assert_allclose(columns[:, :2], frames.states[:, :2], atol=0.0251)
+        np.testing.assert_allclose(np.cos(columns[:, 2]), frames.states[:, 2], atol=1e-4)
+        np.testing.assert_allclose(np.sin(columns[:, 2]), frames.states[:, 3], atol=1e-4)
+        np.testing.assert_allclose(columns[:, 3:7], frames.actions, atol=2e-5)
         assert frames.interaction is not None
-        np.testing.assert_allclose(part[:, 7], frames.interaction, atol=3e-5)
+        np.testing.assert_allclose(columns[:, 7], frames.interaction, atol=3e-5)
 
 
 def test_a_page_of_376_episodes_is_under_10_mb(report, report_set):

@@ -42,8 +42,8 @@ def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
     assert summary["statistics"] == "copolicy-dataset stats was not run"
     page = visit.open(root / "report.html")
     expect(page.locator("#finding-list")).to_contain_text("There are no stored findings of copolicy-dataset check")
-    for place in ("#statistic-list", "#route-statistics"):
-        expect(page.locator(place)).to_contain_text("copolicy-dataset stats was not run on this data set")
+    for selector in ("#statistic-list", "#route-statistics"):
+        expect(page.locator(selector)).to_contain_text("copolicy-dataset stats was not run on this data set")
 
 
 def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
@@ -66,8 +66,8 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     label = figures.nth(1).locator("svg").get_attribute("aria-label")
     assert label is not None
     human = distance["details"]["human"]["counts"]
-    word = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
-    assert f"RL 10 in this data set, {human[word]} of people" in label
+    label = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
+    assert f"RL 10 in this data set, {human[label]} of people" in label
 
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     cells = section.locator("#configuration-table tbody tr").first.locator("th, td").all_inner_texts()
@@ -96,9 +96,9 @@ def test_statistics_of_other_episodes_are_called_stale(visit, report_set, tmp_pa
     (root / STATISTICS_FILE).write_text(json.dumps(route_document(["RL"] * 6, EPISODES - 1)), encoding="utf-8")
     assert main(["report", str(root), "--overwrite"]) == 0
     page = visit.open(root / "report.html")
-    doubt = f"These statistics are stale. They were computed when the data set had {EPISODES - 1} episodes; it has"
-    for place in ("#route-statistics", "#statistic-list"):
-        expect(page.locator(place)).to_contain_text(doubt)
+    note = f"These statistics are stale. They were computed when the data set had {EPISODES - 1} episodes; it has"
+    for selector in ("#route-statistics", "#statistic-list"):
+        expect(page.locator(selector)).to_contain_text(note)
 
 
 def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_path, capsys):

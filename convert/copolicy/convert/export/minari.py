@@ -111,7 +111,7 @@ def _box(bounds: np.ndarray) -> dict[str, Any]:
 
 def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> None:
     last = np.arange(len(episode)) == len(episode) - 1
-    # An end that is no termination reason of the task is a truncation.
+    # A time-out, or an end that is no termination reason of the task, is a truncation.
     reason = episode.meta["termination_reason"]
     terminated = reason != TIMEOUT and reason in episode.task.spec.reasons
     observations = (

@@ -80,8 +80,8 @@ def write_dataset(
 
     The downsampling is stored as the extra key `hold` of the feature `action` in meta/info.json: LeRobot preserves it
     and refuses to merge data sets that differ in it. `record` (versions, sources, skipped episodes, notes by episode)
-    and the task spec go to meta/copolicy.json: LeRobot drops extra keys at the top of info.json, and inside a feature
-    they would prevent merging data sets of different versions.
+    and the task spec go to meta/copolicy.json (the robot type in info.json names the task): LeRobot drops extra keys at
+    the top of info.json, and inside a feature they would prevent merging data sets of different versions.
 
     Args:
         episodes: consumed one by one; all have a video, or none has.

@@ -107,7 +107,9 @@ def convert_upstream(
         if fps != ZARR_HZ:
             raise InvalidValueError("fps", f"{ZARR_HZ}: the store holds every third step only", fps)
         if downsampling == "mean":
-            raise InvalidValueError("downsampling", "'first': the store holds the first of three actions only", downsampling)
+            raise InvalidValueError(
+                "downsampling", "'first': the store holds the first of three actions only", downsampling
+            )
     downsampling = downsampling or ("first" if source.format == "zarr" else "mean")
     # Episodes excluded for a wrong map stay in the data set, flagged; there are no other discarded ones.
     conversion = Conversion(fps, downsampling, license, keep_discarded=True)
