@@ -71,7 +71,9 @@ class CheckpointFacts:
         training = read_optional_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
         recipe = read_optional_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
-        root = dataset_root or _training_root(settings)
+        root, training_root = dataset_root, settings.get("root")
+        if root is None and training_root and (Path(training_root) / INFO_FILE).is_file():
+            root = Path(training_root)
         task = config.get("task")
         if root is not None:
             facts = DatasetFacts.read(root)
@@ -120,8 +122,3 @@ class CheckpointFacts:
             expected = f"an evaluation of {self.folder.name} (weights {self.weights_sha256[:12]})"
             raise FileFormatError(path, expected, f"one of weights {str(weights)[:12]}")
         return result
-
-
-def _training_root(settings: dict[str, Any]) -> Path | None:
-    root = settings.get("root")
-    return Path(root) if root and (Path(root) / INFO_FILE).is_file() else None

@@ -27,7 +27,7 @@ def results(evaluations: Sequence[dict[str, Any]], task: PairTask) -> str:
         labels = sorted({evaluation["label"] for evaluation in members})
         parts += [f"**{label[0].upper()}{label[1:]}.**" for label in labels]
         parts += [_partners(entry, words) for entry in members] if study == "partner" else [_plain(members, words)]
-    measure = f"{words.interaction.capitalize()}: mean size, in {words.interaction_unit}. " if measured else ""
+    measure = f"{words.interaction.capitalize()}: mean magnitude, in {words.interaction_unit}. " if measured else ""
     parts.append(
         "s.e.: binomial standard error over episodes of one trained model; it does not cover other training seeds. "
         "Interval: Wilson. Times to completion are of successes only. "

@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser, commands = command_parser("copolicy-convert", "Make LeRobot v3 data sets, and export them.")
     mcap = add_command(
-        commands, "mcap", _mcap, "convert recordings, one MCAP file an episode, to a LeRobot v3 data set",
+        commands, "mcap", _mcap, "convert recordings, one MCAP file per episode, to a LeRobot v3 data set",
         "copolicy-convert mcap recordings --out datasets/table --repo-id me/table",
         lambda arguments: (
             *DATASETS, *(("av",) if arguments.video else ()), *(("datatrove",) if shards_requested(arguments) else ())

@@ -1,4 +1,4 @@
-"""Converts folders of recordings, one MCAP file an episode, to a LeRobot v3 data set."""
+"""Converts folders of recordings, one MCAP file per episode, to a LeRobot v3 data set."""
 
 import contextlib
 import functools

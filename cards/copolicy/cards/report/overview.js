@@ -26,7 +26,7 @@ function showOverview(selected) {
     ["", ["Recorded", `${(seconds / 60).toFixed(1)} min`, `median ${formatNumber(middle(selected, "duration_s"))} s per episode`]],
     ["", [capital(WORDS.success), selected.length ? percent(successes / selected.length) : "–", `95 %: ${percent(low)} to ${percent(high)}`]],
     ["", ["Pairs", formatNumber(new Set(selected.map((episode) => episode.pair_id)).size), `${new Set(selected.map((e) => e.map_id)).size} ${WORDS.scenarios}`]],
-    ["interaction", [capital(WORDS.interaction), formatNumber(quantile(forces, 0.5)), "median of the episodes' mean size"]],
+    ["interaction", [capital(WORDS.interaction), formatNumber(quantile(forces, 0.5)), "median of the episodes' mean magnitude"]],
     ["", ["Marked", formatNumber(selected.filter((e) => e.discarded || e.quality_flags).length), "discarded or with a quality flag"]],
   ]);
   byId("tiles").replaceChildren(

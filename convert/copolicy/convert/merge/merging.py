@@ -100,7 +100,7 @@ def _mixtures(episodes: pa.Table, sources: Sequence[StoredSet]) -> Mixtures:
 
 
 def _concatenated(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Table:
-    """Concatenates the rows of meta/episodes; a column that a data set lacks is null, or unknown as in earlier data."""
+    """Concatenates the rows of meta/episodes; where a data set lacks a column, null or its unknown value."""
     types = {field.name: field.type for field in tables[0].schema}
     for source, table in zip(sources, tables, strict=True):
         for field in table.schema:
