@@ -1,4 +1,4 @@
-"""A data set of simulated pairs, its report, and a headless Chromium that looks at it."""
+"""A data set of simulated pairs, its report, and a headless Chromium that shows it."""
 
 import base64
 import contextlib
@@ -31,7 +31,7 @@ FINDINGS = {
         {"episode": "", "rule": "balance", "figure": 1, "limit": 5, "severity": "error", "message": "too few <b>"},
     ],
 }
-"""What `copolicy-dataset check --json` printed before it named the content that it checked."""
+"""Output of an earlier `copolicy-dataset check --json`, without a content hash."""
 
 STATISTICS = {
     "version": 1,
@@ -86,7 +86,7 @@ def make_report(root: Path) -> Path:
 
 @contextlib.contextmanager
 def chromium(profile: Path) -> Iterator[BrowserContext]:
-    """A headless Chromium with a profile of its own."""
+    """A headless Chromium with its own profile."""
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
     flags = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
@@ -117,7 +117,7 @@ class Visit:
 
 @contextlib.contextmanager
 def visiting(browser: BrowserContext) -> Iterator[Visit]:
-    """A visit that must ask for nothing but files and see no error."""
+    """A visit that may request files only and must see no error."""
     visit = Visit(browser)
     yield visit
     assert visit.errors == []

@@ -33,7 +33,7 @@ def dataset(tmp_path_factory, upstream) -> Path:
 
 @pytest.fixture
 def offline(monkeypatch):
-    """Whoever asks for the network fails at once."""
+    """Any use of the network fails."""
 
     def refuse(*arguments, **named):
         raise OSError("these tests have no network")
@@ -124,7 +124,7 @@ def test_images_are_no_columns(dataset, tmp_path):
     ]
 
 
-def test_it_must_be_said_where_the_data_are(dataset, capsys):
+def test_croissant_needs_a_repo_id(dataset, capsys):
     assert main(["dataset", str(dataset), "--croissant", "--no-figures", "--overwrite"]) == 2
     expected = "--repo-id: expected user/name with --croissant, which states the data's location, found None"
     assert capsys.readouterr().err == f"copolicy-cards: {expected}\n"

@@ -139,7 +139,7 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
         render(DatasetFacts.read(dataset), "lab/table")
 
 
-def test_findings_are_counted_and_their_age_is_told(dataset):
+def test_findings_are_counted_and_dated(dataset):
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
     assert dataset_command(["check", str(dataset)]) == 0
@@ -163,7 +163,7 @@ def test_findings_are_counted_and_their_age_is_told(dataset):
     assert "| warning | idle run | 2 | episode 2: a\\|b (5.25; limit 5) |" in text
 
 
-def test_routes_are_set_beside_those_of_people(dataset):
+def test_routes_are_compared_with_human_routes(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
     document = route_document(["LL", "LR", "RR", "RL"] * 10, 6)
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
@@ -215,7 +215,7 @@ def test_a_mixture_names_each_source(dataset):
     ("licences", "expected"),
     [(["", *["mit"] * 5], "unknown"), (["cc0-1.0", *["mit"] * 5], "other"), (["MIT"] * 6, "mit")],
 )
-def test_a_licence_is_never_made_up(dataset, licences, expected):
+def test_the_licence_follows_from_the_episodes(dataset, licences, expected):
     _set_column(dataset, "license", licences)
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert yaml.safe_load(text.split("---")[1])["license"] == expected
@@ -227,7 +227,7 @@ def test_what_is_no_licence_identifier_is_refused(dataset):
         render(DatasetFacts.read(dataset), "lab/table")
 
 
-def test_a_card_is_not_overwritten_unless_asked(dataset, capsys):
+def test_a_card_is_overwritten_on_request_only(dataset, capsys):
     (dataset / "README.md").write_text("written by hand", encoding="utf-8")
     assert main(["dataset", str(dataset)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
@@ -266,7 +266,7 @@ def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
     assert is_minimal_card(dataset / "README.md")
 
 
-def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
+def test_excluded_episodes_are_listed(dataset):
     assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
     assert dataset_command(["exclude", str(dataset), "--episode-ids", "1", "3", "--reason", "stick unplugged"]) == 0
     text = render(DatasetFacts.read(dataset), "lab/table")

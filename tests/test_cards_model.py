@@ -37,7 +37,7 @@ def _evaluation(maps: str = "holdout", mean: float = 0.75, complete: bool = True
 
 @pytest.fixture
 def run(tmp_path) -> Path:
-    """A training run with one checkpoint, as LeRobot leaves it."""
+    """A training run with one checkpoint, as LeRobot writes it."""
     folder = tmp_path / "training" / "checkpoints" / "last" / "pretrained_model"
     folder.mkdir(parents=True)
     (folder / "model.safetensors").write_bytes(WEIGHTS)
@@ -171,7 +171,7 @@ def test_a_study_with_partners_has_a_table_of_its_own(exported):
     assert "The partners of the study are also simulated" in text
 
 
-def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
+def test_the_packaged_model_is_named_pretrained(exported, tmp_path):
     folder = exported.rename(tmp_path / "pretrained")
     assert main(["model", str(folder)]) == 0
     text = (folder / "README.md").read_text(encoding="utf-8")
@@ -225,7 +225,7 @@ def test_a_folder_that_is_no_checkpoint_is_named(tmp_path, capsys):
     )
 
 
-def test_a_card_is_not_overwritten_unless_asked(run, capsys):
+def test_a_card_is_overwritten_on_request_only(run, capsys):
     _card(run).write_text("written by hand", encoding="utf-8")
     assert main(["model", str(run)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err

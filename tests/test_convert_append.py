@@ -99,7 +99,7 @@ def test_a_third_session_goes_into_a_third_file(folders, root, tmp_path):
 
 
 @pytest.mark.parametrize("renamed", [0, 1])
-def test_an_interruption_is_made_good(folders, root, monkeypatch, renamed):
+def test_an_interrupted_append_is_restored(folders, root, monkeypatch, renamed):
     before = contents(root)
     rename = Path.rename
     calls = []
@@ -120,7 +120,7 @@ def test_an_interruption_is_made_good(folders, root, monkeypatch, renamed):
     assert load(root).num_episodes == 7
 
 
-def test_everything_is_on_the_disk_before_it_takes_the_place(folders, root, monkeypatch):
+def test_everything_is_on_the_disk_before_the_rename(folders, root, monkeypatch):
     with monkeypatch.context() as patch:
         happened = record_disk_order(patch)
         assert add(folders / "b", root) == 0

@@ -224,7 +224,7 @@ def test_the_final_state_is_the_one_that_the_recording_ends_with(data_set, recor
         np.testing.assert_allclose(computed[:2], recorded[:2], atol=0.5)  # px; the frame's actions are their mean
 
 
-def test_discarded_episodes_stay_behind_unless_asked_for(changed, tmp_path):
+def test_discarded_episodes_are_exported_on_request_only(changed, tmp_path):
     set_columns(changed, discarded=[False, True, False])
     lengths = [len(episode) for episode in list(ExportSource.open(changed, keep_discarded=True).episodes())]
     assert arrays(export(changed, "zarr", tmp_path / "a"))[3].tolist() == [lengths[0], lengths[0] + lengths[2]]
@@ -244,7 +244,7 @@ def test_discarded_episodes_stay_behind_unless_asked_for(changed, tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_a_call_that_cannot_be_met_says_why(data_set, tmp_path, capsys, format, flags, name, message):
+def test_an_invalid_call_gives_one_line(data_set, tmp_path, capsys, format, flags, name, message):
     out = tmp_path / name
     assert main(["export", str(data_set), "--format", format, "--out", str(out), *flags]) == 2
     assert capsys.readouterr().err == f"copolicy-convert: {message}\n"
@@ -269,7 +269,7 @@ def test_what_is_there_is_not_overwritten(data_set, tmp_path, capsys, format):
 
 
 @pytest.mark.parametrize("format", ["zarr", "robomimic", "minari"])
-def test_an_export_that_fails_leaves_nothing_behind(changed, tmp_path, capsys, format):
+def test_a_failed_export_writes_nothing(changed, tmp_path, capsys, format):
     set_columns(changed, length=lambda lengths: [*lengths[:2], lengths[2] + 1])
     folder = tmp_path / "out"
     assert main(["export", str(changed), "--format", format, "--out", str(folder / "table-v0")]) == 2

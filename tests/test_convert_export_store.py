@@ -1,4 +1,4 @@
-"""What diffusion_policy's ReplayBuffer and zarr 2 ask of a store, each as a condition on the files themselves.
+"""What diffusion_policy's ReplayBuffer and zarr 2 require of a store, each as a condition on the files.
 
 The reader opens the store as a group, wants `data` and `meta/episode_ends`, takes whatever else lies in both for
 arrays, cuts the time axis alone, copies chunks byte for byte where the compressor is the one it knows, and appends by
@@ -111,7 +111,7 @@ def test_chunks_are_complete_and_none_is_too_many(store):
         assert {len(codec.decode((array / chunk).read_bytes())) for chunk in names} == {size}
 
 
-def test_an_episode_appended_by_resizing_leaves_the_rest_alone(store):
+def test_appending_an_episode_by_resizing_keeps_the_other_rows(store):
     """What `add_episode` does: a longer shape, and rows written behind the last one."""
     array = arrays(store)["data/action"]
     before, about = read(array), metadata(array)

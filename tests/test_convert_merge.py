@@ -1,4 +1,4 @@
-"""`copolicy-convert merge`: nothing of an episode is lost, and nobody becomes somebody else."""
+"""`copolicy-convert merge`: no content of an episode is lost, and no pseudonyms are mixed up."""
 
 import json
 import shutil
@@ -73,7 +73,7 @@ def test_the_result_is_that_of_one_conversion(folders, tmp_path, capsys):
     assert [finding for finding in check_dataset(tmp_path / "out").findings if finding.severity == "error"] == []
 
 
-def test_exclusions_and_records_are_kept_and_what_is_about_one_part_stays_behind(roots, tmp_path, capsys):
+def test_exclusions_and_records_are_kept_and_files_about_one_part_are_not_copied(roots, tmp_path, capsys):
     first, second = roots
     exclude(first, ["1"], "stick unplugged")
     exclude(second, ["2"], "withdrawn")
@@ -109,7 +109,7 @@ def test_a_merge_can_be_merged_again(folders, roots, tmp_path):
     assert uuids[:6] == episodes(folders / "both").column("episode_uuid").to_pylist()
 
 
-def test_a_column_of_one_lab_alone_is_kept_and_null_for_the_other(roots, tmp_path):
+def test_a_column_of_one_lab_is_kept_and_null_for_the_other(roots, tmp_path):
     first, second = roots
     table = episodes(first)
     pq.write_table(table.append_column("site", pa.array(["north", "south", "north"])), first / EPISODES)
@@ -117,7 +117,7 @@ def test_a_column_of_one_lab_alone_is_kept_and_null_for_the_other(roots, tmp_pat
     assert episodes(tmp_path / "out").column("site").to_pylist() == [None] * 3 + ["north", "south", "north"]
 
 
-def test_one_name_in_two_labs_is_refused_until_somebody_says_who_it_is(roots, tmp_path, capsys):
+def test_a_name_in_two_labs_needs_a_flag(roots, tmp_path, capsys):
     first, second = roots
     set_columns(first, **PEOPLE)
     set_columns(second, **{**PEOPLE, "source": ["human", "human", "simulated"]})
@@ -164,7 +164,7 @@ def test_players_are_compared_across_the_seats(roots, tmp_path, capsys):
         ),
     ],
 )
-def test_a_call_that_cannot_be_met_says_why(folders, tmp_path, capsys, flags, message):
+def test_an_invalid_call_gives_one_line(folders, tmp_path, capsys, flags, message):
     arguments = [
         "merge",
         str(folders / "a"),
@@ -229,7 +229,7 @@ def test_what_comes_out_changed_is_not_written(roots, tmp_path, capsys, monkeypa
     assert contents(tmp_path) == before
 
 
-def test_an_output_that_is_there_is_left_alone(folders, tmp_path, capsys):
+def test_an_existing_output_is_not_changed(folders, tmp_path, capsys):
     (tmp_path / "out").write_text("mine", encoding="utf-8")
     assert merge(tmp_path / "out", folders / "a", folders / "b") == 2
     assert "nothing was overwritten" in capsys.readouterr().err

@@ -65,7 +65,7 @@ def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_pa
     names = {rule.name for rule in rules if of_recordings(rule)}
     applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text(encoding="utf-8"))["applied"]
     assert set(applied) == names
-    # The recordings' own rules find in shards what they find in all at once, episodes named by their index.
+    # The rules of recordings give the same findings in shards as in one folder, with episodes named by index.
     labels = {path.name: str(index) for index, path in enumerate(sorted(recordings.glob("*.mcap")))}
     at_once = check_dataset(recordings).findings
     rules_at_once = {finding.rule for finding in at_once}
@@ -144,7 +144,7 @@ def without_datatrove(monkeypatch) -> Callable[[], None]:
     return hide
 
 
-def test_without_the_extra_one_line_says_so(unsharded, tmp_path, capsys, without_datatrove):
+def test_a_missing_extra_gives_one_line(unsharded, tmp_path, capsys, without_datatrove):
     without_datatrove()
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "4")) == 2
     expected = (

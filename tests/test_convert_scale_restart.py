@@ -1,4 +1,4 @@
-"""Conversions in shards that end early: what is finished stays, and the same call once more does the rest."""
+"""Conversions in shards that end early: finished shards stay, and a second call converts the others."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ from copolicy.convert.cli import main
 COMMAND = [sys.executable, "-c", "from copolicy.convert.cli import main; raise SystemExit(main())"]
 
 
-def test_a_finished_shard_is_not_made_again(unsharded, tmp_path, capsys):
+def test_a_finished_shard_is_not_converted_again(unsharded, tmp_path, capsys):
     recordings = Path(shutil.copytree(unsharded / "recordings", tmp_path / "recordings"))
     shards, broken = tmp_path / "shards", recordings / "episode_000002.mcap"
     sound = broken.read_bytes()
@@ -130,7 +130,7 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recordings", "set", "shards"]
 
 
-def test_what_a_killed_merge_left_goes_away(unsharded, tmp_path):
+def test_files_of_a_killed_merge_are_removed(unsharded, tmp_path):
     leftover = tmp_path / ".set.merging"
     leftover.mkdir()
     (leftover / "half").write_text("", encoding="utf-8")
@@ -158,7 +158,7 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", "null", '{"digest": 1, "episodes": 3}', "{"])
-def test_a_shard_with_another_record_is_made_again(unsharded, tmp_path, capsys, content):
+def test_a_shard_with_an_invalid_record_is_converted_again(unsharded, tmp_path, capsys, content):
     flags = ("--shards", str(tmp_path / "shards"), "--shard-episodes", "4")
     assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
     record = next((tmp_path / "shards").rglob("shard.json"))

@@ -1,4 +1,4 @@
-"""Which map was played in the original program's files, and what becomes of an episode where nobody can tell."""
+"""Which map was played in the original program's files, and the exclusion of an episode whose map is unknown."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -53,7 +53,7 @@ def test_a_zarr_episode_with_another_map_is_noticed(examples):
     assert episode.notes[1].endswith("its obstacles may be wrong")
 
 
-def test_rewards_that_no_known_map_gives_are_said(tmp_path):
+def test_rewards_that_no_known_map_gives_are_noted(tmp_path):
     states, actions = play(random_forces(60))
     pose = np.hstack((states[1:, :2], np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])))
     write_processed(tmp_path / "p" / "p.npz", pose, actions, np.tile([*CONFIG.start, *CONFIG.goal, 1, 1, 1], (60, 1)))

@@ -1,4 +1,4 @@
-"""`copolicy-convert mcap --video`: the right picture for every frame, wherever its episode went."""
+"""`copolicy-convert mcap --video`: the right image for every frame, in any file."""
 
 import io
 import json
@@ -67,7 +67,7 @@ def load(root: Path, **options) -> Any:
 
 
 def drawn(raw: Path) -> list[np.ndarray]:
-    """For each recording the pictures of its frames at 10 Hz, `(T, 80, 160, 3)`."""
+    """For each recording the images of its frames at 10 Hz, `(T, 80, 160, 3)`."""
     episodes = [read_episode(path) for path in sorted(raw.rglob("*.mcap"))]
     return [
         np.stack(list(TableTask().images(episode.map_config, episode.states[::3].astype(np.float32), SIZE)))
@@ -80,7 +80,7 @@ def decoded(dataset: Any, index: int) -> np.ndarray:
 
 
 def assert_images(dataset: Any, expected: list[np.ndarray]) -> None:
-    """The first, second, a middle and the last frame of each episode show what they should, and no other."""
+    """The first, second, a middle and the last frame of each episode show the expected image."""
     rows = dataset.meta.episodes
     assert len(rows) == len(expected)
     for start, end, images in zip(rows["dataset_from_index"], rows["dataset_to_index"], expected, strict=True):
@@ -158,7 +158,7 @@ def test_files_change_when_they_are_full(folders, tmp_path):
     ]
 
 
-def test_the_content_does_not_depend_on_what_stands_beside_an_episode(folders):
+def test_the_content_does_not_depend_on_other_episodes_of_the_file(folders):
     digests = [episode.digest for name in "ab" for episode in read_content(folders / name).episodes]
     assert len(set(digests)) == 4
     changed = [episode.features[SCENE] for episode in read_content(folders / "both").episodes]

@@ -1,4 +1,4 @@
-"""Linked folders and files: entered by every command, counted once, and named where they lead nowhere."""
+"""Linked folders and files: followed by every command, counted once, and named if broken."""
 
 import json
 import os
@@ -22,7 +22,7 @@ from copolicy.dataset.versions.manifest import Manifest
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory) -> Path:
-    """Two sessions, the first of two recordings and the second of one, and what they become together."""
+    """Two sessions, the first of two recordings and the second of one, and the data set of both."""
     folder = tmp_path_factory.mktemp("linked")
     make_recordings(folder / "both" / "a", 2, seed=1)
     make_recordings(folder / "both" / "b", 1, seed=2)
@@ -111,7 +111,7 @@ def test_the_originals_files_are_found_behind_links(examples, tmp_path):
         assert (source.format, len(source.readers)) == (format, len(expected.readers))
 
 
-def test_a_data_set_behind_links_is_read_added_to_and_released_whole(folders, tmp_path, capsys):
+def test_a_data_set_behind_links_is_read_appended_to_and_released(folders, tmp_path, capsys):
     make_data_set(folders / "both" / "a", tmp_path / "disk" / "set")
     root = tmp_path / "set"
     root.mkdir()

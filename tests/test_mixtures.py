@@ -88,7 +88,7 @@ def test_the_physics_of_each_episode_is_in_the_data_set(folders):
     assert load(folders / "both").meta.episodes["obstacle_size"] == [50] * 5
 
 
-def test_a_conversion_says_what_it_mixes(folders, tmp_path, run):
+def test_a_conversion_reports_mixtures(folders, tmp_path, run):
     summary, errors = run("mcap", folders / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table")
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
     assert summary["mixed"] == [f"physics: 3 episodes {HALF_WORDS}; 2 episodes {EIGHTH_WORDS}"]
@@ -97,7 +97,7 @@ def test_a_conversion_says_what_it_mixes(folders, tmp_path, run):
     assert (summary["physics"], "mixed" in summary, errors) == ({HALF_WORDS: 3}, False, [])
 
 
-def test_a_conversion_in_shards_says_so_too(folders, tmp_path, run):
+def test_a_conversion_in_shards_reports_mixtures(folders, tmp_path, run):
     flags = ("--shard-episodes", 2, "--workers", 1)
     summary, _ = run("mcap", folders / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table", *flags)
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
@@ -240,7 +240,7 @@ def test_the_card_states_the_physics(copied):
     assert f"| physics | {HALF_WORDS} (3 of 5 episodes); {EIGHTH_WORDS} (2 of 5 episodes) |" in text
 
 
-def test_a_replayed_recording_of_another_physics_is_said(folders, caplog):
+def test_a_replay_of_another_physics_is_reported(folders, caplog):
     path = sorted((folders / "raw" / "eighth").glob("*.mcap"))[0]
     specs = (PilotSpec.parse(f"replay:{path}"), PilotSpec.parse("scripted"))
     players = make_players("P01", specs, ("", ""))
@@ -263,7 +263,7 @@ def record(path: Path, config: MapConfig, **columns) -> None:
         recorder.finish(False, "operator_discard", discarded=False)
 
 
-def test_obstacles_of_several_sizes_are_said_and_found(tmp_path, run):
+def test_obstacles_of_several_sizes_are_reported(tmp_path, run):
     config = MapConfig((240.0, 300.0, 3.14), (960.0, 300.0), ((600.0, 100.0),))
     for name, size in (("a", 50), ("bb", 30), ("ccc", 30)):
         custom = MapConfig(config.start, config.goal, config.obstacles, size)
@@ -280,7 +280,7 @@ def test_obstacles_of_several_sizes_are_said_and_found(tmp_path, run):
         assert found == [(severity, episodes[name], figure) for severity, episodes, figure in expected]
 
 
-def test_other_software_sources_and_rewards_are_said(folders, copied, tmp_path, run):
+def test_other_software_sources_and_rewards_are_reported(folders, copied, tmp_path, run):
     first, second = copied("half"), copied("eighth")
     set_columns(second, software_version=["0.0.1"] * 2, physics=[physics_text(HALF)] * 2, source=["upstream"] * 2)
     set_frames(second, "next.reward", lambda rewards: rewards + 1)

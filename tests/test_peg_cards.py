@@ -1,4 +1,4 @@
-"""Cards and the report on data and policies of a second task: its names and units, and no word of the first one."""
+"""Cards and the report on data and policies of a second task: its names and units, and no word of the table task."""
 
 import hashlib
 import json
@@ -65,7 +65,7 @@ def test_a_task_without_an_outline_has_no_figures(peg, peg_set, monkeypatch, cap
     assert payload["left_out"]["outline"] == "Left out: the task 'peg' has no outline."
 
 
-def test_the_page_draws_the_outline_and_leaves_out_what_is_lacking(peg_set, visit, tmp_path, capsys):
+def test_the_page_draws_the_outline_and_leaves_out_missing_parts(peg_set, visit, tmp_path, capsys):
     out = tmp_path / "page.html"
     assert main(["report", str(peg_set), "--out", str(out)]) == 0
     page = visit.open(out)

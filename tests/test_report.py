@@ -15,7 +15,7 @@ from copolicy.cards.facts import DatasetFacts
 EPISODES = 30
 
 
-def test_the_top_says_that_pairs_are_simulated(visit, report):
+def test_simulated_pairs_are_named_at_the_top(visit, report):
     page = visit.open(report)
     assert page.title() == "Simulated <i>pairs</i>"
     assert page.locator("h1").inner_text() == "Simulated <i>pairs</i>"

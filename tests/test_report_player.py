@@ -13,7 +13,7 @@ from copolicy.cards.frames import read_frames
 EPISODES = 5
 
 
-def test_an_episode_plays_by_keyboard_alone(visit, report, report_set):
+def test_an_episode_plays_by_keyboard(visit, report, report_set):
     page = visit.open(report)
     open_first = page.get_by_role("button", name=re.compile(r"^Open Episode 0,"))
     open_first.focus()

@@ -32,7 +32,7 @@ def test_findings_and_statistics_are_shown(visit, report):
     expect(rows.nth(1)).to_contain_text("one split only")
 
 
-def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
+def test_commands_that_were_not_run_are_stated(visit, report_set, tmp_path, capsys):
     root = Path(
         shutil.copytree(report_set, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json", "*.html"))
     )
@@ -46,7 +46,7 @@ def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
         expect(page.locator(selector)).to_contain_text("copolicy-dataset stats was not run on this data set")
 
 
-def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
+def test_routes_are_shown_with_human_routes(visit, report_set, tmp_path):
     root = Path(shutil.copytree(report_set, tmp_path / "table"))
     document = route_document(["LL", "LR", "RR", "RL"] * 10, EPISODES)
     (root / STATISTICS_FILE).write_text(json.dumps(document), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What is different where two data sets should hold the same encoded video."""
+"""Describes the difference of two data sets that should hold the same encoded videos."""
 
 from pathlib import Path
 
