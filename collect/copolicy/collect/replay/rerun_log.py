@@ -114,17 +114,17 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
         if strips:
             labels = {"labels": ["goal"] * len(strips)} if role == "goal" else {}
             lines = rr.LineStrips2D(strips, colors=[_COLOURS[role]] * len(strips), **labels)
-            recording.reader(f"world/{entity}", lines, static=True)
+            recording.log(f"world/{entity}", lines, static=True)
     for player, hand, colour in zip(PLAYERS, outline.hands, SEATS, strict=True):
         points = [to_scene(pose, hand) for pose in track.poses]
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[width / _WIDTH])
-        recording.reader(f"world/trail/{player}", trail, static=True)
+        recording.log(f"world/trail/{player}", trail, static=True)
     if track.interaction is not None:
         senses = track.task.words.interaction_senses
-        recording.reader("interaction_force", rr.SeriesLines(names=[f"positive: {senses[0]}"]), static=True)
+        recording.log("interaction_force", rr.SeriesLines(names=[f"positive: {senses[0]}"]), static=True)
     lines = [f"**{track.path.name}**", meta.map_id, meta.pair_id, meta.termination_reason, meta.quality_flags]
     lines += [track.task.missing("interaction measure")] if track.interaction is None else []
-    recording.reader("about", rr.TextDocument("\n\n".join(line for line in lines if line)), static=True)
+    recording.log("about", rr.TextDocument("\n\n".join(line for line in lines if line)), static=True)
 
 
 def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
@@ -132,17 +132,17 @@ def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
     radius = outline.size[0] / _WIDTH
     strips = [_closed([to_scene(pose, corner) for corner in shape.corners]) for shape in outline.body]
     colours = [_COLOURS.get(shape.role, WOOD) for shape in outline.body]
-    recording.reader(f"world/{track.task.spec.name}", rr.LineStrips2D(strips, colors=colours, radii=[2.0 * radius]))
+    recording.log(f"world/{track.task.spec.name}", rr.LineStrips2D(strips, colors=colours, radii=[2.0 * radius]))
     origins = [to_scene(pose, hand) for hand in outline.hands]
     vectors = [(outline.arrow * x, outline.arrow * y) for x, y in (forces[:2], forces[2:])]
-    recording.reader(
+    recording.log(
         "world/forces", rr.Arrows2D(origins=origins, vectors=vectors, colors=list(SEATS), radii=[2.5 * radius])
     )
     if step < track.steps and track.interaction is not None:
-        recording.reader("interaction_force", rr.Scalars([float(track.interaction[step])]))
+        recording.log("interaction_force", rr.Scalars([float(track.interaction[step])]))
     for moment in track.moments:
         if min(moment.step, track.steps) == step:
-            recording.reader("events", rr.TextLog(f"{moment.kind} {moment.detail}".strip()))
+            recording.log("events", rr.TextLog(f"{moment.kind} {moment.detail}".strip()))
 
 
 def _closed(corners: Sequence[Point]) -> list[Point]:
