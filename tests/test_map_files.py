@@ -31,7 +31,7 @@ def test_the_maps_of_a_file(tmp_path):
     assert wide.squares == (((600.0, 100.0), 120), ((600.0, 500.0), 60))
     assert (first.start[2], second.start[2]) == (0.0, math.pi / 2)
     assert free == MapConfig((240, 300, 3.14), (960, 420))
-    assert wide.named == ScenarioName("lab-doors-wide", "lab-doors", "1", chosen.digest, 2)
+    assert wide.name == ScenarioName("lab-doors-wide", "lab-doors", "1", chosen.digest, 2)
     names = [get_task().identify(config)[0] for config in chosen.scenarios]
     assert names == ["lab-doors-wide", "lab-doors-turned-0deg", "lab-doors-turned-90deg", "lab-doors-02"]
     assert chosen.weights == (2, 1, 1, 1)
@@ -139,7 +139,7 @@ def test_maps_that_nobody_can_carry(tmp_path):
         "maps[7].obstacles[1]",
     ]  # fmt: skip
     assert "maps[0].start (line 4): the table at (590, 300), 180 degrees, starts inside an obstacle" in said(path)
-    assert any("out of reach: no way for a table of this length" in problem for problem in said(path))
+    assert any("out of reach: the table cannot pass the obstacles" in problem for problem in said(path))
 
 
 def test_the_same_map_twice_whatever_the_order_of_its_obstacles(tmp_path):

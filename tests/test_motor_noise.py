@@ -53,7 +53,7 @@ def test_rate_and_length_of_pauses():
     active_min = 60 * (1 - 6.0 * 0.8 / 60)
     assert motor.pauses == pytest.approx(6.0 * active_min, abs=3 * math.sqrt(6.0 * active_min))
     weak = stretches(force[:, 0] < 0.25)
-    # The force falls by half within three steps and comes back as fast, so that it is below half for as long as the pause.
+    # The force falls by half within three steps and comes back as fast: it is below half for as long as the pause.
     assert weak.min() >= 0.4 * RECORD_HZ - 2
     assert np.mean(weak) == pytest.approx(0.8 * RECORD_HZ, rel=0.06)
     assert force[:, 0].min() < 0.01

@@ -254,10 +254,26 @@ def test_goals_to_the_left_are_reached_too():
     [
         (lambda: simulated_pair(ONE_OBSTACLE, "S99", 0), UnknownNameError, "unknown simulated pair 'S99'; available: "),
         (lambda: simulated_pair(ONE_OBSTACLE, "S01", -1), InvalidValueError, "seed: expected a whole number, not neg"),
-        (lambda: ScriptedPlayer(2, ONE_OBSTACLE, PlayerProfile(), 0), InvalidValueError, "player: expected 0 or 1, found 2"),
-        (lambda: PlayerProfile(speed=0.0), InvalidValueError, "PlayerProfile.speed: expected a positive number, found 0.0"),
-        (lambda: PlayerProfile(noise=-0.1), InvalidValueError, "PlayerProfile.noise: expected a finite number, not negative, f"),
-        (lambda: PlayerProfile(impulsiveness=1.5), InvalidValueError, "PlayerProfile.impulsiveness: expected at most 1, found 1.5"),
+        (
+            lambda: ScriptedPlayer(2, ONE_OBSTACLE, PlayerProfile(), 0),
+            InvalidValueError,
+            "player: expected 0 or 1, found 2",
+        ),
+        (
+            lambda: PlayerProfile(speed=0.0),
+            InvalidValueError,
+            "PlayerProfile.speed: expected a positive number, found 0.0",
+        ),
+        (
+            lambda: PlayerProfile(noise=-0.1),
+            InvalidValueError,
+            "PlayerProfile.noise: expected a finite number, not negative, f",
+        ),
+        (
+            lambda: PlayerProfile(impulsiveness=1.5),
+            InvalidValueError,
+            "PlayerProfile.impulsiveness: expected at most 1, found 1.5",
+        ),
         (
             lambda: routes(MapConfig((240, 300, 0), (960, 300), ((960, 300),), 150), 2.0),
             InvalidValueError,

@@ -6,8 +6,8 @@
 The profiles of the players were tuned on these very aggregates (time, clearance, shares of the human route labels), so
 agreement with people is a fit, not a finding; nothing here was measured on people but the labels.
 
-The chosen routes are read by letting the players act once more on the recorded states; their actions must come out bit for
-bit, so recordings of other players are refused.
+The chosen routes are read by letting the players act once more on the recorded states; their actions must come out bit
+for bit, so recordings of other players are refused.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""The map and the table as figures and pages draw them."""
+"""Vector outline of the map and the table, for figures, pages and screens."""
 
 import math
 

@@ -219,7 +219,7 @@ def _configuration(task: PairTask, entry: dict[str, Any]) -> Any:
     config = task.scenario_of_json(json.dumps({name: value for name, value in entry.items() if name not in columns}))
     if "map_set_digest" not in entry or not hasattr(config, "named"):
         return config
-    return replace(config, named=ScenarioName(*(entry[name] for name in columns)))
+    return replace(config, name=ScenarioName(*(entry[name] for name in columns)))
 
 
 def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Scripted players: each acts at one end of the table and observes only the table's state.
 
-Importing `scripted_player` loads scipy; it is deferred until a player is made, so that command-line flags can list names.
+`scripted_player` and with it scipy are imported when a player is made, so that command-line flags can list names.
 """
 
 from .players import scripted_robot, simulated_pair, simulated_partner

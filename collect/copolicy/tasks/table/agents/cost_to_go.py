@@ -107,7 +107,7 @@ def _extra_cost(space: np.ndarray, tight: float, wide: float) -> np.ndarray:
 
 @functools.lru_cache(maxsize=64)
 def _fence(centre: tuple[float, float], axis: int, side: int) -> np.ndarray:
-    """Moves that cross the line from an obstacle to the edge of the window, at a right angle to the path's main axis."""
+    """Moves that cross the line from an obstacle to the edge of the window, at a right angle to the path's axis."""
     moves = grid.moves()
     across = np.broadcast_to(grid.poses()[axis], grid.SHAPE).ravel()
     along = np.broadcast_to(grid.poses()[1 - axis], grid.SHAPE).ravel()

@@ -95,7 +95,7 @@ class RouteChoice:
         return ahead_x - x, ahead_y - y, turn
 
     def update(self, pose: tuple[float, float, float], speed: float, force: PartnerForce) -> None:
-        """Keeps or changes the route, by the pose (px, px, rad), the speed (px/s) and the partner's force; once a step."""
+        """Keeps or changes the route, by pose (px, px, rad), speed (px/s) and the partner's force; once a step."""
         cell = grid.cell(*pose)
         shortest = min(self._routes, key=lambda route: route.cost[cell])
         limit = shortest.cost[cell] + _DETOUR

@@ -1,4 +1,4 @@
-"""How the table and its maps look on the screen."""
+"""Draws the table and its maps on the screen."""
 
 from copolicy.collect.screen.outline_view import OutlineView, shrunk
 from copolicy.collect.screen.palette import (
@@ -24,7 +24,7 @@ from ..scene_outline import TableOutline, board_outline
 
 
 class TableView(OutlineView):
-    """Draws one map and the table on it: the outline, with rings in the goal, stripes, and boards of wood."""
+    """Draws a map and the table as outlines, with rings in the goal, striped obstacles and a wooden board."""
 
     def __init__(self, map_config: MapConfig):
         super().__init__(TableOutline(), map_config)
@@ -70,8 +70,8 @@ def _draw_goal(surface: pygame.Surface, centre: Point, size: float) -> None:
     square.center = (round(centre[0]), round(centre[1]))
     pygame.draw.rect(surface, mix(GREEN, FLOOR, 0.62), square)
     with SmoothPatch(surface, [centre], size / 2) as patch:
-        for share, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
-            patch.circle(colour, centre, share * size)
+        for radius, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
+            patch.circle(colour, centre, radius * size)
     pygame.draw.rect(surface, GREEN, square, max(2, round(size / 28)))
 
 

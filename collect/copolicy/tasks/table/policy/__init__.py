@@ -1,4 +1,4 @@
-"""What the table offers to policies beside the generic input: torch modules, imported by `TableTask.features` alone."""
+"""Observation encoders and symmetries of the table for policies; torch, imported by `TableTask.features` only."""
 
 from copolicy.dataset.task import PolicyFeatures
 

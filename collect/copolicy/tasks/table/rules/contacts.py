@@ -9,7 +9,7 @@ from copolicy.dataset.checks.finding import Finding
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.dataset.task_parts import Rule
 
-from ..features import sizes_of
+from ..features import parse_sizes
 from ..map_config import MAX_OBSTACLES, WINDOW
 from ..physics import GOAL_SIZE
 from ..spec import SPEC
@@ -64,7 +64,7 @@ def _obstacle_sides(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
     if "obstacle_sizes" in table.columns:
         texts = table.of_framed("obstacle_sizes")
         for place in np.flatnonzero(texts != ""):
-            own = sizes_of(str(texts[place]))[:MAX_OBSTACLES]
+            own = parse_sizes(str(texts[place]))[:MAX_OBSTACLES]
             smallest[place, : len(own)] = largest[place, : len(own)] = own
     return smallest, largest
 

@@ -17,7 +17,7 @@ from copolicy.dataset.lerobot_folder.exclusions import FLAG
 from copolicy.dataset.scenarios import DISPLACED
 from copolicy.dataset.task_parts import Rule
 
-from ..features import map_of
+from ..features import map_from_vector
 from ..map_config import MapConfig
 from ..maps import MAP_SETS, map_set
 
@@ -34,7 +34,7 @@ def _named(table: EpisodeTable) -> Iterator[Finding]:
             continue
         if not name:
             yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
-        elif family != "custom" and named_map(name) is None:
+        elif family != "custom" and map_by_name(name) is None:
             yield Finding(label, "map_name", name, "a map of a set", "error", "map_id is not the name of a known map")
         elif group != family and not (group == "paper36" and family == "training"):
             yield Finding(label, "map_name", group, family, "error", "map_set is not the set of map_id")
@@ -56,11 +56,11 @@ def _rows(table: EpisodeTable) -> Iterator[Finding]:
     files: dict[tuple[str, str], MapConfig] = {}
     for place, row in zip(table.framed, rows, strict=True):
         name, digest = (str(table.columns[column][place]) for column in ("map_id", "map_set_digest"))
-        expected = None if digest else named_map(name)
+        expected = None if digest else map_by_name(name)
         if expected is None and not digest:
             continue
         try:
-            found = map_of(row, MapConfig.obstacle_size)
+            found = map_from_vector(row, MapConfig.obstacle_size)
         except CopolicyError as error:
             yield Finding(table.labels[place], "map_rows", None, None, "error", str(error))
             continue
@@ -89,7 +89,7 @@ def _obstacle_sizes(table: EpisodeTable) -> Iterator[Finding]:
         if size <= 0 or digest:
             continue  # a data set of an earlier version; a map of a file, where each obstacle has a size of its own
         sizes.setdefault(group, Counter())[f"of {size} px"] += 1
-        expected = named_map(name)
+        expected = map_by_name(name)
         if expected is not None and expected.obstacle_size != size:
             message = f"the obstacles of {name} have another side, px"
             yield Finding(label, "obstacle_size", size, expected.obstacle_size, "error", message)
@@ -114,7 +114,7 @@ def map_distance(found: MapConfig, expected: MapConfig, start: bool = True) -> f
 
 
 @functools.cache
-def named_map(name: str) -> MapConfig | None:
+def map_by_name(name: str) -> MapConfig | None:
     """The map behind a `map_id`, by the names that `task.identify` gives; None if it is of no set."""
     match = re.fullmatch(r"([a-z0-9]+)-(\d+)(?:-(\d+)deg)?", name.removesuffix(DISPLACED))
     if match is None or match[1] not in MAP_SETS or int(match[2]) >= len(MAP_SETS[match[1]]):
