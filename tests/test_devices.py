@@ -9,7 +9,7 @@ import pytest
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.cli import main
-from copolicy.collect.devices import follow_pads, list_devices, open_pads, table, watch
+from copolicy.collect.devices import list_devices, open_gamepads, poll_gamepads, table, watch
 from copolicy.collect.inputs import CalibrationStore, StickCalibration
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError, RunError
@@ -27,7 +27,7 @@ def sticks():
 
 def test_every_pad_is_listed_with_what_it_is(tmp_path, sticks):
     calibrations = CalibrationStore(tmp_path)
-    left, right = list_devices(open_pads(), calibrations)
+    left, right = list_devices(open_gamepads(), calibrations)
     assert left | {"guid": ""} == {
         "instance": sticks[0].instance_id, "name": "Left pad", "guid": "", "axes": 4, "buttons": 10, "hats": 1,
         "calibrated": False,
@@ -36,28 +36,28 @@ def test_every_pad_is_listed_with_what_it_is(tmp_path, sticks):
     assert left["guid"] != right["guid"]
     assert len(left["guid"]) == 32
     calibrations.put(right["guid"], StickCalibration())
-    assert [one["calibrated"] for one in list_devices(open_pads(), calibrations)] == [False, True]
+    assert [one["calibrated"] for one in list_devices(open_gamepads(), calibrations)] == [False, True]
 
 
 def test_pads_are_found_where_the_events_that_told_of_them_are_gone(sticks):
     pygame.event.get()
-    assert len(open_pads()) == 2
+    assert len(open_gamepads()) == 2
 
 
 def test_events_of_a_window_are_left_to_it(sticks):
-    pads = open_pads()
+    pads = open_gamepads()
     key = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a)
     pygame.event.post(key)
     sticks[0].move(1.0, 0.0)
     sticks[1].unplug()
-    assert [pad.name for pad in follow_pads(pads)] == ["Right pad"]
+    assert [pad.name for pad in poll_gamepads(pads)] == ["Right pad"]
     kinds = [event.type for event in pygame.event.get()]
     assert pygame.KEYDOWN in kinds
     assert not {pygame.JOYAXISMOTION, pygame.JOYDEVICEREMOVED} & set(kinds)
 
 
 def test_the_table_aligns(sticks, tmp_path):
-    lines = table(list_devices(open_pads(), CalibrationStore(tmp_path)))
+    lines = table(list_devices(open_gamepads(), CalibrationStore(tmp_path)))
     assert lines[0].split() == ["instance", "name", "guid", "axes", "buttons", "hats", "calibrated"]
     assert len({line.index(word) for line, word in zip(lines, ("guid", "ff", "ff"), strict=True)}) == 1
     assert [line.split()[-1] for line in lines[1:]] == ["no", "no"]
@@ -85,7 +85,7 @@ def move_while_watched(sticks):
 def test_the_test_shows_and_remembers_what_moved(tmp_path, sticks, kind):
     out = kind()
     player = threading.Thread(target=move_while_watched, args=(sticks,))
-    pads = open_pads()
+    pads = open_gamepads()
     player.start()
     found = watch(pads, CalibrationStore(tmp_path), 0.8, out)
     player.join()
@@ -108,11 +108,11 @@ def test_the_test_shows_and_remembers_what_moved(tmp_path, sticks, kind):
 def test_nothing_to_watch(tmp_path, sticks):
     calibrations = CalibrationStore(tmp_path)
     with pytest.raises(InvalidValueError, match="seconds: expected a positive number, found 0"):
-        watch(open_pads(), calibrations, 0, io.StringIO())
+        watch(open_gamepads(), calibrations, 0, io.StringIO())
     for stick in sticks:
         stick.unplug()
     with pytest.raises(RunError, match="expected at least one pad, found none plugged in"):
-        watch(open_pads(), calibrations, 1.0, io.StringIO())
+        watch(open_gamepads(), calibrations, 1.0, io.StringIO())
 
 
 def test_the_command(tmp_path, sticks, capsys):

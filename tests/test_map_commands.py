@@ -192,7 +192,7 @@ def test_the_plan_of_a_human_study_keeps_the_names_of_a_file(tmp_path):
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(plan.to_json()), encoding="utf-8")
     read = StudyPlan.read(path)
-    assert [config.name for config in read.configurations] == [config.name for config in starts]
+    assert [config.named for config in read.configurations] == [config.named for config in starts]
     assert [config.sizes for config in read.configurations] == [config.sizes for config in starts]
     assert read.map_set["map_set"]["digest"] == chosen.digest
 

@@ -31,7 +31,7 @@ def test_the_maps_of_a_file(tmp_path):
     assert wide.squares == (((600.0, 100.0), 120), ((600.0, 500.0), 60))
     assert (first.start[2], second.start[2]) == (0.0, math.pi / 2)
     assert free == MapConfig((240, 300, 3.14), (960, 420))
-    assert wide.name == ScenarioName("lab-doors-wide", "lab-doors", "1", chosen.digest, 2)
+    assert wide.named == ScenarioName("lab-doors-wide", "lab-doors", "1", chosen.digest, 2)
     names = [get_task().identify(config)[0] for config in chosen.scenarios]
     assert names == ["lab-doors-wide", "lab-doors-turned-0deg", "lab-doors-turned-90deg", "lab-doors-02"]
     assert chosen.weights == (2, 1, 1, 1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from play_session import SimulatedClock, settings
 
-from copolicy.collect.agents import HeldAgent, PersonAgent, PolicyAgent, ReplayAgent
+from copolicy.collect.agents import ConstantAgent, PersonAgent, PolicyAgent, ReplayAgent
 from copolicy.collect.cli import main
 from copolicy.collect.episodes import run_episodes
 from copolicy.collect.inputs import HALVES, InputSample
@@ -353,7 +353,7 @@ def test_a_policy_holds_its_actions_at_the_rate_of_the_task(peg):
             return np.full((1, 1, 2), self.frame / 100)
 
     robot = PolicyAgent(Counting(), peg)
-    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, HeldAgent(np.zeros(1))))
+    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, ConstantAgent(np.zeros(1))))
     taken = []
     for _ in range(6):
         rollout.step()
@@ -374,7 +374,7 @@ def test_the_loop_is_measured_at_the_rate_of_the_task():
 
 
 def test_a_policy_is_filmed_with_a_simulated_partner(peg):
-    from copolicy.collect.demonstration.film import SIZE, demonstrate, pictures
+    from copolicy.collect.demonstration.video import SIZE, demonstrate, pictures
 
     class Pushing:
         """Both push to the right, gently."""

@@ -12,7 +12,7 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.cli import main
-from copolicy.collect.rollout import Start
+from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.log import read_episode
@@ -57,7 +57,7 @@ class Counter:
 
 
 def begin(agent, config=MAP, seat=0, seed=0):
-    agent.begin(seat, [Start(config, seed, TableWorld(config).observation)])
+    agent.begin(seat, [EpisodeStart(config, seed, TableWorld(config).observation)])
 
 
 @pytest.fixture

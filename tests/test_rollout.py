@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.collect.agents import HeldAgent, RecordedAgent, ScriptedAgent
+from copolicy.collect.agents import ConstantAgent, RecordedAgent, ScriptedAgent
 from copolicy.collect.rollout import Agent, Rollout, Trace
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.task import get_task
@@ -36,7 +36,7 @@ class Listener(Agent):
 
 
 def pairs(seed=0, maps=MAPS, **settings):
-    agents = (ScriptedAgent.of_pair("S01"), ScriptedAgent.of_pair("S01"))
+    agents = (ScriptedAgent.from_pair("S01"), ScriptedAgent.from_pair("S01"))
     return Rollout(TASK, maps, agents, seeds=[seed + k for k in range(len(maps))], **settings)
 
 
@@ -71,7 +71,7 @@ def test_worlds_side_by_side_go_as_each_alone():
 
 
 def test_steps_can_be_bounded_and_can_go_beyond_the_end():
-    agents = (HeldAgent(np.array([-1.0, 0.0])), HeldAgent(np.array([-1.0, 0.0])))
+    agents = (ConstantAgent(np.array([-1.0, 0.0])), ConstantAgent(np.array([-1.0, 0.0])))
     short = Rollout(TASK, MAPS[:1], agents)
     short.run(5)
     assert short.worlds[0].step_count == 5
@@ -92,7 +92,7 @@ def test_recorded_actions_end_with_rest():
 def test_a_task_without_simulated_players_says_so(monkeypatch):
     monkeypatch.setattr(TableTask, "agents", None)
     with pytest.raises(CopolicyError, match=r"^left out: the task 'table' has no agents$"):
-        ScriptedAgent.of_pair("S01")
+        ScriptedAgent.from_pair("S01")
 
 
 def test_a_table_with_exchanged_seats_moves_in_the_same_way():

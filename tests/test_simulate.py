@@ -90,9 +90,9 @@ def numbers(folder):
 
 
 def test_equal_seeds_give_equal_bytes_for_one_and_two_workers(tmp_path):
-    one = simulate(tmp_path / "one", 4, 5, workers=1, physics=SHORT, started_ns=STARTED_NS)
-    two = simulate(tmp_path / "two", 4, 5, workers=2, physics=SHORT, started_ns=STARTED_NS)
-    later = simulate(tmp_path / "later", 3, 5, workers=1, physics=SHORT)
+    one = simulate(tmp_path / "one", 4, 5, workers=1, settings=SHORT, started_ns=STARTED_NS)
+    two = simulate(tmp_path / "two", 4, 5, workers=2, settings=SHORT, started_ns=STARTED_NS)
+    later = simulate(tmp_path / "later", 3, 5, workers=1, settings=SHORT)
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == [f"episode_{i:06d}.mcap" for i in range(4)]
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
@@ -102,14 +102,14 @@ def test_equal_seeds_give_equal_bytes_for_one_and_two_workers(tmp_path):
 
 
 def test_other_seeds_give_other_episodes(tmp_path):
-    simulate(tmp_path / "one", 2, 5, workers=1, physics=SHORT)
-    simulate(tmp_path / "two", 2, 6, workers=1, physics=SHORT)
+    simulate(tmp_path / "one", 2, 5, workers=1, settings=SHORT)
+    simulate(tmp_path / "two", 2, 6, workers=1, settings=SHORT)
     assert not set(numbers(tmp_path / "one").values()) & set(numbers(tmp_path / "two").values())
 
 
 def test_episodes_say_where_they_come_from(tmp_path):
     pair = sorted(PAIRS)[0]
-    summary = simulate(tmp_path, 3, 1, "unseen", workers=1, orientations=True, pairs=[pair], physics=SHORT)
+    summary = simulate(tmp_path, 3, 1, "unseen", workers=1, orientations=True, pairs=[pair], settings=SHORT)
     assert (summary["episodes"], summary["success_rate"]) == (3, 0.0)
     assert summary["termination_reasons"] == {"timeout": 3}
     assert summary["bytes"] == sum(path.stat().st_size for path in tmp_path.iterdir())

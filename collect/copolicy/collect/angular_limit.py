@@ -10,16 +10,16 @@ from copolicy.dataset.task import PairTask
 ANGULAR_LIMITS = {"pi/2": math.pi / 2, "pi/8": math.pi / 8}
 """Bounds that recordings are made with, rad/s^2."""
 
-LIMIT = "angular_acceleration_limit"
+LIMIT_SETTING = "angular_acceleration_limit"
 """The setting of a world behind the flag."""
 
 
 def angular_limit_of(settings: Any) -> float | None:
     """The bound in the settings of a world; None where they have none."""
-    return getattr(settings, LIMIT, None)
+    return getattr(settings, LIMIT_SETTING, None)
 
 
-def limited(task: PairTask, settings: Any, limit: str | float) -> Any:
+def with_angular_limit(task: PairTask, settings: Any, limit: str | float) -> Any:
     """Settings with a bound, in rad/s^2 or by its name.
 
     Raises:
@@ -31,4 +31,4 @@ def limited(task: PairTask, settings: Any, limit: str | float) -> Any:
         if limit not in ANGULAR_LIMITS:
             raise InvalidValueError("angular limit", f"one of {sorted(ANGULAR_LIMITS)}", limit)
         limit = ANGULAR_LIMITS[limit]
-    return replace(settings, **{LIMIT: limit})
+    return replace(settings, **{LIMIT_SETTING: limit})

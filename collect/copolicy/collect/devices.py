@@ -26,7 +26,7 @@ _OF_JOYSTICKS = (
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
-def open_pads(config_folder: Path | None = None) -> Pads:
+def open_gamepads(config_folder: Path | None = None) -> Pads:
     """All pads that are plugged in; needs neither a window nor a display.
 
     Args:
@@ -44,7 +44,7 @@ def open_pads(config_folder: Path | None = None) -> Pads:
     return pads
 
 
-def follow_pads(pads: Pads) -> list[Pad]:
+def poll_gamepads(pads: Pads) -> list[Pad]:
     """Reads the sticks, and the events of plugging and unplugging; returns the pads that went.
 
     Takes all events of joysticks from the queue, so that it never fills up, and leaves those of the window.
@@ -112,7 +112,7 @@ def watch(
     height, lines = 0, []
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        for pad in follow_pads(pads):
+        for pad in poll_gamepads(pads):
             found[pad.instance_id]["unplugged"] = True
         lines = []
         for pad in pads:
@@ -132,7 +132,7 @@ def watch(
 
 def devices_command(seconds: float | None, as_json: bool, config_folder: Path | None = None) -> dict[str, Any]:
     """What the command does: prints the table or the live test, and returns its summary."""
-    pads = open_pads(config_folder)
+    pads = open_gamepads(config_folder)
     calibrations = CalibrationStore(config_folder or user_config_folder())
     devices = list_devices(pads, calibrations)
     if not as_json:

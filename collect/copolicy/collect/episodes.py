@@ -11,7 +11,7 @@ from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import TABLE, get_task
 
-from .agents.named import make_agent
+from .agents.agent_names import make_agent
 from .agents.policy import PolicyAgent
 from .rollout import Agent, Rollout, Trace
 
@@ -62,7 +62,7 @@ def run_episodes(
     if human is None:
         if not isinstance(first, PolicyAgent):
             raise InvalidValueError("robot", "a policy, which acts for both players", first.name)
-        second: Agent = first.other_half()
+        second: Agent = first.human_half()
     else:
         second = make_agent(human, task) if isinstance(human, str) else human
     for agent in (first, second):
@@ -73,11 +73,12 @@ def run_episodes(
     trace = Trace(rollout)
     rollout.run()
     return [
-        episode_of(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
+        episode_from_trace(rollout, trace, index, scenario, seed + index, settings)
+        for index, scenario in enumerate(scenarios)
     ]
 
 
-def episode_of(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+def episode_from_trace(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
     """What happened in a world of a rollout, from its start to its end, as an episode."""
     task, outcome = rollout.task, rollout.outcomes[index]
     states, actions = task.states_of(trace.states(index)), trace.actions(index)

@@ -10,7 +10,7 @@ from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import RUNNING, Outcome, PairTask, World
 
 
-class Start(NamedTuple):
+class EpisodeStart(NamedTuple):
     """What an agent is told before an episode.
 
     Attributes:
@@ -40,7 +40,7 @@ class Agent(ABC):
     is_person: bool = False
     input: PlayerInput | None = None
 
-    def begin(self, seat: int, starts: Sequence[Start]) -> None:  # noqa: B027 (nothing to prepare is the usual case)
+    def begin(self, seat: int, starts: Sequence[EpisodeStart]) -> None:  # noqa: B027 (nothing to prepare is the usual case)
         """Episodes begin side by side, one in each world; seat 0 is the robot's."""
 
     @abstractmethod
@@ -112,7 +112,7 @@ class Rollout:
         if begin:
             seeds = seeds or [0] * len(self.worlds)
             starts = [
-                Start(scenario, seed, world.observation)
+                EpisodeStart(scenario, seed, world.observation)
                 for scenario, seed, world in zip(scenarios, seeds, self.worlds, strict=True)
             ]
             for seat, agent in enumerate(agents):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
-from copolicy.collect.angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
+from copolicy.collect.angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, FIGURES, POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number, seed
@@ -102,7 +102,7 @@ def protocol_of(arguments: argparse.Namespace, policies: Iterable[tuple[str, Tra
             logging.info("%s: %s", name, note)
     task = _one_task({name: conditions.task for name, conditions in named})
     usual, limit_flag = usual_settings(task, arguments.step_limit), arguments.angular_limit
-    worlds = {name: replace(conditions.physics, step_limit=usual.step_limit) for name, conditions in named}
+    worlds = {name: replace(conditions.settings, step_limit=usual.step_limit) for name, conditions in named}
     if limit_flag is None and len(set(worlds.values())) > 1:
         found = {name: task.settings_summary(world) for name, world in worlds.items()}
         if angular_limit_of(usual) is not None:
@@ -112,10 +112,10 @@ def protocol_of(arguments: argparse.Namespace, policies: Iterable[tuple[str, Tra
     physics = next(iter(worlds.values()), usual)
     contradictions: list[str] = []
     if limit_flag is not None:
-        physics = limited(task, physics, limit_flag)
+        physics = with_angular_limit(task, physics, limit_flag)
         contradictions += [
             f"--angular-limit {limit_flag}: {name} learned with {limit:.4g} rad/s^2"
-            for name, limit in ((name, getattr(world, LIMIT)) for name, world in worlds.items())
+            for name, limit in ((name, getattr(world, LIMIT_SETTING)) for name, world in worlds.items())
             if not math.isclose(limit, ANGULAR_LIMITS[limit_flag])
         ]
     fps_flag = getattr(arguments, "fps", None)
@@ -146,7 +146,7 @@ def usual_settings(task: PairTask, step_limit: int | None = None) -> Any:
 
 def stated_settings(task: PairTask, physics: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """What results and plans state of a world: those that flags set, and all where others are unusual."""
-    names = [field.name for field in fields(physics) if field.name in ("step_limit", LIMIT)]
+    names = [field.name for field in fields(physics) if field.name in ("step_limit", LIMIT_SETTING)]
     stated = {name: getattr(physics, name) for name in sorted(names, reverse=True)}
     return stated, ({} if physics == task.settings_type(**stated) else {"physics": asdict(physics)})
 

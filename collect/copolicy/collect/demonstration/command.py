@@ -66,7 +66,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.
     from ..agents import load_policy
-    from ..agents.simulated import pair_name
+    from ..agents.simulated_players import pair_name
     from ..replay.film import save_gif
     from ..replay.pictures import picture_count
     from .film import SIZE, demonstrate, pictures
@@ -74,7 +74,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     task.required_outline  # noqa: B018 (a film needs one)
     partner = pair_name(task, arguments.partner)
     policy = load_policy(arguments.policy)
-    physics = policy.conditions.physics
+    physics = policy.conditions.settings
     tracks = [demonstrate(policy, maps[place], partner, arguments.seed, physics, task) for place in arguments.map]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)

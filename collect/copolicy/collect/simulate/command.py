@@ -24,7 +24,7 @@ from copolicy.dataset.scenarios import DISPLACED
 from copolicy.dataset.task import TABLE, PairTask, get_task
 from copolicy.dataset.worker_pool import WorkerPool
 
-from ..agents.simulated import pair_name, simulated_players
+from ..agents.simulated_players import pair_name, simulated_players
 from ..recording.episode_file import PART_SUFFIX
 from ..recording.wall_clock import WallClockAnchor
 from .episode_job import EpisodeJob, EpisodeResult

@@ -31,7 +31,7 @@ class EpisodeJob:
     def record(self) -> "EpisodeResult":
         """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, act until the episode ends."""
         task = get_task(self.task)
-        robot, human = (ScriptedAgent.of_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
+        robot, human = (ScriptedAgent.from_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
         agents = (robot, human)
         return record_episode(self.path, self.scenario, agents, self.meta, self.anchor, self.settings, self.task)
 

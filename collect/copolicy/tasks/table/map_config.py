@@ -30,7 +30,7 @@ class MapConfig:
         obstacle_size: side of the squares, px (50 in the training family, 45 in the paper's evaluation); of the largest
             where they differ.
         obstacle_sizes: side of each square, px, where they differ; empty where they are equal. `sizes` is always full.
-        name: name and set of a map from a map file; not compared and not in the JSON.
+        named: name and set of a map from a map file; not compared and not in the JSON.
     """
 
     start: tuple[float, float, float]
@@ -38,7 +38,7 @@ class MapConfig:
     obstacles: tuple[tuple[float, float], ...] = ()
     obstacle_size: int = 50
     obstacle_sizes: tuple[int, ...] = ()
-    name: ScenarioName | None = field(default=None, compare=False, repr=False)
+    named: ScenarioName | None = field(default=None, compare=False, repr=False)  # the field's name is in plan digests
 
     def __post_init__(self):
         object.__setattr__(self, "start", tuple(float(value) for value in self.start))

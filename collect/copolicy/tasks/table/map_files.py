@@ -169,7 +169,7 @@ def _check_texts(document: Document, content: MapFile, problems: list[Problem]) 
 
 
 def _configs(document: Document, path: str, entry: Map, number: str, problems: list[Problem]) -> list[MapConfig]:
-    """The map in each of its orientations, with its name within the file; adds what is wrong at `path` to `problems`."""
+    """The map in each of its orientations, named as in its file; adds what is wrong at `path` to `problems`."""
     start = entry.start
     if (start.theta is None) == (start.orientations is None):
         problems.append(document.problem(f"{path}.start", "expected either theta or orientations"))
@@ -198,7 +198,7 @@ def _configs(document: Document, path: str, entry: Map, number: str, problems: l
     obstacles = tuple((obstacle.x, obstacle.y) for obstacle in entry.obstacles)
     sizes = tuple(obstacle.size for obstacle in entry.obstacles)
     configs = [
-        MapConfig((start.x, start.y, angle), (entry.goal.x, entry.goal.y), obstacles, obstacle_sizes=sizes, name=name)
+        MapConfig((start.x, start.y, angle), (entry.goal.x, entry.goal.y), obstacles, obstacle_sizes=sizes, named=name)
         for angle in angles
     ]
     return configs if start.orientations is None else [start_at(config, config.start[2]) for config in configs]
@@ -227,9 +227,9 @@ def _splits(
 
 
 def _with_name(config: MapConfig, map_set: ScenarioSet, weight: int) -> MapConfig:
-    assert config.name is not None
-    name = f"{map_set.name}-{config.name.scenario}"
-    return replace(config, name=ScenarioName(name, map_set.name, map_set.version, map_set.digest, weight))
+    assert config.named is not None
+    name = f"{map_set.name}-{config.named.scenario}"
+    return replace(config, named=ScenarioName(name, map_set.name, map_set.version, map_set.digest, weight))
 
 
 def _as_entry(config: MapConfig) -> dict[str, Any]:

@@ -119,8 +119,8 @@ def identify(config: MapConfig) -> tuple[str, str]:
         36, its name in the training family), `("training-17-90deg", "training")` for one of its start orientations,
         the name in its file for a map of a file, `("custom-1a2b3c4d", "custom")` for any other.
     """
-    if config.name is not None:
-        return config.name[:2]
+    if config.named is not None:
+        return config.named[:2]
     name = _names().get(config.digest)
     return (name, name.split("-")[0]) if name else (f"custom-{config.digest}", "custom")
 
@@ -141,7 +141,7 @@ def turned(map_set: ScenarioSet) -> ScenarioSet:
     """A set with each map in the four start orientations, which replace the orientations that a map file gives."""
     bases: dict[Any, tuple[MapConfig, int]] = {}
     for index, (config, weight) in enumerate(zip(map_set.scenarios, map_set.weights, strict=True)):
-        bases.setdefault(index if config.name is None else _ANGLE.sub("", config.name.scenario), (config, weight))
+        bases.setdefault(index if config.named is None else _ANGLE.sub("", config.named.scenario), (config, weight))
     scenarios = tuple(turned for config, _ in bases.values() for turned in _orientations(config))
     weights = tuple(weight for _, weight in bases.values() for _ in _ORIENTATIONS)
     return replace(map_set, scenarios=scenarios, weights=weights)
@@ -149,11 +149,11 @@ def turned(map_set: ScenarioSet) -> ScenarioSet:
 
 def start_at(config: MapConfig, theta: float) -> MapConfig:
     """A map with another start orientation (rad), which is added to a name from a file in degrees."""
-    name = config.name
+    name = config.named
     if name is not None:
         base = _ANGLE.sub("", name.scenario)
         name = name._replace(scenario=f"{base}-{round(math.degrees(theta)) % 360}deg")
-    return replace(config, start=(*config.start[:2], theta), name=name)
+    return replace(config, start=(*config.start[:2], theta), named=name)
 
 
 def _orientations(config: MapConfig) -> list[MapConfig]:

@@ -12,7 +12,7 @@ from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
 
 from .dynamics import integrate
-from .features import environment_state, map_from_vector, format_sizes, states_7, theta_of
+from .features import environment_state, format_sizes, map_from_vector, states_7, theta_of
 from .interaction import interaction_force
 from .map_config import MapConfig
 from .maps import MAP_SETS, identify, turned
@@ -227,7 +227,7 @@ class TableTask(PairTask):
 
     def name_of(self, scenario: MapConfig) -> ScenarioName:
         """The name of a map from a file, else the name by `identify`."""
-        return scenario.name or super().name_of(scenario)
+        return scenario.named or super().name_of(scenario)
 
     @property
     def scenario_files(self) -> "MapFiles":

@@ -99,7 +99,7 @@ def coplan(
 
 def together(agent: PolicyAgent, maps: Sequence[Any], physics: Any) -> Rollout:
     """A rollout at the start of maps in which both players act on the agent's chunks."""
-    return Rollout(agent.task, maps, (agent, agent.other_half()), settings=physics)
+    return Rollout(agent.task, maps, (agent, agent.human_half()), settings=physics)
 
 
 def traced_to_the_end(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:

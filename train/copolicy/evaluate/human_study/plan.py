@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
-from copolicy.collect.angular_limit import LIMIT
+from copolicy.collect.angular_limit import LIMIT_SETTING
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
@@ -20,7 +20,7 @@ from ..study_flags import usual_settings
 
 _VERSION = 1
 _WHAT = "a plan of copolicy-eval human plan"
-_WORLD = ("step_limit", LIMIT, "physics")
+_WORLD = ("step_limit", LIMIT_SETTING, "physics")
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ def _configuration(task: PairTask, entry: dict[str, Any]) -> Any:
     config = task.scenario_of_json(json.dumps({name: value for name, value in entry.items() if name not in columns}))
     if "map_set_digest" not in entry or not hasattr(config, "named"):
         return config
-    return replace(config, name=ScenarioName(*(entry[name] for name in columns)))
+    return replace(config, named=ScenarioName(*(entry[name] for name in columns)))
 
 
 def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

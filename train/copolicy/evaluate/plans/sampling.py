@@ -92,7 +92,7 @@ def sample_plans(
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
     here, configs = rollout.worlds[0], [config] * samples
     agent = agent.branch(samples)
-    branch = _branched(task, here, (agent, agent.other_half()), configs, physics, begin=False)
+    branch = _branched(task, here, (agent, agent.human_half()), configs, physics, begin=False)
     whole = Trace(branch, trace)
     policy.wanted, wanted = None, policy.wanted
     branch.step()

@@ -7,7 +7,7 @@ from typing import Any
 from copolicy.dataset.task import PairTask, SceneView, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
-from ..episodes import episode_of
+from ..episodes import episode_from_trace
 from ..replay.pictures import LAST_S
 from ..replay.track import Track, sampled, track_of
 from ..rollout import Rollout, Trace
@@ -49,7 +49,7 @@ def demonstrate(
         InvalidValueError: the policy has learned another task.
     """
     task = task or get_task()
-    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
+    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.from_pair(partner, task)
     try:
         rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], settings=settings)
         trace = Trace(rollout)
@@ -58,7 +58,9 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    return track_of(Path(task.name_of(scenario).scenario), episode_of(rollout, trace, 0, scenario, seed, settings))
+    return track_of(
+        Path(task.name_of(scenario).scenario), episode_from_trace(rollout, trace, 0, scenario, seed, settings)
+    )
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
