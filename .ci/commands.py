@@ -47,7 +47,7 @@ def commands(block: Block) -> Iterator[str]:
         line = line.removeprefix("uv run ")  # the caller's PATH has the commands
         if line.startswith("copolicy-collect play "):
             line = re.sub(r"\b(keyboard|joystick)\b", "scripted", line) + " --headless --episodes 1"
-            line += "" if "--pilots" in line else " --pilots scripted scripted"
+            line += "" if "--players" in line else " --players scripted scripted"
         if not line.startswith(_ELSEWHERE):
             yield line
 

@@ -41,7 +41,7 @@ class PersonAgent(Agent):
         """
         if not (len(action) in (1, 2) and all(low <= 0 <= high for low, high in zip(*action.bounds, strict=True))):
             expected = "a task with actions of one or two numbers that can be 0, as a stick has"
-            raise InvalidValueError(f"--pilots {name}", expected, action.names)
+            raise InvalidValueError(f"--players {name}", expected, action.names)
         self.name = name
         self._bounds = action.bounds
         self._device: Pad | KeyboardHalf | None = None
