@@ -241,7 +241,7 @@ def test_a_complete_file_that_only_lacks_its_name_keeps_its_result(tmp_path, who
     truth_path, truth = whole
     (tmp_path / "episode.mcap.part").write_bytes(truth_path.read_bytes())
     (found,) = recover(tmp_path)
-    assert (found.status, found.steps, found.detail) == ("recovered", 95, "it was complete but for its name")
+    assert (found.status, found.steps, found.detail) == ("recovered", 95, "it was complete except for its name")
     episode = read_episode(tmp_path / "episode.recovered.mcap")
     assert episode.final_state.tobytes() == truth.final_state.tobytes()
     meta = episode.meta
