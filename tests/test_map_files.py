@@ -89,8 +89,8 @@ def test_the_digest_is_of_the_content(tmp_path):
         ("180deg", "half", "maps[0].start (line 7): expected rad as a number, or degrees such as 90deg, found 'half'"),
         ("theta: 180deg", "z: 1", "maps[0].start.z (line 7): unknown key; known are x, y, theta, orientations"),
         ("  - start:", "  - name: wide\n    start:", "maps[2].name (line 17): wide is the name of maps[0] too"),
-        ("0deg, 90deg", "90deg, 450deg", "maps[1].start.orientations (line 14): expected orientations that differ by at "
-         "least a degree"),
+        ("0deg, 90deg", "90deg, 450deg", "maps[1].start.orientations (line 14): expected orientations that differ by "
+         "at least a degree"),
         ("[wide, turned]", "[wide, narrow]", "splits.train (line 20): there is no map 'narrow'"),
         ("[2]", "[2, 2]", "splits.test (line 21): expected at least one map, and each once"),
         ("y: 100, size: 120", "y: 40, size: 120", "maps[0].obstacles[0] (line 10): the square of 120 px "

@@ -85,13 +85,7 @@ class Ticker:
 
 
 class LoopStatistics:
-    """Timing of the loop over an episode, without its pauses.
-
-    Attributes:
-        ticks: number of ticks.
-        late: number of late ticks.
-        skipped: number of skipped ticks.
-    """
+    """Timing of the loop over an episode, without its pauses."""
 
     def __init__(self, hz: int = RECORD_HZ):
         self._dt_ns = 10**9 // hz
@@ -131,5 +125,5 @@ class LoopStatistics:
 
     def summary(self) -> str:
         """The detail of the event `loop` in recordings, one line."""
-        p50, p99, most = (self.percentile_ms(percent) for percent in (50, 99, 100))
-        return f"period p50 {p50:.2f} p99 {p99:.2f} max {most:.2f} ms, late {self.late}, skipped {self.skipped}"
+        p50, p99, maximum = (self.percentile_ms(percent) for percent in (50, 99, 100))
+        return f"period p50 {p50:.2f} p99 {p99:.2f} max {maximum:.2f} ms, late {self.late}, skipped {self.skipped}"

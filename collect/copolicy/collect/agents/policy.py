@@ -26,8 +26,7 @@ class Policy(Protocol):
         n_obs_steps: frames of history in an observation.
         n_action_steps: actions of a chunk that are executed before the next chunk.
         fps: frames a second of the data that it learned from.
-        keeps_history: it stores past frames itself; it must be called for each frame of all worlds, and returns one
-            action.
+        keeps_history: it stores past frames itself, so it is called for each frame of all worlds; returns one action.
     """
 
     name: str
@@ -42,11 +41,7 @@ class Policy(Protocol):
         ...
 
     def predict_action_chunk(self, observations: dict[str, np.ndarray], /) -> np.ndarray:
-        """Predicts joint actions `(B, actions, 2 m)` from the newest frame on.
-
-        Args:
-            observations: columns `(B, n_obs_steps, n)`.
-        """
+        """Joint actions `(B, actions, 2 m)` from the newest frame on, for observations `(B, n_obs_steps, n)`."""
         ...
 
 
@@ -156,11 +151,11 @@ class PolicyAgent(Agent):
             if frame > 0:
                 self._observe(states, worlds)
             self._next_action(frame, worlds)
-        own = self.half(self._seat, worlds)
+        actions = self.half(self._seat, worlds)
         if self._worker is not None:
             age = self._clock() - self._observed_ns if self._observed_ns else 0
-            self.input = PlayerInput(axes=own[0].tolist(), age_ns=age)
-        return own
+            self.input = PlayerInput(axes=actions[0].tolist(), age_ns=age)
+        return actions
 
     def half(self, seat: int, worlds: np.ndarray) -> np.ndarray:
         """A seat's half `(B, m)` of the joint actions of the present frame."""

@@ -27,13 +27,14 @@ class RecordedAgent(Agent):
         """Starts from the first action."""
         self._step = 0
         size = self._actions[0].shape[1] // 2
-        self._own = [actions[:, seat * size : (seat + 1) * size] for actions in self._actions]
+        self._own_actions = [actions[:, seat * size : (seat + 1) * size] for actions in self._actions]
         self._zero = np.zeros(size)
 
     def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """The actions of this step."""
         step, self._step = self._step, self._step + 1
-        return np.array([own[step] if step < len(own := self._own[index]) else self._zero for index in worlds])
+        own_actions = [self._own_actions[index] for index in worlds]
+        return np.array([actions[step] if step < len(actions) else self._zero for actions in own_actions])
 
 
 class ReplayAgent(RecordedAgent):

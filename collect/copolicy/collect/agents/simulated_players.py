@@ -16,10 +16,7 @@ def simulated_players(task: PairTask) -> SimulatedPlayers:
 
 
 def pair_name(task: PairTask, name: str | None, label: str = "simulated pair") -> str:
-    """The name of a simulated pair after a check; without a name, that of the task's first pair.
-
-    Args:
-        label: of the name in the error.
+    """Checks the name of a simulated pair, by default that of the task's first pair; errors say `label`.
 
     Raises:
         UnknownNameError: no such pair.

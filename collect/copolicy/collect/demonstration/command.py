@@ -51,15 +51,15 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     task, path = get_task(arguments.task), arguments.out
     scenario_set = task.scenario_set(set_name(task, arguments.maps, "unseen"))
     scenarios = scenario_set.scenarios
-    for name, value, least, most in (
+    for name, value, minimum, maximum in (
         ("seed", arguments.seed, 0, 2**32 - 1),
         ("fps", arguments.fps, 1, 50),
         ("width", arguments.width, 200, 2000),
         ("speed", arguments.speed, 0.1, 20),
         *(("map", index, 0, len(scenarios) - 1) for index in arguments.map),
     ):
-        if not least <= value <= most:
-            raise InvalidValueError(f"--{name}", f"{least} to {most}", value)
+        if not minimum <= value <= maximum:
+            raise InvalidValueError(f"--{name}", f"{minimum} to {maximum}", value)
     if path.suffix.lower() != ".gif":
         raise InvalidValueError("--out", "a name that ends with .gif", str(path))
     if path.exists() and not arguments.overwrite:

@@ -27,10 +27,7 @@ def theta_of(states: np.ndarray) -> np.ndarray:
 
 
 def states_7(states: np.ndarray) -> np.ndarray:
-    """States `(..., 6)` with theta as states `(..., 7)` with its cosine and sine by numpy.
-
-    The last bit can differ from `math.cos`, which `TableWorld.observation` uses.
-    """
+    """States `(..., 6)` with theta as `(..., 7)` with cosine and sine; their last bit may differ from `math.cos`."""
     cosine, sine = np.cos(states[..., 2]), np.sin(states[..., 2])
     return np.concatenate((states[..., :2], cosine[..., None], sine[..., None], states[..., 3:]), axis=-1)
 

@@ -99,8 +99,8 @@ class MapFiles(ScenarioFiles):
         """See `ScenarioFiles.read`."""
         map_set, problems = self._read(path)
         if map_set is None or problems:
-            more = f" (and {len(problems) - 1} more: copolicy-collect maps check)" if len(problems) > 1 else ""
-            raise FileFormatError(path, "maps that can be used", f"{problems[0]}{more}")
+            others = f" (and {len(problems) - 1} more: copolicy-collect maps check)" if len(problems) > 1 else ""
+            raise FileFormatError(path, "maps that can be used", f"{problems[0]}{others}")
         return map_set
 
     def problems(self, path: Path) -> list[Problem]:
@@ -113,10 +113,10 @@ class MapFiles(ScenarioFiles):
 
         if not re.fullmatch(_SET_NAME, name) or name in (*MAP_SETS, "custom"):
             raise InvalidValueError("--name", "lower-case letters, digits, - or _, and no set of the package", name)
-        for key, least, most in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
+        for key, minimum, maximum in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
             low, high = bounds[key]
-            if not least <= math.ceil(low) <= math.floor(high) <= most:
-                expected = f"{key} with a whole number in it, from {least} to {most}"
+            if not minimum <= math.ceil(low) <= math.floor(high) <= maximum:
+                expected = f"{key} with a whole number in it, from {minimum} to {maximum}"
                 raise InvalidValueError("--bounds", expected, f"{key}={low:g}:{high:g}")
         maps = [_as_entry(config) for config in random_maps(count, seed, bounds)]
         text = ", ".join(f"{key}={low:g}:{high:g}" for key, (low, high) in bounds.items())
@@ -189,8 +189,8 @@ def _configs(document: Document, path: str, entry: Map, number: str, problems: l
                 problems.append(document.problem(f"{path}.start", message))
             radians = math.radians(float(angle[:-3])) if isinstance(angle, str) else float(angle or 0.0)
             angles.append(radians % (2 * math.pi))
-    whole = [round(math.degrees(angle)) % 360 for angle in angles]
-    if start.orientations is not None and (not angles or len(set(whole)) < len(whole)):
+    degrees = [round(math.degrees(angle)) % 360 for angle in angles]
+    if start.orientations is not None and (not angles or len(set(degrees)) < len(degrees)):
         message = "expected orientations that differ by at least a degree"
         problems.append(document.problem(f"{path}.start.orientations", message))
         return []

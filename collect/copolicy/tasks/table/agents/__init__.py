@@ -7,12 +7,6 @@ from .players import scripted_robot, simulated_pair, simulated_partner
 from .profiles import NEVER_YIELDS, PAIRS, PARTNERS, ROBOTS, PlayerProfile
 
 __all__ = [
-    "NEVER_YIELDS",
-    "PAIRS",
-    "PARTNERS",
-    "ROBOTS",
-    "PlayerProfile",
-    "scripted_robot",
-    "simulated_pair",
-    "simulated_partner",
-]
+    "NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS", "PlayerProfile",
+    "scripted_robot", "simulated_pair", "simulated_partner",
+]  # fmt: skip

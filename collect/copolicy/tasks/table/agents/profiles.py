@@ -8,11 +8,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 @dataclass(frozen=True)
 class PlayerProfile:
-    """Parameters of one scripted player.
-
-    Raises:
-        InvalidValueError: a value outside its range.
-    """
+    """Parameters of one scripted player."""
 
     speed: float = 48.0
     """Target speed on a free path, px/s; two full forces reach 50."""

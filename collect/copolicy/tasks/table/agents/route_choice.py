@@ -21,13 +21,9 @@ _STILL = 6.0  # px/s: below this speed the table counts as still
 
 
 class PartnerForce:
-    """Estimate of the partner's force: the part of the table's motion that the own force does not explain.
+    """Estimate (x, y) of the partner's force, of a full force, from the motion that the own force does not explain.
 
     From v' = v + (-(b/m) v + (f/m) (u_own + u_partner)) dt, solved for u_partner and smoothed over 0.4 s.
-
-    Attributes:
-        x: component along x, of a full force.
-        y: component along y, of a full force.
     """
 
     def __init__(self):
@@ -40,12 +36,7 @@ class PartnerForce:
         self.x = self.y = 0.0
 
     def update(self, velocity: tuple[float, float], own_force: tuple[float, float]) -> None:
-        """Adds a step.
-
-        Args:
-            velocity: of the table now, px/s.
-            own_force: that acted since the previous velocity, in [-1, 1].
-        """
+        """Adds a step: the table's velocity (px/s), and the own force since the previous velocity ([-1, 1])."""
         if self._velocity is not None:
             vx, vy = self._velocity
             force_x = ((velocity[0] - vx) / self._dt + self._damping * vx) / self._push - own_force[0]

@@ -27,12 +27,6 @@ class ScriptedPlayer:
     It follows a route (`RouteChoice`), computes the velocity and spin of the table along it and the two forces that
     would produce them, from the state `delay_steps` ago, and applies its own one of the two with `MotorNoise`. It has
     no access to the other player's route, force or random numbers.
-
-    Attributes:
-        player: 0 at the robot's seat, 1 at the human's.
-        profile: of this player.
-        route_choice: its present route.
-        motor_noise: its pauses and slips.
     """
 
     def __init__(self, player: int, map_config: MapConfig, profile: PlayerProfile, seed: int):
@@ -40,9 +34,6 @@ class ScriptedPlayer:
         Args:
             player: 0 for the robot's seat, 1 for the human's.
             seed: of its random numbers; equal seeds and equal states give equal forces, bit for bit.
-
-        Raises:
-            InvalidValueError: no such seat, or a negative seed.
         """
         if player not in range(len(PLAYERS)):
             raise InvalidValueError("player", "0 or 1", player)

@@ -24,12 +24,12 @@ _NEGATED = {
 }
 
 
-def mirror(batch: dict[str, Tensor], chosen: Tensor) -> dict[str, Tensor]:
-    """The chosen samples mirrored in y: the window, the table and the dynamics are symmetric about its middle row.
+def mirror(batch: dict[str, Tensor], mask: Tensor) -> dict[str, Tensor]:
+    """Mirrors samples in y; the window, the table and the dynamics are symmetric about the middle row of the window.
 
     Args:
         batch: columns `(B, T, n)`; only those of the task are touched.
-        chosen: `(B,)` bool.
+        mask: `(B,)` bool, the samples to mirror.
     """
     mirrored = dict(batch)
     for key in _NEGATED.keys() & batch.keys():
@@ -43,7 +43,7 @@ def mirror(batch: dict[str, Tensor], chosen: Tensor) -> dict[str, Tensor]:
             negated[..., 4] += _HEIGHT
             centres = values[..., _OBSTACLES:].unflatten(-1, (MAX_OBSTACLES, 2))
             negated[..., _OBSTACLES + 1 :: 2] += _HEIGHT * (centres != 0).any(dim=-1)
-        mirrored[key] = torch.where(chosen[:, None, None], negated, values)
+        mirrored[key] = torch.where(mask[:, None, None], negated, values)
     return mirrored
 
 
