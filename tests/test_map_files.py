@@ -143,11 +143,11 @@ def test_maps_that_nobody_can_carry(tmp_path):
 
 
 def test_the_same_map_twice_whatever_the_order_of_its_obstacles(tmp_path):
-    one, other = _square(600, 200, 50), _square(600, 450, 60)
-    path = _maps(tmp_path, {"obstacles": f"{one}, {other}"}, {"obstacles": f"{other}, {one}"})
+    first, second = _square(600, 200, 50), _square(600, 450, 60)
+    path = _maps(tmp_path, {"obstacles": f"{first}, {second}"}, {"obstacles": f"{second}, {first}"})
     assert said(path) == ["maps[1] (line 7): the same as maps[0]"]
     swapped = ", ".join((_square(600, 200, 60), _square(600, 450, 50)))
-    assert said(_maps(tmp_path, {"obstacles": f"{one}, {other}"}, {"obstacles": swapped})) == []
+    assert said(_maps(tmp_path, {"obstacles": f"{first}, {second}"}, {"obstacles": swapped})) == []
 
 
 def test_the_sets_of_the_package_have_no_problem():
@@ -157,10 +157,10 @@ def test_the_sets_of_the_package_have_no_problem():
 
 def test_random_maps_pass_and_depend_on_seed_and_bounds_alone():
     bounds = {**FILES.bounds, "obstacles": (2, 3), "obstacle_size": (40, 90)}
-    one = FILES.make("lab", 6, 1, bounds)
-    assert one == FILES.make("lab", 6, 1, bounds)
-    assert one["maps"] != FILES.make("lab", 6, 2, bounds)["maps"]
-    for entry in one["maps"]:
+    first = FILES.make("lab", 6, 1, bounds)
+    assert first == FILES.make("lab", 6, 1, bounds)
+    assert first["maps"] != FILES.make("lab", 6, 2, bounds)["maps"]
+    for entry in first["maps"]:
         assert 2 <= len(entry["obstacles"]) <= 3
         assert all(40 <= obstacle["size"] <= 90 for obstacle in entry["obstacles"])
         assert entry["start"]["x"] == 240

@@ -67,11 +67,11 @@ def counter():
 
 @pytest.fixture
 def agent(counter):
-    one = PolicyAgent(counter, real_time=True)
-    begin(one, seed=5)
-    yield one
+    agent = PolicyAgent(counter, real_time=True)
+    begin(agent, seed=5)
+    yield agent
     counter.gate.set()
-    one.close()
+    agent.close()
 
 
 def _run(agent, world, steps, human=(0.0, 0.0), wait=True):
@@ -235,4 +235,4 @@ def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_p
     assert plans.startswith("seat 0: ")
     inputs = [PlayerInput.FromString(m.data) for _, channel, m in messages if channel.topic == "/player/0/input"]
     assert len(inputs) == len(episode.actions)
-    assert max(one.age_ns for one in inputs) > 10**7
+    assert max(sample.age_ns for sample in inputs) > 10**7
