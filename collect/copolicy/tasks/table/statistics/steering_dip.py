@@ -60,9 +60,9 @@ def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Gene
 
 def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Proportion of its states at which the steering over the next {AHEAD_S} s of other episodes with the "
-        f"same goal and obstacles, at their position nearest to it within {RADIUS_PX:g} px, one value an episode, is not "
-        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of its states at which the steering over the next {AHEAD_S} s of other episodes with "
+        f"the same goal and obstacles, at their position nearest to it within {RADIUS_PX:g} px, one value an episode, "
+        f"is not unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
     per_query: list[tuple[int, np.ndarray]] = []
     inside = np.flatnonzero(zone)
@@ -95,8 +95,8 @@ def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estima
 
 def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Proportion of configurations in which its mean over the zone, one value an episode, is not unimodal "
-        f"(dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of configurations in which its mean over the zone, one value an episode, is not "
+        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
     frames = data.per_episode(zone)
     mean = np.divide(data.per_episode(zone * sideways), frames, out=np.full(len(frames), np.nan), where=frames > 0)
