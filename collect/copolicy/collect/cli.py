@@ -29,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
         commands,
         "simulate",
         _simulate,
-        help="record episodes of scripted pairs, as fast as the machine goes",
+        help="record episodes of scripted pairs in simulated time",
         example="copolicy-collect simulate --recipe pairs-sim-376 --out recordings/pairs-sim-376\n  "
         "copolicy-collect simulate --episodes 200 --seed 0 --maps training --out recordings/simulated",
     )

@@ -32,7 +32,6 @@ class PersonAgent(Agent):
     def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns, action: Vector = _PLANE):
         """
         Args:
-            name: kind of the device.
             clock: monotonic time, ns.
             action: vector of one player's action in the task.
 

@@ -21,8 +21,6 @@ _POLICY_TYPE, _IMAGES = "copolicy", "observation.images."
 
 
 class _DataSet(TypedDict, total=False):
-    """`dataset` of the training settings, and `meta/info.json`."""
-
     fps: float | None
     root: str | None
     repo_id: str | None
@@ -79,8 +77,7 @@ def training_conditions(folder: Path) -> TrainingConditions:
 
     Where `config.json` has no rate (older checkpoints), it is read from `recipe.json` or from the data set of
     `train_config.json`, else assumed. Configurations of LeRobot's policies have no task: it is that of the data set,
-    else the only installed task with the policy's features, else the table. A co-policy without a task learned the
-    table.
+    else the only installed task with the policy's features, else the table. The default of a co-policy is the table.
 
     Args:
         folder: with `config.json`, see `checkpoint_folder`.

@@ -58,7 +58,6 @@ class IntactPart:
         events: all events, also those after the last complete step.
         unverified: descriptions of content without a check sum.
         loop: timing of the loop over the steps; without ticks where time was simulated.
-        recorded: recorded states, flat, by `TaskSpec.recorded`.
     """
 
     path: Path
@@ -216,7 +215,7 @@ class _StepChecker:
         return () if self._topics else tuple(sorted(self._other_topics))
 
     def add(self, record: McapRecord) -> None:
-        """Adds a schema, a channel or a message."""
+
         if isinstance(record, Schema):
             self._schemas[record.id] = record.name
         elif isinstance(record, Channel):

@@ -94,8 +94,7 @@ def simulate(
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
     # The digest distinguishes the sets of map files with equal names.
-    set_name = f"{scenario_set.label.replace('#', '.')}-{scenario_set.digest}"
-    variant = set_name if scenario_set.from_file else scenario_set.name
+    variant = scenario_set.label.replace("#", ".") + f"-{scenario_set.digest}" * scenario_set.from_file
     variant = variant if task == TABLE else f"{task}-{variant}"
     variant += f"{'-orientations' if orientations else ''}"
     variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)

@@ -31,13 +31,13 @@ _Angle = Annotated[
 
 
 class Start(Struct, forbid_unknown_fields=True):
-    """Where the table's centre is at rest, and how the table lies there."""
+    """Start pose of the table's centre, at rest."""
 
     x: _X
     y: _Y
     theta: _Angle | None = None
     orientations: Annotated[
-        list[_Angle] | None, Meta(description="instead of theta: the map is there once in each, as a map of its own")
+        list[_Angle] | None, Meta(description="instead of theta: start orientations, each of which makes a map")
     ] = None
 
 
@@ -66,7 +66,7 @@ class Map(Struct, forbid_unknown_fields=True):
         str, Meta(pattern=f"^(|{_MAP_NAME})$", description="for splits and recordings (default: its number, from 00)")
     ] = ""
     weight: Annotated[
-        int, Meta(ge=1, le=_MOST_WEIGHT, description="how often it comes up beside a map of weight 1")
+        int, Meta(ge=1, le=_MOST_WEIGHT, description="number of episodes relative to a map of weight 1")
     ] = 1
 
 

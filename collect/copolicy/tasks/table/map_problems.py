@@ -43,8 +43,7 @@ def _problems(config: MapConfig) -> list[PathMessage]:
         if not _inside(centre, size):
             problems.append((f".obstacles[{index}]", f"{_square(centre, size)} lies outside the window of {_WINDOW}"))
         if centre in config.obstacles[:index]:
-            first = config.obstacles.index(centre)
-            problems.append((f".obstacles[{index}]", f"has the same centre as obstacles[{first}]"))
+            problems.append((f".obstacles[{index}]", f"same centre as obstacles[{config.obstacles.index(centre)}]"))
     if not _inside(config.goal, GOAL_SIZE):
         problems.append((".goal", f"{_square(config.goal, GOAL_SIZE)} lies outside the window of {_WINDOW}"))
     contact = TableWorld(config).contact(config.start)

@@ -31,7 +31,7 @@ _UNSEEN = (
     ((0.5, 0.2), (0.5, 0.5)),
     ((0.6, 0.5), (0.4, 0.3), (0.4, 0.7)),
 )
-# Which obstacles of the family stand in each of the 84 holdout maps, seven draws for each start and goal.
+# Obstacles of the family in each of the 84 holdout maps, seven draws for each start and goal.
 # The original draws them in each run from a generator that its environment shares, so that the draws differ between
 # methods; this list is one such draw (seed 88), fixed, repeats included.
 _HOLDOUT = (

@@ -98,7 +98,7 @@ def _final_gap(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | floa
     """`(F,)` smallest possible distance of the outer rectangle from a square at the end, px, and its error."""
     positions, thetas, error = _final(table)
     poses = zip(positions, thetas, strict=True)
-    gaps = [separation(position, theta, OUTER, centres, half) for position, theta in poses]
+    gaps = [separation(*pose, OUTER, centres, half) for pose in poses]
     return np.minimum.reduce(gaps), error
 
 

@@ -47,11 +47,9 @@ def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
         f"{of_successes(data)}"
     )
     estimate = route_classes(data, taken, definition)
-    # The order of the details is that of the document.
-    first, second = estimate.details.items()
-    left_by_obstacle = dict(sorted(sides.items()))
-    details = dict((first, ("unclear_side", unclear), second, ("left_by_obstacle", left_by_obstacle)))
-    return replace(estimate, details=details)
+    first, second = estimate.details.items()  # the document has the others between and after them
+    left_by_obstacle = ("left_by_obstacle", dict(sorted(sides.items())))
+    return replace(estimate, details=dict((first, ("unclear_side", unclear), second, left_by_obstacle)))
 
 
 def _pooled_entropy(taken: dict[int, str], rng: np.random.Generator) -> Estimate:
