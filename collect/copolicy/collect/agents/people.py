@@ -45,7 +45,7 @@ class PersonAgent(Agent):
         self._bounds = action.bounds
         self._device: Pad | KeyboardHalf | None = None
         self._calibration = StickCalibration()
-        self._rest_watch = RestWatch()
+        self._rest = RestWatch()
         self._clock = clock
 
     @property
@@ -55,7 +55,7 @@ class PersonAgent(Agent):
 
     @device.setter
     def device(self, device: Pad | KeyboardHalf | None) -> None:
-        self._device, self._rest_watch = device, RestWatch()
+        self._device, self._rest = device, RestWatch()
 
     @property
     def calibration(self) -> StickCalibration:
@@ -64,18 +64,18 @@ class PersonAgent(Agent):
 
     @calibration.setter
     def calibration(self, calibration: StickCalibration) -> None:
-        self._calibration, self._rest_watch = calibration, RestWatch()
+        self._calibration, self._rest = calibration, RestWatch()
 
     @property
     def push_at_rest(self) -> float:
         """Force of the stick at rest, as a proportion of the full force; 0 for a centred stick."""
-        return self._rest_watch.push
+        return self._rest.push
 
     def watch_rest(self) -> None:
         """Measures the stick between episodes; called once a tick."""
         if self._has_stick:
             still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
-            self._rest_watch.add(self.force(self.sample()), still)
+            self._rest.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
         """Reads the device.
@@ -97,7 +97,7 @@ class PersonAgent(Agent):
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
-            self._rest_watch.add(force, RestWatch.CARRYING)
+            self._rest.add(force, RestWatch.CARRYING)
         age = self._clock() - sample.time_ns
         self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
         low, high = self._bounds

@@ -90,7 +90,8 @@ def recover_file(source: Path | str) -> Recovery:
         OutputExistsError: another file has the name of the recovered one.
     """
     source = Path(source)
-    output = _output_of(source)
+    name = source.name.removesuffix(PART_SUFFIX).removesuffix(".mcap")
+    output = source.with_name(f"{name}.{RECOVERED}.mcap")
     try:
         file = source.open("r+b")
     except OSError as error:
@@ -140,11 +141,6 @@ def _try_recover(source: Path) -> Recovery:
 
 def _without_path(error: CopolicyError, path: Path) -> str:
     return str(error).removeprefix(f"{path}: ")
-
-
-def _output_of(source: Path) -> Path:
-    name = source.name.removesuffix(PART_SUFFIX).removesuffix(".mcap")
-    return source.with_name(f"{name}.{RECOVERED}.mcap")
 
 
 def _earlier_recovery(source: Path, output: Path, digest: str) -> Recovery:

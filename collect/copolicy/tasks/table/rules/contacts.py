@@ -97,8 +97,7 @@ def _final(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray, float]:
 def _final_gap(table: EpisodeTable, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:
     """`(F,)` smallest possible distance of the outer rectangle from a square at the end, px, and its error."""
     positions, thetas, error = _final(table)
-    poses = zip(positions, thetas, strict=True)
-    gaps = [separation(*pose, OUTER, centres, half) for pose in poses]
+    gaps = [separation(*pose, OUTER, centres, half) for pose in zip(positions, thetas, strict=True)]
     return np.minimum.reduce(gaps), error
 
 
