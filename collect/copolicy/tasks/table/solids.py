@@ -2,7 +2,7 @@
 
 import pymunk
 
-from .outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_FRINGE, CIRCLE_RADIUS, TRIANGLE
+from .geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_FRINGE, CIRCLE_RADIUS, TRIANGLE
 
 
 def table_shapes(body: pymunk.Body) -> tuple[pymunk.Shape, ...]:

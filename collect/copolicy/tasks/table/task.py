@@ -48,9 +48,9 @@ class TableTask(PairTask):
     @property
     def agents(self) -> SimulatedPlayers:
         """Scripted pairs, partners and robots."""
-        from .agents.players import PLAYERS
+        from .agents.players import SCRIPTED_PLAYERS
 
-        return PLAYERS
+        return SCRIPTED_PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:
@@ -210,9 +210,9 @@ class TableTask(PairTask):
     @property
     def features(self) -> PolicyFeatures:
         """Encoders of the map relative to the table; mirror and permutation symmetries."""
-        from .policy import FEATURES  # torch
+        from .policy import POLICY_FEATURES  # torch
 
-        return FEATURES
+        return POLICY_FEATURES
 
     def settings_summary(self, settings: Physics) -> str:
         """The bound on the angular acceleration, and all other settings that differ from the default."""

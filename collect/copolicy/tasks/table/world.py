@@ -11,8 +11,8 @@ from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.task import RUNNING, Outcome
 
 from .features import state_vector
+from .geometry import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 from .map_config import WINDOW, MapConfig
-from .outline import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 from .physics import GOAL_SIZE, Physics
 from .reward import reward
 from .solids import square_shape, table_shapes

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_RADIUS, IMAGE_SIZE
 from ..map_config import WINDOW
-from ..outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_RADIUS, IMAGE_SIZE
 
 # Discs (u, v, r) that cover the table, symmetric under half a turn, since either end may lead.
 _INNER_U = (BOARD[2] - BOARD[0]) / 2 - BOARD_CORNER_RADIUS + 2.5

@@ -72,7 +72,7 @@ def _player(player: int, map_config: MapConfig, profile: PlayerProfile, seed: in
     return ScriptedPlayer(player, map_config, profile, seed)
 
 
-PLAYERS = SimulatedPlayers(
+SCRIPTED_PLAYERS = SimulatedPlayers(
     PAIRS, PARTNERS, ROBOTS, simulated_pair, simulated_partner, scripted_robot, options=("clearance",)
 )
 """The scripted players of the task, `TableTask.agents`."""

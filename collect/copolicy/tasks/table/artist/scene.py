@@ -16,8 +16,8 @@ from copolicy.dataset.outline import placed
 from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task_spec import PLAYERS
 
+from ..geometry import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import WINDOW, MapConfig
-from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 
 FRAME_DESCRIPTION = "world: x right, y up, z out of the screen; 1 px = 0.01 m"

@@ -12,8 +12,8 @@ from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 from copolicy.dataset.recording.topics import Record, Topic
 from copolicy.dataset.task_spec import PLAYERS
 
+from ..geometry import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import MAX_OBSTACLES, MapConfig
-from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from .scene import (
     BOARD_CENTRE,

@@ -17,8 +17,8 @@ from copolicy.collect.screen.patch import Point, SmoothPatch
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.outline import Pose
 
+from ..geometry import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import MapConfig
-from ..outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from ..scene_outline import TableOutline, board_outline
 

@@ -5,7 +5,7 @@ from copolicy.dataset.task import PolicyFeatures
 from .encoders import RelativeFeatures, ScanFeatures
 from .symmetries import mirror_half, permute_obstacles
 
-FEATURES = PolicyFeatures(
+POLICY_FEATURES = PolicyFeatures(
     encoders={"relative": RelativeFeatures, "scan": ScanFeatures},
     symmetries={"mirror": mirror_half, "permute_obstacles": permute_obstacles},
 )

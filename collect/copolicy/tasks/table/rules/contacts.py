@@ -13,7 +13,7 @@ from ..features import parse_sizes
 from ..map_config import MAX_OBSTACLES, WINDOW
 from ..physics import GOAL_SIZE
 from ..spec import SPEC
-from .geometry import INNER, OUTER, final_poses, separation
+from .contact_bounds import INNER, OUTER, final_poses, separation
 
 _SIZES = (45, 50)  # px, possible sides of obstacles where the data do not say which
 

@@ -4,7 +4,7 @@ from copolicy.dataset.statistics.forces import FULL_FORCES
 from copolicy.dataset.task_parts import TaskStatistics
 
 from .human_routes import human_reference
-from .routes import route_statistics
+from .route_statistics import route_statistics
 from .steering_dip import dip_statistics
 
 STATISTICS = TaskStatistics(

@@ -10,7 +10,7 @@ from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import GOAL_SIZE
 from copolicy.tasks.table.rules import LIMITS
-from copolicy.tasks.table.rules.geometry import INNER, OUTER, final_poses, separation
+from copolicy.tasks.table.rules.contact_bounds import INNER, OUTER, final_poses, separation
 from copolicy.tasks.table.world import TableWorld
 
 GOAL = (600.0, 300.0)
