@@ -89,7 +89,7 @@ def test_failures_that_the_geometry_contradicts(sound):
 def test_duplicates_by_name_and_by_bits(sound):
     table = with_entry(sound, "episode_uuid", 4, sound.columns["episode_uuid"][1])
     assert [str(finding) for finding in find(table, "duplicate_names")] == [
-        "error: duplicate: episode 4: the same episode_uuid as episode 1 (2; limit 1)"
+        "error: duplicate: episode 4: same episode_uuid as episode 1 (2; limit 1)"
     ]
     same = np.arange(sound.starts[0], sound.ends[0] + 1)
     rows = np.concatenate((np.arange(sound.frame_count), same))
@@ -100,7 +100,7 @@ def test_duplicates_by_name_and_by_bits(sound):
         framed=np.arange(7),
         starts=np.append(sound.starts, sound.frame_count),
     )
-    message = "the same states and actions, bit for bit, as episode 0"
+    message = "states and actions bit-identical to episode 0"
     assert [(f.episode, f.message) for f in find(copied, "duplicate_motion")] == [("6", message)]
 
 

@@ -89,8 +89,8 @@ def obstacles_of(shapes: Iterable[Shape]) -> tuple[tuple[Point, tuple[float, flo
     obstacles = []
     for shape in shapes:
         if shape.role == "obstacle":
-            (left, right), (top, bottom) = ((min(values), max(values)) for values in _columns(shape.corners))
-            obstacles.append((((left + right) / 2, (top + bottom) / 2), (right - left, bottom - top)))
+            (x0, x1), (y0, y1) = ((min(values), max(values)) for values in _columns(shape.corners))
+            obstacles.append((((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0, y1 - y0)))
     return tuple(sorted(obstacles))
 
 

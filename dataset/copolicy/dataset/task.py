@@ -128,11 +128,7 @@ class PairTask(ABC):
 
     @abstractmethod
     def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> Any:
-        """The scenario of an episode of a data set, the inverse of `scenario_vector`.
-
-        Args:
-            vector: `(len(TaskSpec.scenario),)`.
-            columns: episode columns, which complete the vector (`columns_of`).
+        """The scenario of a vector `(n,)` and the episode columns that complete it, see `columns_of`.
 
         Raises:
             InvalidValueError: no scenario has this vector.
@@ -149,11 +145,13 @@ class PairTask(ABC):
         """
         values = {}
         for setting in fields(self.settings_type):
-            entry, kind = entries.get(setting.name), type(setting.default)
-            if isinstance(entry, bool) or not isinstance(entry, (str, int) if kind is int else (str, int, float)):
+            entry, number_type = entries.get(setting.name), type(setting.default)
+            if isinstance(entry, bool) or not isinstance(
+                entry, (str, int) if number_type is int else (str, int, float)
+            ):
                 raise InvalidValueError(label.format(setting.name), "a number", entry)
             try:
-                values[setting.name] = kind(entry)
+                values[setting.name] = number_type(entry)
             except (ValueError, OverflowError) as error:
                 expected = "a number" if isinstance(error, ValueError) else "a finite number"
                 raise InvalidValueError(label.format(setting.name), expected, entry) from None

@@ -24,10 +24,7 @@ class Vector:
         names: name of each element.
         units: unit of each element, `1` for none.
         low: lowest value of each element; low and high scale the input of policies.
-        high: highest value of each element.
-
-    Raises:
-        InvalidValueError: the lengths differ, or a low value is not below its high value.
+        high: highest value of each element, above the lowest.
     """
 
     names: tuple[str, ...]
@@ -69,13 +66,10 @@ class TaskSpec:
         scenario: the vector of a scenario in a data set.
         action: one player's action.
         reasons: termination reasons of the world.
-        successes: the termination reasons that mean success.
+        successes: those of `reasons` that mean success.
         record_hz: steps per second.
         players: names of the seats.
         title: name in messages; `name` by default.
-
-    Raises:
-        InvalidValueError: a success is not among the reasons.
     """
 
     name: str

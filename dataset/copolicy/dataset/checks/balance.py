@@ -38,17 +38,20 @@ def _maps(data: EpisodeData) -> Iterator[Finding]:
 
 def _pairs(data: EpisodeData) -> Iterator[Finding]:
     pairs, maps = data.columns["pair_id"], _base_maps(data)
-    named = pairs != ""
-    if not named.any():
+    has_pair = pairs != ""
+    if not has_pair.any():
         return
-    counts = Counter(pairs[named].tolist())
-    most, least = max(counts.values()), min(counts.values())
-    if most / least > data.limit("balance.pairs"):
-        message = f"the largest of {len(counts)} pairs has {most} episodes, the smallest {least}"
-        yield Finding("", "balance_pairs", most / least, data.limit("balance.pairs"), "warning", message)
-    if len(counts) < 2 or len(set(maps[named])) < 2:
+    counts = Counter(pairs[has_pair].tolist())
+    largest, smallest_pair = max(counts.values()), min(counts.values())
+    if largest / smallest_pair > data.limit("balance.pairs"):
+        message = f"the largest of {len(counts)} pairs has {largest} episodes, the smallest {smallest_pair}"
+        yield Finding("", "balance_pairs", largest / smallest_pair, data.limit("balance.pairs"), "warning", message)
+    if len(counts) < 2 or len(set(maps[has_pair])) < 2:
         return
-    rows, columns = np.unique(pairs[named], return_inverse=True)[1], np.unique(maps[named], return_inverse=True)[1]
+    rows, columns = (
+        np.unique(pairs[has_pair], return_inverse=True)[1],
+        np.unique(maps[has_pair], return_inverse=True)[1],
+    )
     cells = np.zeros((rows.max() + 1, columns.max() + 1), np.int64)
     np.add.at(cells, (rows, columns), 1)
     result = chi2_contingency(cells)
@@ -89,9 +92,7 @@ def _weights(task: PairTask, name: str, counts: Counter[str], weights_of_files: 
         return {map_id: max(1, weights_of_files.get(map_id, 1)) for map_id in counts}
     sets = [Counter(map_id for map_id, family in maps if family == name) for maps in _named_sets(task)]
     fitting = [weights for weights in sets if set(counts) <= set(weights)]
-    return min(
-        fitting, key=lambda weights: (len(weights), _chi_square(weights, counts)), default=dict.fromkeys(counts, 1)
-    )
+    return min(fitting, key=lambda set_: (len(set_), _chi_square(set_, counts)), default=dict.fromkeys(counts, 1))
 
 
 @functools.cache
@@ -102,16 +103,12 @@ def _named_sets(task: PairTask) -> tuple[tuple[tuple[str, str], ...], ...]:
 
 def _chi_square(weights: Counter[str], counts: Counter[str]) -> float:
     """Pearson's chi-square statistic of the episode counts against the weights of a set."""
-    expected_per_weight = counts.total() / weights.total()
-    return sum(
-        (counts[map_id] - weight * expected_per_weight) ** 2 / (weight * expected_per_weight)
-        for map_id, weight in weights.items()
-    )
+    scale = counts.total() / weights.total()
+    return sum((counts[map_id] - weight * scale) ** 2 / (weight * scale) for map_id, weight in weights.items())
 
 
 RULES = (
     Rule("balance", "the maps of a set are equally frequent", _maps, (), ("map_set", "map_id"), whole=True),
-    Rule(
-        "balance_pairs", "pairs are equally frequent, on the same maps", _pairs, (), ("pair_id", "map_id"), whole=True
-    ),
-)
+    Rule("balance_pairs", "pairs are equally frequent, on the same maps", _pairs, (), ("pair_id", "map_id"),
+         whole=True),
+)  # fmt: skip

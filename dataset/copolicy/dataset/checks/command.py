@@ -80,9 +80,8 @@ def _save(root: Path, document: dict[str, Any]) -> str | None:
         replace_json(root / CHECK_FILE, document, allow_nan=False)
     except OSError as error:
         reason = error.strerror or str(error)
-        logging.warning(
-            "warning: %s: the findings were not written: %s; --no-save does not try", root / CHECK_FILE, reason
-        )
+        message = "warning: %s: the findings were not written: %s; --no-save does not try"
+        logging.warning(message, root / CHECK_FILE, reason)
         return None
     return str(root / CHECK_FILE)
 

@@ -108,22 +108,20 @@ class EpisodeData:
         return limits_of(self.task)[name].value
 
     def findings(
-        self, rule: str, where: np.ndarray, figures: np.ndarray, limit: Figure, message: str,
+        self, rule: str, mask: np.ndarray, figures: np.ndarray, limit: Figure, message: str,
         severity: Severity = "error",
     ) -> Iterator[Finding]:  # fmt: skip
         """A finding for every episode that a mask `(E,)` or `(F,)` selects, with its entry of `figures`."""
-        indices = self.framed if len(where) == len(self.framed) else range(len(self.labels))
-        for index in np.flatnonzero(where):
+        indices = self.framed if len(mask) == len(self.framed) else range(len(self.labels))
+        for index in np.flatnonzero(mask):
             value: Any = figures[index]
             figure = value.item() if isinstance(value, np.generic) else value
             yield Finding(self.labels[indices[index]], rule, figure, limit, severity, message)
 
-    def over_limit(
-        self, rule: str, figures: np.ndarray, message: str, severity: Severity = "error"
-    ) -> Iterator[Finding]:
-        """A finding for every episode whose figure `(E,)` or `(F,)` is above the limit of the rule, or NaN."""
-        bound = self.limit(rule)
-        return self.findings(rule, ~(figures <= bound), figures, bound, message, severity)
+    def over_limit(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
+        """An error for every episode whose figure `(E,)` or `(F,)` is above the limit of the rule, or NaN."""
+        limit = self.limit(rule)
+        return self.findings(rule, ~(figures <= limit), figures, limit, message)
 
     def graded(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
         """Errors for figures above the limit `RULE.error`, warnings for those above `RULE.warning`."""

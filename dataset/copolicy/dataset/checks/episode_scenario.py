@@ -27,13 +27,13 @@ def _constant(data: EpisodeData) -> Iterator[Finding]:
 def _names(data: EpisodeData) -> Iterator[Finding]:
     columns = (data.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
     for label, name, map_set, digest in zip(data.labels, *columns, strict=True):
-        named = _named(data.task).get(base_name(name))
+        entry = _named(data.task).get(base_name(name))
         if not name:
             yield Finding(label, "map_name", name, "a map", "warning", "no map_id")
-        elif named is None and not digest and not name.startswith("custom-"):
+        elif entry is None and not digest and not name.startswith("custom-"):
             yield Finding(label, "map_name", name, "a map of a set", "error", "map_id is not the name of a known map")
-        elif named is not None and map_set != named[0]:
-            yield Finding(label, "map_name", map_set, named[0], "error", "map_set is not the set of map_id")
+        elif entry is not None and map_set != entry[0]:
+            yield Finding(label, "map_name", map_set, entry[0], "error", "map_set is not the set of map_id")
 
 
 def _files(data: EpisodeData) -> Iterator[Finding]:

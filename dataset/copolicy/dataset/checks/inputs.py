@@ -47,22 +47,16 @@ def _idle(data: EpisodeData) -> Iterator[Finding]:
     human = data.framed_column("source") == "human"
     warning, error, run_limit = (data.limit(name) for name in ("idle.warning", "idle.error", "idle_run"))
     for player, seat in enumerate(data.task.spec.players):
-        player_text = f"player {player} ({seat})"
+        subject = f"player {player} ({seat})"
         idle = np.linalg.norm(data.player_force(player), axis=1) < data.limit("idle_force")
-        proportion = data.proportion(idle)
-        never_active = (proportion >= error) & human
-        yield from data.findings(
-            "idle", never_active, proportion, error, f"{player_text} gave no force in the whole episode"
-        )
-        message = f"proportion of frames in which {player_text} gave no force"
-        yield from data.findings(
-            "idle", (proportion > warning) & ~never_active, proportion, warning, message, "warning"
-        )
+        idle_part = data.proportion(idle)
+        absent = (idle_part >= error) & human
+        yield from data.findings("idle", absent, idle_part, error, f"{subject} gave no force in the whole episode")
+        often, message = idle_part > warning, f"proportion of frames in which {subject} gave no force"
+        yield from data.findings("idle", often & ~absent, idle_part, warning, message, "warning")
         seconds = data.longest_run(idle) / data.fps
-        message = f"{player_text} gave no force for this many consecutive s"
-        yield from data.findings(
-            "idle_run", (seconds > run_limit) & ~(proportion > warning), seconds, run_limit, message, "info"
-        )
+        message = f"{subject} gave no force for this many consecutive s"
+        yield from data.findings("idle_run", (seconds > run_limit) & ~often, seconds, run_limit, message, "info")
 
 
 def _identical(data: EpisodeData) -> Iterator[Finding]:
@@ -70,18 +64,17 @@ def _identical(data: EpisodeData) -> Iterator[Finding]:
     actions = data.task.spec.full_forces(data.frames[ACTION])
     active = data.proportion(any_force(actions))
     proportion = np.divide(data.proportion(same_action(actions)), active, out=np.zeros_like(active), where=active > 0)
-    bound = data.limit("identical")
-    is_identical = proportion >= bound
+    limit = data.limit("identical")
+    identical = proportion >= limit
     # Scripted pairs may act identically by design; different kinds of device, or keyboard halves, are two devices.
     people = data.framed_column("source") == "human"
     columns = zip(*(data.framed_column(name).tolist() for name in _DEVICE_COLUMNS), strict=True)
     devices = np.array([may_be_one_device(*values) for values in columns], bool)
     message = "both players gave the same actions"
-    yield from data.findings(
-        "identical", is_identical & devices, proportion, bound, f"{message}: one device controlled both"
-    )
-    yield from data.findings("identical", is_identical & people & ~devices, proportion, bound, message, "warning")
-    yield from data.findings("identical", is_identical & ~people, proportion, bound, message, "info")
+    cause = f"{message}: one device controlled both"
+    yield from data.findings("identical", identical & devices, proportion, limit, cause)
+    yield from data.findings("identical", identical & people & ~devices, proportion, limit, message, "warning")
+    yield from data.findings("identical", identical & ~people, proportion, limit, message, "info")
 
 
 def _saturated(data: EpisodeData) -> Iterator[Finding]:

@@ -109,17 +109,14 @@ def motion_digests(data: EpisodeData) -> list[str]:
 
 
 def _by_column(data: EpisodeData) -> Iterator[Finding]:
-    for column, relation in (
-        ("episode_uuid", "the same episode_uuid as"),
-        ("source_sha256", "made of the same file as"),
-    ):
+    for column, relation in (("episode_uuid", "same episode_uuid as"), ("source_sha256", "same source file as")):
         if column in data.columns:
             yield from _repeated(data.columns[column].tolist(), list(data.labels), relation)
 
 
 def _by_bits(data: EpisodeData) -> Iterator[Finding]:
     labels = [data.labels[index] for index in data.framed]
-    yield from _repeated(motion_digests(data), labels, "the same states and actions, bit for bit, as")
+    yield from _repeated(motion_digests(data), labels, "states and actions bit-identical to")
 
 
 def _repeated(values: Iterable[str], labels: list[str], relation: str) -> Iterator[Finding]:
@@ -132,17 +129,10 @@ def _repeated(values: Iterable[str], labels: list[str], relation: str) -> Iterat
 
 
 DUPLICATE_RULES = (
-    Rule(
-        "duplicate_names",
-        "every episode_uuid and every source file once",
-        _by_column,
-        (),
-        ("episode_uuid",),
-        whole=True,
-    ),
+    Rule("duplicate_names", "every episode_uuid and every source file once", _by_column, (), ("episode_uuid",),
+         whole=True),
     Rule("duplicate_motion", "no two episodes with the same states and actions", _by_bits, (STATE, ACTION), whole=True),
-)
-
+)  # fmt: skip
 
 RULES = (
     Rule("leakage", "the splits of meta/info.json share nothing", _between_splits, kinds=("lerobot",), whole=True),

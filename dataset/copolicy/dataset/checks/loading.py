@@ -45,22 +45,17 @@ def _statistics(data: EpisodeData) -> Iterator[Finding]:
     for name, values in ((name, values) for name, values in data.frames.items() if name in features):
         rows = values.reshape(data.frame_count, -1).astype(float)
         if name in stored and np.isfinite(rows).all():  # else a finding of `finite`
-            yield from _compare_with_frames(data, name, stored[name], rows)
+            yield from _compare(data, name, stored[name], rows)
 
 
-def _compare_with_frames(
-    data: EpisodeData, name: str, stored: Mapping[str, Any], rows: np.ndarray
-) -> Iterator[Finding]:
+def _compare(data: EpisodeData, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
     from ..lerobot_folder.loading import STATISTICS, numbers
 
     warning, error = (data.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))
     computed = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     scale = 1 + np.abs(rows).max(axis=0)
-    errors = {
-        statistic: float((np.abs(numbers(stored[statistic], None) - computed[statistic]) / scale).max())
-        for statistic in STATISTICS
-    }
-    statistic = max(errors, key=lambda statistic: errors[statistic])
+    errors = {key: float((np.abs(numbers(stored[key], None) - computed[key]) / scale).max()) for key in STATISTICS}
+    statistic = max(errors, key=lambda key: errors[key])
     if not errors[statistic] <= warning:
         severity: Severity = "error" if not errors[statistic] <= error else "warning"
         bound = error if severity == "error" else warning

@@ -150,9 +150,7 @@ def _concatenated(
     for path in visible_files(root / folder, "*.parquet"):
         name = path.relative_to(root).as_posix()
         try:
-            table = read_parquet(
-                path, [column for column, kind in column_types(path).items() if _is_needed(column, kind)]
-            )
+            table = read_parquet(path, [name for name, kind in column_types(path).items() if _is_needed(name, kind)])
         except FileFormatError as error:
             message = f"{name} cannot be read: {str(error).removeprefix(f'{path}: ')}"
             damage.append(Finding("", "check_sum", None, None, "error", message))

@@ -69,8 +69,8 @@ def data_of_recordings(
     task = get_task(episodes[0].task) if episodes else get_task()
     lengths = np.array([len(episode.actions) for episode in episodes], np.int64)
     columns = {
-        name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[kind])
-        for name, kind in EPISODE_COLUMNS.items()
+        name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[type_name])
+        for name, type_name in EPISODE_COLUMNS.items()
     }
     frames: dict[str, np.ndarray] = {}
     final_states = None
@@ -83,15 +83,6 @@ def data_of_recordings(
         }
         final_states = np.array([episode.final_state for episode in episodes])
     return EpisodeData(
-        root,
-        "recordings",
-        float(task.spec.record_hz),
-        tuple(labels),
-        {**columns, "length": lengths},
-        frames,
-        np.arange(len(episodes)),
-        np.cumsum(lengths) - lengths,
-        final_states,
-        damage=damage,
-        task=task,
-    )
+        root, "recordings", float(task.spec.record_hz), tuple(labels), {**columns, "length": lengths}, frames,
+        np.arange(len(episodes)), np.cumsum(lengths) - lengths, final_states, damage=damage, task=task,
+    )  # fmt: skip

@@ -148,5 +148,5 @@ def channels_text(topics: Iterable[str]) -> str:
     names = sorted(set(topics))
     if not names:
         return "an MCAP file without channels"
-    rest = f" and {len(names) - _TOPICS_SHOWN} more" if len(names) > _TOPICS_SHOWN else ""
-    return f"no recording of this task (channels: {', '.join(names[:_TOPICS_SHOWN])}{rest})"
+    suffix = f" and {len(names) - _TOPICS_SHOWN} more" if len(names) > _TOPICS_SHOWN else ""
+    return f"no recording of this task (channels: {', '.join(names[:_TOPICS_SHOWN])}{suffix})"

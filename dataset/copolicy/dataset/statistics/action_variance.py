@@ -105,10 +105,10 @@ def _at_zero_spread(variances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
     return np.maximum(0.0, variances.mean(axis=0) - slope * spreads.mean(axis=0))
 
 
-def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries, columns, whose: str) -> Estimate:
+def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries, columns, subject: str) -> Estimate:
     numbers = ", ".join(map(str, NEIGHBOUR_COUNTS))
     definition = (
-        f"k-nearest-neighbour conditional action variance: mean variance of {whose} among the nearest states of other "
+        f"k-nearest-neighbour conditional action variance: mean variance of {subject} among the nearest states of other "
         "episodes with the same goal and obstacles, one per episode, divided by their total variance: 0 if the state "
         "determines the action, 1 (the null, by construction) if they are independent. States are scaled from the "
         f"task's bounds to [-1, 1]. The variance among {numbers} neighbours is extrapolated linearly in their mean "
@@ -133,11 +133,11 @@ def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries
         return np.vstack((extrapolated, within_variances)) / total
 
     all_episodes = np.ones((1, len(data.rows)))
-    drawn = bootstrap.weights[(bootstrap.weights @ queries) > 0]
+    usable_weights = bootstrap.weights[(bootstrap.weights @ queries) > 0]
     frames = len(data.actions)
     if not squares.sum() / frames - ((sums.sum(axis=0) / frames) ** 2).sum() > 1e-12:
         return Estimate(None, "1", definition, episodes, note="the actions never change")
     value, *within_variances = ratios(all_episodes)[:, 0].tolist()
-    bounds = interval(value, ratios(drawn.astype(float))[0], 0.0)
+    bounds = interval(value, ratios(usable_weights.astype(float))[0], 0.0)
     details = {"among_episodes": dict(zip(map(str, NEIGHBOUR_COUNTS), within_variances, strict=True))}
     return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, details=details)

@@ -15,14 +15,9 @@ from ..files.staging import replace_json
 
 def add_stats_command(commands: argparse._SubParsersAction) -> None:
     """Adds `stats`."""
-    parser = add_command(
-        commands,
-        "stats",
-        _stats,
-        "compute the statistics of a data set, with intervals and null distributions, into meta/copolicy_stats.json",
-        "copolicy-dataset stats datasets/table",
-        (*TABLES, "sklearn", "diptest"),
-    )
+    summary_text = "compute statistics with intervals and null distributions, into meta/copolicy_stats.json"
+    needed = (*TABLES, "sklearn", "diptest")
+    parser = add_command(commands, "stats", _stats, summary_text, "copolicy-dataset stats datasets/table", needed)
     parser.add_argument("path", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write to this file instead of into the data set")
     parser.add_argument("--seed", type=seed(), default=0, help="seed of all random draws (default: %(default)s)")

@@ -25,8 +25,8 @@ class Bootstrap:
         names, cluster = np.unique(pairs, return_inverse=True)
         self.resampled = "pairs" if len(names) >= MIN_CLUSTERS else "episodes"
         if self.resampled == "pairs":
-            drawn = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=replicates)
-            self.weights = drawn[:, cluster].astype(np.float32)
+            pair_weights = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=replicates)
+            self.weights = pair_weights[:, cluster].astype(np.float32)
         else:
             count = len(cluster)
             self.weights = rng.multinomial(count, np.full(count, 1 / count), size=replicates).astype(np.float32)

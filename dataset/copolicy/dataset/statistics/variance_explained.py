@@ -96,12 +96,6 @@ def _by_configuration(
     weights = bootstrap.weights[:_PERMUTATIONS, episodes].astype(float)
     replicates = np.array([eta_squared(values, strata, single_stratum, row) for row in weights])
     draws = np.array([eta_squared(values, rng.permutation(strata), single_stratum) for _ in range(_PERMUTATIONS)])
-    return Estimate(
-        value,
-        "1",
-        definition,
-        len(episodes),
-        interval(value, replicates[np.isfinite(replicates)], 0.0, 1.0),
-        bootstrap.resampled,
-        Null.from_draws("configurations shuffled among episodes", value, draws),
-    )
+    bounds = interval(value, replicates[np.isfinite(replicates)], 0.0, 1.0)
+    null = Null.from_draws("configurations shuffled among episodes", value, draws)
+    return Estimate(value, "1", definition, len(episodes), bounds, bootstrap.resampled, null)

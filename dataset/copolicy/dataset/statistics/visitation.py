@@ -100,26 +100,20 @@ def visitation_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     value, mean_coverage = float(np.average(bits, weights=weights)), float(np.average(coverage, weights=weights))
     episodes = len(data.rows)
     averaging = f"{grid}, for each obstacle layout, averaged by frames"
+    entropy_definition = (
+        f"Entropy (Miller-Madow) of {data.task.words.body} over {averaging}; a uniform distribution has "
+        f"{np.log2(grid.cells):.1f} bits."
+    )
+    coverage_definition = (
+        f"Proportion of the cells outside obstacles that {data.task.words.body} visited, on {averaging}. It grows "
+        "with the number of episodes; the interval is for as many episodes."
+    )
+    bounds = interval(value, (replicate_bits[nonempty] * replicate_weights).sum(axis=1), 0.0)
+    coverage_bounds = interval(mean_coverage, (replicate_coverage[nonempty] * replicate_weights).sum(axis=1), 0.0, 1.0)
+    details, resampled = {"layouts": per_layout}, bootstrap.resampled
     return {
-        _NAMES[0]: Estimate(
-            value,
-            "bits",
-            f"Entropy (Miller-Madow) of {data.task.words.body} over {averaging}; a uniform distribution has "
-            f"{np.log2(grid.cells):.1f} bits.",
-            episodes,
-            interval(value, (replicate_bits[nonempty] * replicate_weights).sum(axis=1), 0.0),
-            bootstrap.resampled,
-            details={"layouts": per_layout},
-        ),
-        _NAMES[1]: Estimate(
-            mean_coverage,
-            "1",
-            f"Proportion of the cells outside obstacles that {data.task.words.body} visited, on {averaging}. It grows "
-            "with the number of episodes; the interval is for as many episodes.",
-            episodes,
-            interval(mean_coverage, (replicate_coverage[nonempty] * replicate_weights).sum(axis=1), 0.0, 1.0),
-            bootstrap.resampled,
-        ),
+        _NAMES[0]: Estimate(value, "bits", entropy_definition, episodes, bounds, resampled, details=details),
+        _NAMES[1]: Estimate(mean_coverage, "1", coverage_definition, episodes, coverage_bounds, resampled),
         _NAMES[2]: _between_pairs(data, grid, counts, groups, rng),
     }
 
