@@ -156,7 +156,7 @@ def test_a_task_with_more_parts_has_more_statistics(peg, root, capsys, monkeypat
     assert (size["unit"], 0 < size["value"] < top["value"] <= 100) == ("N", True)
     assert top["interval"][0] <= top["value"] <= top["interval"][1]
     coverage = families["visitation"]["visitation_coverage"]["definition"]
-    assert "the peg's middle has been in, on a grid of 0.0416667 m" in coverage
+    assert "the peg's middle visited, on a grid of 0.0416667 m" in coverage
     assert 0 < families["visitation"]["visitation_coverage"]["value"] < 1
     assert "the peg faster than 0.15 m/s" in families["forces"]["conflict_fraction"]["definition"]
     assert families["smoothness"]["sparc"]["value"] < 0

@@ -48,10 +48,7 @@ def _pairs(data: EpisodeData) -> Iterator[Finding]:
         yield Finding("", "balance_pairs", largest / smallest_pair, data.limit("balance.pairs"), "warning", message)
     if len(counts) < 2 or len(set(maps[has_pair])) < 2:
         return
-    rows, columns = (
-        np.unique(pairs[has_pair], return_inverse=True)[1],
-        np.unique(maps[has_pair], return_inverse=True)[1],
-    )
+    rows, columns = (np.unique(values[has_pair], return_inverse=True)[1] for values in (pairs, maps))
     cells = np.zeros((rows.max() + 1, columns.max() + 1), np.int64)
     np.add.at(cells, (rows, columns), 1)
     result = chi2_contingency(cells)

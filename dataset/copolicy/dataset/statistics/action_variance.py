@@ -108,10 +108,10 @@ def _at_zero_spread(variances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
 def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries, columns, subject: str) -> Estimate:
     numbers = ", ".join(map(str, NEIGHBOUR_COUNTS))
     definition = (
-        f"k-nearest-neighbour conditional action variance: mean variance of {subject} among the nearest states of other "
-        "episodes with the same goal and obstacles, one per episode, divided by their total variance: 0 if the state "
-        "determines the action, 1 (the null, by construction) if they are independent. States are scaled from the "
-        f"task's bounds to [-1, 1]. The variance among {numbers} neighbours is extrapolated linearly in their mean "
+        f"k-nearest-neighbour conditional action variance: mean variance of {subject} among the nearest states of "
+        "other episodes with the same goal and obstacles, one per episode, divided by their total variance: 0 if the "
+        "state determines the action, 1 (the null, by construction) if they are independent. States are scaled from "
+        f"the task's bounds to [-1, 1]. The variance among {numbers} neighbours is extrapolated linearly in their mean "
         "square spread to a spread of zero; with few episodes a bias towards that of distant neighbours remains."
     )
     episodes = int((queries > 0).sum())
