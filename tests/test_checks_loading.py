@@ -119,7 +119,7 @@ def test_sentences_that_are_no_index_are_not_found_by_lerobot(root):
     ("change", "message"),
     [
         (lambda path: path.unlink(), "no such file"),
-        (lambda path: path.write_text("{", encoding="utf-8"), "no JSON"),
+        (lambda path: path.write_text("{", encoding="utf-8"), "invalid JSON"),
         (lambda path: path.write_text("{}", encoding="utf-8"), "says nothing of"),
         (lambda path: _set_statistic(path, "mean", [math.nan] * 4), "no usable mean of action"),
         (lambda path: _set_statistic(path, "std", [1.0]), "no usable std of action"),

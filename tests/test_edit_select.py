@@ -237,7 +237,7 @@ def test_an_output_that_exists_and_a_set_without_columns(root, tmp_path, capsys)
     assert main(["select", str(root), "--out", str(tmp_path / "new"), "--episodes", "0"]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert main(["select", str(tmp_path / "none"), "--out", str(tmp_path / "b"), "--episodes", "0"]) == 2
-    assert "expected a LeRobot v3 data set with meta/info.json, found nothing there" in capsys.readouterr().err
+    assert "expected a LeRobot v3 data set with meta/info.json, found no such file or folder" in capsys.readouterr().err
 
 
 def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):

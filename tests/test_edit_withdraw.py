@@ -243,7 +243,7 @@ def test_a_deletion_that_was_killed_is_finished_and_never_undone(folder, monkeyp
     with pytest.raises(Killed):
         withdraw("C-5", [folder / "set"], really=True)
     monkeypatch.undo()
-    with pytest.raises(FileFormatError, match="nothing there"):
+    with pytest.raises(FileFormatError, match="no such file or folder"):
         withdraw("C-5", [folder / "set"], really=True)
     assert [path.name for path in folder.iterdir()] == ["recordings"]
 
@@ -303,7 +303,7 @@ def test_an_unreadable_recording_is_named(folder, capsys):
         ("C-77", ["set", "recordings"], RunError, "expected an episode with consent id C-77, found none"),
         ("", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
         ("C-1,C-2", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
-        ("C-1", ["set", "nowhere"], FileFormatError, "found nothing there"),
+        ("C-1", ["set", "nowhere"], FileFormatError, "found no such file or folder"),
     ],
 )
 def test_a_wrong_call_changes_nothing(folder, consent, paths, error, line):

@@ -123,7 +123,7 @@ def test_episodes_that_are_not_there(root, text):
 
 def test_a_folder_that_is_no_data_set(root, tmp_path, capsys):
     assert main(["exclude", str(tmp_path / "none"), "--list"]) == 2
-    expected = "expected a LeRobot v3 data set with meta/info.json, found nothing there\n"
+    expected = "expected a LeRobot v3 data set with meta/info.json, found no such file or folder\n"
     assert capsys.readouterr().err == f"copolicy-dataset: {tmp_path / 'none'}: {expected}"
     bare = table(root).drop_columns(["discarded"])
     pq.write_table(bare, root / EPISODES)

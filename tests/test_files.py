@@ -3,7 +3,13 @@ import os
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.listing import broken_links, distinct, distinct_files, on_visible_files, visible_files
+from copolicy.dataset.files.listing import (
+    broken_links,
+    distinct_files,
+    skipping_hidden_files,
+    visible_files,
+    without_duplicates,
+)
 
 
 @pytest.fixture
@@ -51,7 +57,7 @@ def test_a_file_counts_once_by_its_own_path(tmp_path):
     os.link(recording, tmp_path / "session" / "one" / "b.mcap")
     assert distinct_files(tmp_path / "session", "*.mcap") == [recording]
     assert len(visible_files(tmp_path / "session", "*.mcap")) == 5
-    assert distinct([recording, tmp_path / "session" / "a.mcap"]) == [recording]
+    assert without_duplicates([recording, tmp_path / "session" / "a.mcap"]) == [recording]
 
 
 def test_folders_that_link_to_each_other_end(tmp_path):
@@ -89,5 +95,5 @@ def test_a_folder_that_cannot_be_read_is_no_empty_folder(session, monkeypatch):
 
 
 def test_foreign_code_does_not_find_hidden_files(session):
-    names = on_visible_files(lambda folder: sorted(path.name for path in folder.glob("*.mcap")))
+    names = skipping_hidden_files(lambda folder: sorted(path.name for path in folder.glob("*.mcap")))
     assert names(session) == ["a.mcap"]

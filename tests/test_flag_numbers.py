@@ -27,7 +27,7 @@ from copolicy.train.quickstart import main as quickstart
         (number("--x"), "-0.5", "--x: expected a number of at least 0, found -0.5"),
         (number("--x"), "nan", "--x: expected a number of at least 0, found nan"),
         (number("--x"), "inf", "--x: expected a finite number, found inf"),
-        (number("--x", above=True), "0", "--x: expected a number above 0, found 0.0"),
+        (number("--x", exclusive=True), "0", "--x: expected a number above 0, found 0.0"),
         (number("--x", 0, 60), "61", "--x: expected a number of at most 60, found 61.0"),
         (number("--x"), "ten", "--x: expected a number, found 'ten'"),
     ],

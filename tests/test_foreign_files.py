@@ -16,13 +16,13 @@ from reading_commands import COMMANDS
 
 from copolicy.collect.inputs.calibration_store import CalibrationStore
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 
 KINDS = {
-    "nothing": "nothing there",
+    "nothing": "no such file or folder",
     "empty file": "an empty file",
     "text": "a text file",
-    "zeros": "zeros",
+    "zeros": "a file of zeros",
     "magic alone": "an MCAP file",
     "hdf5": "an HDF5 file",
     "npz": "a NumPy archive (.npz)",
@@ -46,7 +46,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_files_and_folders_are_called_what_they_are(tmp_path, kind):
-    assert kind_of(FOREIGN[kind](tmp_path)) == KINDS[kind]
+    assert describe_path(FOREIGN[kind](tmp_path)) == KINDS[kind]
 
 
 OWN_READERS = ("collect replay", "collect recover", "convert mcap", "convert upstream", "dataset check")

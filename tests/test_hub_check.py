@@ -51,8 +51,8 @@ def test_recordings_stay_there_and_no_finding_is_put_into_the_clients_cache(user
 @pytest.mark.parametrize(
     ("name", "flags", "message"),
     [
-        ("lab/none", (), "lab/none: no such data set on the Hub, or a private one that the token may not see"),
-        ("lab/table", ("--revision", "data-9.0.0"), "lab/table@data-9.0.0: asking the Hub: no such revision"),
+        ("lab/none", (), "lab/none: no such data set on the Hub, or a private one that the token cannot read"),
+        ("lab/table", ("--revision", "data-9.0.0"), "lab/table@data-9.0.0: querying the Hub: no such revision"),
     ],
 )
 def test_what_is_not_there_is_one_line(user, name, flags, message):
@@ -64,6 +64,6 @@ def test_a_hub_in_trouble_is_one_line_and_no_older_copy_is_checked_instead(user)
     user.hub.fail("GET", r"/api/datasets/lab/table", 503, times=20)
     error = user.run("check", "lab/table").error
     user.hub.faults.clear()
-    trouble = "the Hub has trouble (HTTP 503); run the command again, it goes on where it stopped"
-    assert error == f"lab/table: asking the Hub: {trouble}"
+    trouble = "the Hub failed (HTTP 503); run the command again to continue"
+    assert error == f"lab/table: querying the Hub: {trouble}"
     assert user.run("check", "lab/table", "--json").status == 0

@@ -2,7 +2,7 @@
 
 | fault | what the user sees | what a rerun does |
 |---|---|---|
-| no token, or a wrong one | one line: the Hub does not accept the token; nothing changed | publishes, with a token |
+| no token, or a wrong one | one line: the Hub rejected the token; nothing changed | publishes, with a token |
 | a token that may only read | one line: the token may not do this | publishes, with another token |
 | 500 once or twice | nothing: the client tries again | |
 | 500 for good, or a connection that drops, while uploading | one line; no commit | sends only what did not arrive |
@@ -210,14 +210,14 @@ def test_private_is_private_or_nothing(hub, user, dataset, publish):
     assert public.head == {}
 
 
-REJECTED = "the Hub does not accept the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`"
+REJECTED = "the Hub rejected the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`"
 
 
 @pytest.mark.parametrize(
     ("token", "message"),
     [
-        ("hf_" + "w" * 34, f"lab/table: asking the Hub: {REJECTED}"),
-        (None, f"lab/table: asking the Hub: {REJECTED}"),
+        ("hf_" + "w" * 34, f"lab/table: querying the Hub: {REJECTED}"),
+        (None, f"lab/table: querying the Hub: {REJECTED}"),
         (READ_TOKEN, "lab/table: creating the repository: the token may not do this; it needs the right to write "
          "to the repository"),
     ],
@@ -238,7 +238,7 @@ def test_a_hub_that_stumbles_is_asked_again(hub, dataset, publish, path):
     assert is_published(hub, dataset)
 
 
-TROUBLE = "the Hub has trouble (HTTP 500); run the command again, it goes on where it stopped"
+TROUBLE = "the Hub failed (HTTP 500); run the command again to continue"
 
 
 def test_an_upload_that_fails_for_good_goes_on_where_it_stopped(hub, dataset, publish):
@@ -256,8 +256,8 @@ def test_an_upload_that_fails_for_good_goes_on_where_it_stopped(hub, dataset, pu
 def test_a_connection_that_drops_while_uploading(hub, dataset, publish):
     hub.drop("PUT", r"^/lfs/", "before", times=100)
     message = publish().error
-    assert message.startswith("lab/table: uploading: the connection broke off (")
-    assert message.endswith("); run the command again, it goes on where it stopped")
+    assert message.startswith("lab/table: uploading: the connection was lost (")
+    assert message.endswith("); run the command again to continue")
     assert set(hub.data_set("lab/table").head) == {".gitattributes"}
     hub.faults.clear()
     assert publish().status == 0
@@ -283,7 +283,7 @@ FAULTS_AFTER_THE_COMMIT = {
 @pytest.mark.parametrize("fault", FAULTS_AFTER_THE_COMMIT)
 def test_a_commit_that_arrived_is_not_made_again(hub, dataset, publish, fault):
     FAULTS_AFTER_THE_COMMIT[fault](hub)
-    assert publish().error.endswith("run the command again, it goes on where it stopped")
+    assert publish().error.endswith("run the command again to continue")
     assert "data-1.0.0" not in hub.data_set("lab/table").tags
     done = publish()
     assert done.status == 0, done.err
@@ -312,7 +312,8 @@ def test_somebody_elses_commit_is_not_lost_unseen(hub, dataset, publish):
 
     hub.meanwhile("POST", COMMIT, commit)
     assert publish().error == (
-        "lab/table: uploading: somebody else committed meanwhile; look at what changed there and run the command again"
+        "lab/table: uploading: the repository was changed by another commit; check the changes and run "
+        "the command again"
     )
     repository = hub.data_set("lab/table")
     assert repository.head["README.md"] == b"theirs"
@@ -324,7 +325,7 @@ def test_somebody_elses_commit_is_not_lost_unseen(hub, dataset, publish):
 
 def test_a_conflict_that_the_hub_reports_itself(hub, dataset, publish):
     hub.fail("POST", COMMIT, 409)
-    assert "somebody else committed meanwhile" in publish().error
+    assert "the repository was changed by another commit" in publish().error
     assert publish().status == 0
 
 
@@ -356,7 +357,7 @@ def test_a_name_that_is_none_is_refused(hub, user, dataset):
     done = user.run("publish", dataset, "--repo-id", "table")
     assert (done.status, hub.requests) == (2, [])
     assert done.err == (
-        "copolicy-dataset: --repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), "
+        "copolicy-dataset: --repo-id: expected USER/NAME that the Hub accepts (one slash between user and name), "
         "found 'table'\n"
     )
 

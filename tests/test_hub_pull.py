@@ -152,7 +152,7 @@ def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, rele
         hub.drop("GET", path, "before", times=100)
     message = user.run("pull", "lab/table", "--root", tmp_path / "out").error
     assert message.startswith("lab/table: downloading: ")
-    assert message.endswith("; run the command again, it goes on where it stopped")
+    assert message.endswith("; run the command again to continue")
     assert not (tmp_path / "out").exists()
     hub.faults.clear()
     hub.requests.clear()
@@ -206,8 +206,8 @@ def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("lab/nothing", "lab/nothing: no such data set on the Hub, or a private one that the token may not see"),
-        ("lab/table@data-9.0.0", "lab/table@data-9.0.0: asking the Hub: no such revision"),
+        ("lab/nothing", "lab/nothing: no such data set on the Hub, or a private one that the token cannot read"),
+        ("lab/table@data-9.0.0", "lab/table@data-9.0.0: querying the Hub: no such revision"),
     ],
 )
 def test_what_is_not_there_is_named(user, hub, tmp_path, name, message):
@@ -218,7 +218,7 @@ def test_what_is_not_there_is_named(user, hub, tmp_path, name, message):
 def test_a_private_data_set_asks_for_a_token(user, hub, tmp_path):
     hub.data_set("lab/table").private = True
     assert user.run("pull", "lab/table", "--root", tmp_path / "out", token=None).error == (
-        "lab/table: asking the Hub: the Hub does not accept the token, or a private data set needs one; "
+        "lab/table: querying the Hub: the Hub rejected the token, or a private data set needs one; "
         "set HF_TOKEN or run `hf auth login`"
     )
 

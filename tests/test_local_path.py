@@ -6,7 +6,7 @@ import pytest
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.local_path import named_on_hub, require_hub_name
+from copolicy.dataset.files.local_path import repo_id_from_url, require_repo_id
 from copolicy.train.cli import main as train
 
 
@@ -25,13 +25,13 @@ def here(tmp_path, monkeypatch) -> Path:
     [
         (
             "outputs/datset",
-            "did you mean outputs/dataset? (as hf://datasets/outputs/datset it is looked up on the Hub)",
+            "did you mean outputs/dataset? (write hf://datasets/outputs/datset for the Hub)",
         ),
         (
             "output/dataset",
-            "did you mean outputs/dataset? (as hf://datasets/output/dataset it is looked up on the Hub)",
+            "did you mean outputs/dataset? (write hf://datasets/output/dataset for the Hub)",
         ),
-        ("outputs/other", "no such file or folder (as hf://datasets/outputs/other it is looked up on the Hub)"),
+        ("outputs/other", "no such file or folder (write hf://datasets/outputs/other for the Hub)"),
         ("./outputs/datset", "did you mean outputs/dataset?"),
         ("outputs/datset/", "did you mean outputs/dataset?"),
         ("outputs/dataset/meta", "no such file or folder"),
@@ -40,8 +40,8 @@ def here(tmp_path, monkeypatch) -> Path:
         ("nothing", "no such file or folder"),
         ("../nothing/here", "no such file or folder"),
         ("~/nothing", "no such file or folder"),
-        ("lab/a..b", "no such file or folder, and no name that the Hub takes (no '--' and no '..')"),
-        ("lab/täble", "and no name that the Hub takes (letters a to z, digits, '-', '_' and '.' only)"),
+        ("lab/a..b", "no such file or folder, and not a valid name on the Hub (no '--' and no '..')"),
+        ("lab/täble", "and not a valid name on the Hub (letters a to z, digits, '-', '_' and '.' only)"),
     ],
 )
 def test_a_path_that_does_not_exist_is_said_so(here, text, found, capsys):
@@ -62,7 +62,7 @@ def test_an_absolute_path_is_compared_too(here, capsys):
 
 def test_a_name_of_the_hub_stays_one(here):
     for text in ("lab/table", "lerobot/pusht", "a/b"):
-        assert require_hub_name(text, "something") == text
+        assert require_repo_id(text, "something") == text
 
 
 @pytest.mark.parametrize(
@@ -73,13 +73,13 @@ def test_a_name_of_the_hub_stays_one(here):
     ],
 )  # fmt: skip
 def test_a_name_may_say_that_it_is_on_the_hub(here, text):
-    assert named_on_hub(text) == "outputs/datset"
-    assert require_hub_name(text, "something") == "outputs/datset"
+    assert repo_id_from_url(text) == "outputs/datset"
+    assert require_repo_id(text, "something") == "outputs/datset"
 
 
 def test_a_name_on_the_hub_must_be_one_that_it_takes(here):
-    with pytest.raises(FileFormatError, match=r"something as the Hub takes it \(no '--' and no '\.\.'\)"):
-        require_hub_name("hf://datasets/lab/a..b", "something")
+    with pytest.raises(FileFormatError, match=r"something that the Hub accepts \(no '--' and no '\.\.'\)"):
+        require_repo_id("hf://datasets/lab/a..b", "something")
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ def test_the_rules_are_those_of_the_hubs_client():
 def test_the_rule_that_is_broken_is_named(text, reason):
     with pytest.raises(InvalidValueError) as error:
         checked_repo_id(text)
-    assert str(error.value) == f"--repo-id: expected USER/NAME as the Hub takes it ({reason}), found {text!r}"
+    assert str(error.value) == f"--repo-id: expected USER/NAME that the Hub accepts ({reason}), found {text!r}"
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -85,7 +85,7 @@ def test_every_command_refuses_it_before_it_looks_at_anything(command, arguments
     assert command([*(part.format(**places) for part in arguments), name]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "expected USER/NAME as the Hub takes it (" in error
+    assert "expected USER/NAME that the Hub accepts (" in error
     assert error.endswith(f"found {name!r}\n")
     assert list(tmp_path.iterdir()) == []
 
@@ -95,7 +95,7 @@ def test_every_command_refuses_it_before_it_looks_at_anything(command, arguments
 def test_training_refuses_it_before_lerobot_is_loaded(flag, name, capsys):
     assert train([f"--{flag}={name}"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(f"copolicy-train: --{flag}: expected USER/NAME as the Hub takes it (")
+    assert error.startswith(f"copolicy-train: --{flag}: expected USER/NAME that the Hub accepts (")
     assert error.count("\n") == 1
 
 

@@ -5,7 +5,7 @@ import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.files.staging import about, new_file, new_folder, replace_json, replacement, require_new
+from copolicy.dataset.files.staging import named_errors, new_file, new_folder, replace_json, replacement, require_new
 
 
 def names(folder):
@@ -122,7 +122,7 @@ def test_an_error_of_a_network_library_keeps_its_words(tmp_path):
     class RemoteError(OSError):
         pass
 
-    with pytest.raises(RemoteError) as caught, about(tmp_path / "run"):
+    with pytest.raises(RemoteError) as caught, named_errors(tmp_path / "run"):
         raise RemoteError("404 Client Error")
     assert (caught.value.errno, caught.value.filename) == (None, None)
 

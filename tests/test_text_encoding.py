@@ -12,7 +12,7 @@ from versioned_data_set import simulated_data_set
 from copolicy.dataset.cli import main
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.text_files import read_older_text, read_text
+from copolicy.dataset.files.text_files import read_legacy_text, read_text
 
 
 def test_a_byte_order_mark_is_no_letter(tmp_path):
@@ -26,8 +26,8 @@ def test_a_text_in_another_encoding_is_named(tmp_path):
     path.write_bytes("héllo".encode("latin-1"))
     with pytest.raises(FileFormatError) as error:
         read_text(path)
-    assert str(error.value) == f"{path}: expected a text in UTF-8, found the byte 0xe9 at position 1"
-    assert read_older_text(path) == "héllo"
+    assert str(error.value) == f"{path}: expected UTF-8 text, found the byte 0xe9 at position 1"
+    assert read_legacy_text(path) == "héllo"
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-8"])

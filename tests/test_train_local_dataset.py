@@ -46,7 +46,7 @@ def truncate(path: Path) -> None:
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text("{", encoding="utf-8"),
-            "{root}/meta/info.json: expected LeRobot's data set information, found no JSON",
+            "{root}/meta/info.json: expected LeRobot's data set information, found invalid JSON",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text(

@@ -21,7 +21,7 @@ from versioned_data_set import (
 )
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.json_file import converted as as_type
+from copolicy.dataset.files.json_file import convert_json as as_type
 from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.digests import Content, EpisodeContent, digest, encode

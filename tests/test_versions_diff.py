@@ -115,7 +115,7 @@ def test_a_value_that_one_side_lacks_differs():
             "{}/nothing",
             "{}/nothing: expected a folder, FOLDER@data-x.y.z, or U/N[@REVISION] on the Hub, found none of them",
         ),
-        ("lab/table", "lab/table: asking the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"),
+        ("lab/table", "lab/table: querying the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"),
     ],
 )  # fmt: skip
 def test_trouble_is_no_difference(converted, capsys, name, message):

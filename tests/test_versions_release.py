@@ -19,7 +19,7 @@ from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.meta_files import MANIFEST_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.exclusions import exclude
-from copolicy.dataset.publication.data_version import DataVersion, newest
+from copolicy.dataset.publication.data_version import DataVersion, newest_version
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.difference import Change
 from copolicy.dataset.versions.manifest import Manifest
@@ -225,14 +225,14 @@ def test_a_record_that_contradicts_itself_is_refused(released):
         ReleaseRecord.read(path)
     path.write_text("{", encoding="utf-8")
     with pytest.raises(
-        FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found no JSON"
+        FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found invalid JSON"
     ):
         read_release(released)
 
 
 def test_versions_are_ordered_by_number():
-    assert newest(["v3.0", "data-1.9.0", "data-1.10.0", "data-draft", "1.11.0"]) == DataVersion(1, 10, 0)
-    assert newest(["v3.0"]) is None
+    assert newest_version(["v3.0", "data-1.9.0", "data-1.10.0", "data-draft", "1.11.0"]) == DataVersion(1, 10, 0)
+    assert newest_version(["v3.0"]) is None
     assert DataVersion.parse("data-1.2.3").tag == "data-1.2.3"
     with pytest.raises(InvalidValueError, match=r"data version: expected x.y.z or data-x.y.z, found '1.2'"):
         DataVersion.parse("1.2")

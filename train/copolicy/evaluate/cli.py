@@ -6,7 +6,7 @@ from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import require_new
 
 from .comparison import add_compare_command
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         study_needs,
     )
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    add_maps_flag(coplan, _MAPS, given=False)
+    add_maps_flag(coplan, _MAPS, use_default=False)
     coplan.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     add_whole_number(coplan, "--repeats", "episodes a map (default: 1)", 1, 1, 10_000)
     add_whole_number(coplan, "--limit", "only the first N maps, for a quick look; stated in the result")
@@ -48,7 +48,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     picture = arguments.out.with_suffix(".png")
     require_new(arguments.out, picture, overwrite=arguments.overwrite)
     task = learned_task(arguments.policy)
-    chosen = task.scenario_set(set_name(task, arguments.maps, _MAPS))
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, _MAPS))
     if arguments.orientations:
         chosen = task.turned(chosen)
     maps = chosen.scenarios[: arguments.limit]

@@ -15,7 +15,7 @@ from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from lerobot.scripts import lerobot_train
 from tqdm import tqdm
 
-from copolicy.dataset.files.listing import on_visible_files
+from copolicy.dataset.files.listing import skipping_hidden_files
 
 from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes
 from .finite_data import NonFiniteError, mended_statistics, require_finite_frames
@@ -68,7 +68,7 @@ def _replaced(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
 @contextmanager
 def _hidden_files_passed_over() -> Iterator[None]:
     # LeRobot takes every file in a folder of tables for one, also what macOS leaves beside them.
-    ours = {"load_nested_dataset": on_visible_files(io_utils.load_nested_dataset)}
+    ours = {"load_nested_dataset": skipping_hidden_files(io_utils.load_nested_dataset)}
     with _replaced(io_utils, ours), _replaced(dataset_reader, ours):
         yield
 

@@ -59,12 +59,12 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument(
         "--limit-px",
-        type=number("--limit-px", above=True),
+        type=number("--limit-px", exclusive=True),
         help="of --verify: largest drift, px (default 0.01)",
     )
     command.add_argument(
         "--limit-rad",
-        type=number("--limit-rad", above=True),
+        type=number("--limit-rad", exclusive=True),
         help="of --verify: the same, rad (default 0.0001)",
     )
 

@@ -11,8 +11,8 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
-from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
-from copolicy.dataset.files.staging import about, write_as_lerobot
+from copolicy.dataset.files.replace_folder import finish_interrupted, swap_folders
+from copolicy.dataset.files.staging import named_errors, write_lerobot_json
 from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.references import Place, numbered_files
@@ -110,13 +110,13 @@ def append_recordings(
     with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
         added, whole = Path(scratch) / "added", Path(f"{scratch}.whole")
         try:
-            with about(root, places={added: root, whole: root}):
+            with named_errors(root, targets={added: root, whole: root}):
                 written = convert_recordings(new, added, repo_id, conversion, skip_damaged, workers)
                 copy_as_links(place, whole)
                 columns_added = add_later_columns(whole)
                 info = _join(whole, added)
                 mixtures = _mixtures(whole, rewards)
-                shutil.rmtree(take_place(whole, place))
+                shutil.rmtree(swap_folders(whole, place))
         except CopolicyError as error:
             # The folders in the making are gone when somebody reads this.
             error.args = (str(error).replace(str(added), str(root)).replace(str(whole), str(root)),)
@@ -180,7 +180,7 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     for name in (INFO_FILE, STATS_FILE, RECORD_FILE):
         (whole / name).unlink(missing_ok=True)  # a link: writing into it would change the data set in use
     write_stats(aggregate_stats(statistics), whole)
-    write_as_lerobot(whole / INFO_FILE, info)
+    write_lerobot_json(whole / INFO_FILE, info)
     write_record(whole, record)
     return info
 

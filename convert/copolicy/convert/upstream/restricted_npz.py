@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 
 from .restricted_pickle import first_line, load_pickle
 
@@ -36,7 +36,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
     except OSError as error:
         raise FileFormatError(path, "a readable .npz file", error.strerror or str(error)) from None
     except (Exception, MemoryError) as error:  # zipfile, zlib, the header's parser: each has its own
-        kind = kind_of(path)
+        kind = describe_path(path)
         found = f"a damaged one ({first_line(error)})" if "NumPy" in kind or "zip" in kind else kind
         raise FileFormatError(path, "an .npz file", found) from None
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..files.json_file import read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
@@ -149,4 +149,4 @@ def _instead(root: Path) -> str:
     inside = sorted((*root.glob("*/meta/info.json"), *root.glob("*/*/meta/info.json")))
     if inside:
         return f"none, but one in {inside[0].parent.parent}"
-    return kind_of(root)
+    return describe_path(root)

@@ -25,7 +25,7 @@ from ..hub.client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_a
 from ..hub.repository import BRANCH, Repository, read_file, read_repository
 from ..lerobot_folder.exclusions import excluded_episodes
 from ..lerobot_folder.info import read_info
-from ..publication.data_version import newest
+from ..publication.data_version import newest_version
 from ..publication.minimal_card import is_minimal_card
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
@@ -156,7 +156,7 @@ def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord)
         content_hash = published.get("content_hash")
         what = "this content" if content_hash == record.content_hash else f"other content ({content_hash})"
         raise RunError(f"{repository.repo_id}: {tag} is on the Hub already, with {what}; nothing was uploaded")
-    latest = newest(list(repository.tags))
+    latest = newest_version(list(repository.tags))
     if latest is not None and latest > record.data_version:
         raise RunError(
             f"{repository.repo_id}: expected a release after {latest.tag}, which is on the Hub, found {tag}; "

@@ -7,8 +7,8 @@ from pathlib import Path
 from ..exceptions import FileFormatError, RunError
 from ..files.listing import visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER, RAW_MANIFEST_FILE
-from ..files.staging import about, require_new, take_name
-from ..hub.repository import download, forget_progress, resolve
+from ..files.staging import named_errors, rename_complete, require_new
+from ..hub.repository import download, remove_download_state, resolve
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.manifest import Manifest, file_entry
@@ -47,17 +47,17 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
     require_new(root)
     revision, commit = resolve(repo_id, revision)
     partial = root.parent / f".{root.name}.{commit[:12]}.partial"
-    with about(root, partial):
+    with named_errors(root, partial):
         try:
             download(repo_id, partial, commit, skip=None if raw else f"{RAW_FOLDER}/*")
         except OSError:
             shutil.rmtree(partial, ignore_errors=True)  # a full disk would stay full
             raise
         try:
-            forget_progress(partial)
+            remove_download_state(partial)
             (partial / ".gitattributes").unlink(missing_ok=True)
             record, files = _verify(partial, f"{repo_id}@{revision}")
-            take_name(partial, root)
+            rename_complete(partial, root)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             raise

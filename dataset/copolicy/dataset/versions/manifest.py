@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError
-from ..files.json_file import converted, parse_json, read_json
+from ..files.json_file import convert_json, parse_json, read_json
 from ..files.listing import is_hidden, visible_files
 from ..files.meta_files import MANIFEST_FILE, RAW_FOLDER
 from .digests import digest
@@ -70,7 +70,7 @@ class Manifest:
 
     @classmethod
     def _of(cls, fields: dict, path: Path | str) -> "Manifest":
-        stored = converted(fields, _File, _WHAT, path)
+        stored = convert_json(fields, _File, _WHAT, path)
         if stored.schema != _SCHEMA:
             raise FileFormatError(path, _WHAT, f"schema {stored.schema!r}")
         return cls(stored.files)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..exceptions import InvalidValueError, RunError
 from ..files.meta_files import CHANGELOG_FILE, CHECK_FILE, EARLIER_FOLDER, MANIFEST_FILE, RELEASE_FILE
 from ..files.staging import replacements
-from ..files.text_files import read_older_text
+from ..files.text_files import read_legacy_text
 from ..publication.data_version import BUMPS, Bump, DataVersion
 from .content import read_content
 from .difference import Change, compare, withdrawal_text
@@ -91,7 +91,7 @@ def _write(
     root: Path, record: ReleaseRecord, changes: tuple[Change, ...], last: ReleaseRecord | None, manifest: Manifest
 ) -> None:
     changelog = root / CHANGELOG_FILE
-    before = read_older_text(changelog) if changelog.exists() else ""
+    before = read_legacy_text(changelog) if changelog.exists() else ""
     texts: dict[str, str] = {}
     if last is not None:
         texts[f"{EARLIER_FOLDER}/{last.version}.json"] = last.to_text()

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..exceptions import FileFormatError, UnknownNameError
-from ..files.json_file import converted, read_json
+from ..files.json_file import convert_json, read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EARLIER_FOLDER, RELEASE_FILE
 from ..publication.data_version import DataVersion
@@ -56,7 +56,7 @@ class ReleaseRecord:
         """
         what = f"the record of a release ({_SCHEMA})"
         stored = read_json(path, dict, what)
-        record = converted(stored, cls, what, path)
+        record = convert_json(stored, cls, what, path)
         if stored.get("schema") != _SCHEMA:
             raise FileFormatError(path, what, f"schema {stored.get('schema')!r}")
         # What was withdrawn after the release has no digest any more.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from copolicy.collect.agents.simulated import simulated_players
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import get_task
@@ -46,7 +46,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         "of the task, for the table never-yields)",
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
-    add_maps_flag(command, MAPS, given=False)
+    add_maps_flag(command, MAPS, use_default=False)
     add_whole_number(
         command,
         "--configurations",
@@ -77,7 +77,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     for kind in partners:
         if kind not in profiles:
             raise UnknownNameError("kind of partner", kind, profiles)
-    chosen = task.scenario_set(set_name(task, arguments.maps, MAPS))
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, MAPS))
     # Deferred: `--help` and a wrong call should not wait for torch.
     from .figure import save_partner_figure
     from .robots import scripted_robots

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...exceptions import FileFormatError
 from ...files.meta_files import EPISODES_FOLDER, STATS_FILE
-from ...files.staging import write_as_lerobot
+from ...files.staging import write_lerobot_json
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -50,7 +50,7 @@ def write_statistics(statistics: Statistics, folder: Path) -> None:
     nested = {
         feature: {kind: values.tolist() for kind, values in kinds.items()} for feature, kinds in statistics.items()
     }
-    write_as_lerobot(folder / STATS_FILE, nested)
+    write_lerobot_json(folder / STATS_FILE, nested)
 
 
 def _aggregated(stacked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
-from ...files.staging import write_as_lerobot
+from ...files.staging import write_lerobot_json
 from ...lerobot_folder.info import split_range, task_name
 from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
 from ...lerobot_folder.tables import read_parquet
@@ -67,7 +67,7 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     paths = {name: path for name, path in _PATHS.items() if source.info.get(name)}
     totals = {"total_episodes": len(numbers), "total_frames": int(lengths.sum()), "splits": dict(splits)}
     info = {**source.info, **paths, **totals}
-    write_as_lerobot(folder / INFO_FILE, info)
+    write_lerobot_json(folder / INFO_FILE, info)
     licences = {source.rows[number]["license"] for number in numbers}
     write_minimal_card(folder / CARD_FILE, licences, task_name(source.info))
     return _verified(source, numbers, folder)
