@@ -66,7 +66,7 @@ def test_recordings_are_converted_checked_and_found(made, tmp_path):
 
 def test_a_data_set_is_checked_described_and_released(made, root):
     assert check_dataset(root).findings == check_dataset(made / "set").findings
-    assert Manifest.of_folder(root).files == Manifest.of_folder(made / "set").files
+    assert Manifest.from_folder(root).files == Manifest.from_folder(made / "set").files
     ok(dataset, "exclude", root, "--episodes", 1, "--reason", "stick unplugged")
     ok(dataset, "stats", root)
     ok(dataset, "release", root, "--bump", "minor", "--notes", "The first.")

@@ -195,7 +195,7 @@ def test_what_is_not_as_released_is_not_kept(user, hub, tmp_path, what):
 def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, hub, released, tmp_path):
     other = Path(shutil.copytree(released, tmp_path / "other"))
     set_value(other, FRAMES, "action[0]", 0, 0.5)
-    (other / MANIFEST_FILE).write_text(Manifest.of_folder(other).to_text(), encoding="utf-8")
+    (other / MANIFEST_FILE).write_text(Manifest.from_folder(other).to_text(), encoding="utf-8")
     for name in (FRAMES, MANIFEST_FILE):
         tamper(hub, name, (other / name).read_bytes())
     found = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out").error

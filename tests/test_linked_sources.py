@@ -119,7 +119,7 @@ def test_a_data_set_behind_links_is_read_added_to_and_released_whole(made, tmp_p
         os.symlink(os.path.relpath(path, root), root / path.name)
     os.symlink(made / "both", root / "raw")
     before = contents(tmp_path / "disk")
-    assert Manifest.of_folder(root).files == Manifest.of_folder(tmp_path / "disk" / "set").files != {}
+    assert Manifest.from_folder(root).files == Manifest.from_folder(tmp_path / "disk" / "set").files != {}
     assert check_dataset(root).count("error") == 0
     assert converted(made / "both", root, "--append") == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == 3
@@ -143,7 +143,7 @@ def test_a_recording_whose_link_leads_nowhere_is_named(made, linked, tmp_path, c
     assert message.startswith(str(lost))
     found = [(f.episode, f.message) for f in check_dataset(linked).findings if f.severity == "error"]
     assert found == [("a/lost.mcap", "a link that leads nowhere")]
-    with pytest.raises(CopolicyError, match=r"lost\.mcap: expected a recording, found a link that leads nowhere"):
+    with pytest.raises(CopolicyError, match=r"lost\.mcap: expected a recording, found a broken link"):
         find_raw_recordings(made / "whole", linked)
     capsys.readouterr()
     assert collect(["recover", str(linked), "--damaged", "--json"]) == 1
@@ -173,8 +173,8 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
 def test_a_file_of_a_data_set_whose_link_leads_nowhere_is_named(made, tmp_path, capsys):
     root = Path(shutil.copytree(made / "whole", tmp_path / "set"))
     os.symlink("/nowhere", root / "meta" / "notes.txt")
-    with pytest.raises(CopolicyError, match=r"notes\.txt: expected a file, found a link that leads nowhere"):
-        Manifest.of_folder(root)
+    with pytest.raises(CopolicyError, match=r"notes\.txt: expected a file, found a broken link"):
+        Manifest.from_folder(root)
     before = set(os.listdir(root / "meta"))
     make_recordings(tmp_path / "raw", 1, seed=9)
     assert converted(tmp_path / "raw", root, "--append") == 2

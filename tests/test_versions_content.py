@@ -166,7 +166,7 @@ DAMAGES = {
     ),
     "twice": (
         lambda root: change_table(root, EPISODES, lambda t: t.set_column(7, "episode_uuid", pa.array(["a"] * 6))),
-        r"episodes: expected an episode_uuid of its own for each episode, found 6 with 'a'",
+        r"episodes: expected a unique episode_uuid for each episode, found 6 with 'a'",
     ),
     "a frame less": (
         lambda root: change_table(root, FRAMES, lambda table: table.slice(1)),

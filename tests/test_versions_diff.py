@@ -14,8 +14,8 @@ from versioned_data_set import (
 )
 
 from copolicy.dataset.cli import main
+from copolicy.dataset.versions.diff_inputs import compare_statistics
 from copolicy.dataset.versions.release import release
-from copolicy.dataset.versions.sources import compare_statistics
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_the_text_names_each_change_and_the_step_it_asks_for(converted, dataset,
     text = capsys.readouterr().out
     first = uuids(converted)[0]
     assert f"1 episode with other values of pair_id: {first} (patch)" in text
-    assert "not compared: stored on one side at most" in text
+    assert "not compared: not stored for both data sets" in text
 
 
 def test_stored_statistics_are_compared(converted, dataset, capsys):

@@ -23,7 +23,7 @@ from copolicy.dataset.publication.data_version import DataVersion, newest_versio
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.difference import Change
 from copolicy.dataset.versions.manifest import Manifest
-from copolicy.dataset.versions.release import release, with_release
+from copolicy.dataset.versions.release import changelog_with_release, release
 from copolicy.dataset.versions.release_record import ReleaseRecord, read_release
 
 DAY = datetime.date(2026, 3, 1)
@@ -71,7 +71,7 @@ def test_the_manifest_names_every_file(released):
     manifest = Manifest.read(released / MANIFEST_FILE)
     files = {path.relative_to(released).as_posix() for path in released.rglob("*") if path.is_file()}
     assert set(manifest.files) == files - {MANIFEST_FILE}
-    assert manifest.differences(Manifest.of_folder(released)) == []
+    assert manifest.differences(Manifest.from_folder(released)) == []
     assert manifest.files["README.md"].size == (released / "README.md").stat().st_size
 
 
@@ -85,7 +85,7 @@ def test_a_manifest_names_what_differs(released):
     (released / ".cache" / "x").write_text("", encoding="utf-8")
     (released / "raw").mkdir()
     (released / "raw" / "one.mcap").write_text("", encoding="utf-8")
-    assert manifest.differences(Manifest.of_folder(released)) == [
+    assert manifest.differences(Manifest.from_folder(released)) == [
         "README.md has other content",
         "meta/stats.json is missing",
         "notes/routes.png is not in the manifest",
@@ -167,7 +167,7 @@ def test_the_change_log_keeps_a_changelog(released):
 
 
 def test_a_hand_written_head_of_the_change_log_stays():
-    text = with_release(
+    text = changelog_with_release(
         "# Our table\nBy us.\n", "1.0.0", "2026-03-01", "N.", [Change("major", "task 'a' removed")], "h"
     )
     assert text == (
@@ -205,13 +205,13 @@ def test_a_release_that_breaks_off_can_be_run_again(released, monkeypatch, renam
     monkeypatch.setattr(os, "replace", really_replace)
     assert release(released, "patch", "Corrected.", DAY).version == "1.0.1"
     assert (released / "CHANGELOG.md").read_text(encoding="utf-8").count("## [1.0.1]") == 1
-    assert Manifest.read(released / MANIFEST_FILE).differences(Manifest.of_folder(released)) == []
+    assert Manifest.read(released / MANIFEST_FILE).differences(Manifest.from_folder(released)) == []
     assert not list(released.rglob("*.part"))
 
 
 @pytest.mark.parametrize("notes", ["", "  \n", "Fine.\n## [9.9.9]"])
 def test_notes_that_would_spoil_the_change_log_are_refused(dataset, notes):
-    with pytest.raises(InvalidValueError, match=r"--notes: expected a text without headings of its own"):
+    with pytest.raises(InvalidValueError, match=r"--notes: expected a text without lines that begin with '## '"):
         release(dataset, "major", notes, DAY)
     assert not (dataset / "CHANGELOG.md").exists()
 

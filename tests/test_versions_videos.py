@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.versions.frames import video_digest
+from copolicy.dataset.versions.frame_digests import video_digest
 
 FPS = 10
 

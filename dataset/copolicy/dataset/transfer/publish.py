@@ -134,7 +134,7 @@ def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
     if minimal or not (root / CARD_FILE).is_file():
         found = "the minimal one of copolicy-convert, which describes nothing" if minimal else "none"
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
-    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
+    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.from_folder(root)
     differences = released.differences(present)
     about = {CHECK_FILE, CROISSANT_FILE}
     changed = [line for line in released.differences(present, without=about) if line.startswith(_CHECKED)]

@@ -68,7 +68,7 @@ def _verify(folder: Path, name: str) -> tuple[ReleaseRecord, int]:
     """The release in a folder and the number of its files, once every byte and the content hash are as they should."""
     try:
         record, manifest = read_release(folder), Manifest.read(folder / MANIFEST_FILE)
-        differences = manifest.differences(Manifest.of_folder(folder))
+        differences = manifest.differences(Manifest.from_folder(folder))
         content_hash = read_content(folder).hash
         files = len(manifest.files) + 1
         if (folder / RAW_MANIFEST_FILE).exists():

@@ -40,7 +40,7 @@ def find_raw_recordings(root: Path, folder: Path) -> RawRecordings:
     found = set()
     for path in paths:
         if not path.exists():
-            raise FileFormatError(path, "a recording", "a link that leads nowhere")
+            raise FileFormatError(path, "a recording", "a broken link")
         entry = file_entry(path)
         if entry.sha256 in wanted and entry.sha256 not in found:
             name = f"{RAW_FOLDER}/{path.relative_to(folder).as_posix()}"

@@ -30,7 +30,7 @@ from ...files.replace_folder import delete_folder, is_unfinished, replaced_folde
 from ...versions.digests import EpisodeContent
 from ...versions.manifest import Manifest
 from ...versions.release_record import ReleaseRecord
-from ...versions.withdrawals import anonymised, read_withdrawals, withdrawals_text
+from ...versions.withdrawals import anonymise, read_withdrawals, withdrawals_text
 from ..amend import today
 from ..subset.stored_set import StoredSet, without_episodes, write_record
 from ..subset.writing import kept_splits, write_subset
@@ -141,7 +141,7 @@ def _clean_releases(partial: Path, traces: Traces, gone: Sequence[EpisodeContent
             record,
             notes=traces.without(record.notes),
             changes=[traces.without(text) for text in record.changes],
-            content=anonymised(record.content, lambda episode: episode.episode_uuid in uuids),
+            content=anonymise(record.content, lambda episode: episode.episode_uuid in uuids),
         )
         _rewrite(path, record.to_text())
     changelog = partial / CHANGELOG_FILE
