@@ -10,7 +10,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.json_file import read_json
-from copolicy.dataset.lerobot_folder.info import is_ours
+from copolicy.dataset.lerobot_folder.info import is_copolicy_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.policies.documents import TrainingDocument
 
@@ -104,7 +104,7 @@ def require_episode_columns(meta: Any, named: bool) -> None:
 
 def _is_ours(meta: Any) -> bool:
     """A conversion of ours left a mark that LeRobot's tools keep, or a document that they do not touch."""
-    marked = is_ours({"robot_type": meta.robot_type, "features": dict(meta.features)})
+    marked = is_copolicy_info({"robot_type": meta.robot_type, "features": dict(meta.features)})
     return marked or any((Path(meta.root) / "meta").glob("copolicy*.json"))
 
 

@@ -15,7 +15,7 @@ from copolicy.dataset.files.replace_folder import finish_interrupted, swap_folde
 from copolicy.dataset.files.staging import named_errors, write_lerobot_json
 from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
-from copolicy.dataset.lerobot_folder.references import Place, numbered_files
+from copolicy.dataset.lerobot_folder.references import FileIndex, chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, write_minimal_card
 from copolicy.dataset.recording.log import read_metadata
@@ -100,7 +100,7 @@ def append_recordings(
     finish_interrupted(root)
     require_loadable(root)
     files, unfinished = find_recordings(folders)
-    known = {name for path in numbered_files(root / EPISODES_FOLDER).values() for name in _uuids(path)}
+    known = {name for path in chunk_files(root / EPISODES_FOLDER).values() for name in _uuids(path)}
     new = [path for path in files if _uuid(path) not in known]
     summary: dict[str, Any] = {"root": str(root), "already_there": len(files) - len(new), "episodes_added": 0}
     if not new:
@@ -155,14 +155,14 @@ def _join(whole: Path, added: Path) -> dict[str, Any]:
     if read_parquet(whole / TASKS_FILE).to_pylist() != read_parquet(added / TASKS_FILE).to_pylist():
         raise FileFormatError(whole / TASKS_FILE, "the one task of copolicy-convert", "others")
     shift = Shift(info["total_episodes"], info["total_frames"])
-    data: dict[Place, Place] = {}
-    last, example = list(numbered_files(whole / "data").items())[-1]
-    for old, path in numbered_files(added / "data").items():
+    data: dict[FileIndex, FileIndex] = {}
+    last, example = list(chunk_files(whole / "data").items())[-1]
+    for old, path in chunk_files(added / "data").items():
         data[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
         write_like(shift.frame_table(read_parquet(path)), example, _numbered(whole / "data", last))
     moved = {"data": data, **_move_videos(whole, added, info)}
-    last, example = list(numbered_files(whole / EPISODES_FOLDER).items())[-1]
-    for path in numbered_files(added / EPISODES_FOLDER).values():
+    last, example = list(chunk_files(whole / EPISODES_FOLDER).items())[-1]
+    for path in chunk_files(added / EPISODES_FOLDER).values():
         last = update_chunk_file_indices(*last, info["chunks_size"])
         table = shift.episode_table(read_parquet(path), moved, last)
         write_like(table, example, _numbered(whole / EPISODES_FOLDER, last))
@@ -194,14 +194,14 @@ def _renew_minimal_card(root: Path) -> None:
     write_minimal_card(path, {row["license"] for row in episode_rows(root)}, task_name(read_info(root)))
 
 
-def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:
+def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, dict[FileIndex, FileIndex]]:
     """Moves the video files behind those that are there; where each went, by folder."""
-    moved: dict[str, dict[Place, Place]] = {}
+    moved: dict[str, dict[FileIndex, FileIndex]] = {}
     for key in (name for name, feature in info["features"].items() if feature["dtype"] == "video"):
         folder = f"videos/{key}"
-        last = list(numbered_files(whole / folder, "mp4"))[-1]
+        last = list(chunk_files(whole / folder, "mp4"))[-1]
         places = moved[folder] = {}
-        for old, path in numbered_files(added / folder, "mp4").items():
+        for old, path in chunk_files(added / folder, "mp4").items():
             places[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
             target = _numbered(whole / folder, last, "mp4")
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -209,7 +209,7 @@ def _move_videos(whole: Path, added: Path, info: dict[str, Any]) -> dict[str, di
     return moved
 
 
-def _numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
+def _numbered(folder: Path, place: FileIndex, suffix: str = "parquet") -> Path:
     return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
 
 

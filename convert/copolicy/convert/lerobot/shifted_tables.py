@@ -8,7 +8,7 @@ from typing import Any
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER
-from copolicy.dataset.lerobot_folder.references import Place, numbered_files
+from copolicy.dataset.lerobot_folder.references import FileIndex, chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 try:
@@ -49,7 +49,7 @@ class Shift:
         return table
 
     def episode_table(
-        self, table: "pa.Table", moved_files: Mapping[str, Mapping[Place, Place]], own: Place
+        self, table: "pa.Table", moved_files: Mapping[str, Mapping[FileIndex, FileIndex]], own: FileIndex
     ) -> "pa.Table":
         """A table of meta/episodes.
 
@@ -95,7 +95,7 @@ def write_like(table: "pa.Table", example: "Path | pa.Schema", path: Path) -> No
 
 def episode_rows(root: Path) -> list[dict[str, Any]]:
     """The episode columns of each episode of a data set, as far as it has them."""
-    tables = [read_parquet(path) for path in numbered_files(root / EPISODES_FOLDER).values()]
+    tables = [read_parquet(path) for path in chunk_files(root / EPISODES_FOLDER).values()]
     return [
         row
         for table in tables
@@ -103,7 +103,7 @@ def episode_rows(root: Path) -> list[dict[str, Any]]:
     ]
 
 
-def _placed(table: "pa.Table", folder: str, places: list[Place]) -> "pa.Table":
+def _placed(table: "pa.Table", folder: str, places: list[FileIndex]) -> "pa.Table":
     for part, name in enumerate(_PLACE):
         table = replaced(table, f"{folder}/{name}", [place[part] for place in places])
     return table

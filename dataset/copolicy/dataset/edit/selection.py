@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from ..episode import OTHER_REASONS, Source
 from ..exceptions import InvalidValueError, RunError
-from ..lerobot_folder.episode_rows import chosen_episodes
+from ..lerobot_folder.episode_rows import select_episodes
 from ..task import get_task, installed_tasks
 from .expression import parse_condition
 
@@ -66,7 +66,7 @@ class Selection:
             RunError: a value that no episode has.
         """
         names = {row["episode_uuid"]: row["episode_index"] for row in rows if row.get("episode_uuid")}
-        listed = chosen_episodes(self.episodes, (row["episode_index"] for row in rows), names)
+        listed = select_episodes(self.episodes, (row["episode_index"] for row in rows), names)
         holds = parse_condition(self.where, types) if self.where else lambda _: True
         wanted = {
             "--pairs": (self.pairs, lambda row: {row.get("pair_id")}),

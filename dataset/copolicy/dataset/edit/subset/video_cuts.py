@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...exceptions import FileFormatError, MissingExtraError
-from ...lerobot_folder.references import Place, next_place, numbered, video_span
+from ...lerobot_folder.references import FileIndex, chunk_file, next_index, video_span
 
 Row = dict[str, Any]
 _NOT_WRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -36,18 +36,18 @@ def cut_videos(
         FileFormatError: a file lacks pictures, or an episode in it does not begin with a key picture.
         MissingExtraError: PyAV is not installed.
     """
-    by_file: dict[Place, list[int]] = defaultdict(list)
+    by_file: dict[FileIndex, list[int]] = defaultdict(list)
     for place, row in enumerate(episodes):
         by_file[row[f"videos/{key}/chunk_index"], row[f"videos/{key}/file_index"]].append(place)
     wanted = set(chosen)
     columns: dict[int, Row] = {}
-    target: Place | None = None
+    target: FileIndex | None = None
     for _, places in sorted(by_file.items()):
         inside = sorted((place for place in places if place in wanted), key=lambda p: _start(episodes[p], key))
         if not inside:
             continue
-        target = next_place(target, info)
-        path = numbered(folder / "videos" / key, target, "mp4")
+        target = next_index(target, info)
+        path = chunk_file(folder / "videos" / key, target, "mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
         video, *_ = video_span(root, info, episodes[inside[0]], key)
         if len(inside) == len(places):

@@ -13,7 +13,7 @@ from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
 from ...files.staging import write_lerobot_json
 from ...lerobot_folder.info import split_range, task_name
-from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, Place, data_file, next_place, numbered
+from ...lerobot_folder.references import DATA_TEMPLATE, VIDEO_TEMPLATE, FileIndex, chunk_file, data_file, next_index
 from ...lerobot_folder.tables import read_parquet
 from ...publication.minimal_card import write_minimal_card
 from ...versions.content import read_content
@@ -57,7 +57,7 @@ def write_subset(source: StoredSet, numbers: Sequence[int], folder: Path, splits
     for name, values in columns.items():
         rows = _replaced(rows, name, list(values))
     rows = _moved_statistics(rows, {"episode_index": range(len(numbers)), "index": starts.tolist()})
-    path = numbered(folder / EPISODES_FOLDER, (0, 0))
+    path = chunk_file(folder / EPISODES_FOLDER, (0, 0))
     path.parent.mkdir(parents=True)
     pq.write_table(_plain(rows), path, compression="snappy", use_dictionary=True)
     write_statistics(aggregated_statistics(rows), folder)
@@ -86,12 +86,12 @@ def kept_splits(info: Mapping[str, Any], numbers: Sequence[int]) -> dict[str, st
     return splits or {"train": f"0:{len(numbers)}"}
 
 
-def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray, folder: Path) -> list[Place]:
+def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray, folder: Path) -> list[FileIndex]:
     """Writes the data files, a row group an episode; where each episode went."""
     size = source.info.get("data_files_size_in_mb")
     limit = (size if isinstance(size, int | float) and size > 0 else _DATA_MB) * 2**20
-    places: list[Place] = []
-    place: Place | None = None
+    places: list[FileIndex] = []
+    place: FileIndex | None = None
     path, writer, schema = folder, None, None
     try:
         for number, start, frames in zip(numbers, starts.tolist(), _frames(source, numbers), strict=True):
@@ -101,8 +101,8 @@ def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray,
                 writer.close()
                 writer = None
             if writer is None:
-                place = next_place(place, source.info)
-                path = numbered(folder / "data", place)
+                place = next_index(place, source.info)
+                path = chunk_file(folder / "data", place)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 writer = pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True)
             moved = _replaced(frames, "episode_index", [len(places)] * len(frames))
