@@ -101,8 +101,7 @@ def test_the_command(root, capsys):
         (("--reason", "x"), "--episodes: expected numbers, ranges such as 3-5, or episode_uuids, found None"),
         (
             ("--episodes", "1", "3-9", "--reason", "x"),
-            "--episodes: expected numbers from 0 to 4, ranges such as 3-5, or existing episode_uuids, "
-            "found '3-9'",
+            "--episodes: expected numbers from 0 to 4, ranges such as 3-5, or existing episode_uuids, found '3-9'",
         ),
         (("--episodes", "1", "--reason", "x", "--undo"), "--reason: expected none with --undo, found 'x'"),
         (("--list", "--reason", "x"), "--list: expected neither --episodes nor --reason with it, found 'one of them'"),

@@ -170,7 +170,7 @@ REFUSED = {
     "changed metadata": (
         lambda root: set_value(root, EPISODES, "pair_id", 0, "pair-9"),
         1,
-        "{root}: expected what release 1.0.0 holds, found that meta/episodes/chunk-000/file-000.parquet has other "
+        "{root}: expected the content of release 1.0.0, found meta/episodes/chunk-000/file-000.parquet has other "
         "content; release it first",
     ),
     "other statistics": (
@@ -178,7 +178,7 @@ REFUSED = {
             (root / "meta/stats.json").read_text(encoding="utf-8") + " ", encoding="utf-8"
         ),
         1,
-        "{root}: expected what release 1.0.0 holds, found that meta/stats.json has other content; release it first",
+        "{root}: expected the content of release 1.0.0, found meta/stats.json has other content; release it first",
     ),
     "an error that the checks find": (
         lambda root: (set_value(root, FRAMES, "action[0]", 0, 7.0), release(root, "major", "Stronger.")),
@@ -349,7 +349,7 @@ def test_recordings_that_are_not_complete_are_refused(hub, dataset, publish, rel
     recordings = Path(shutil.copytree(released_once.parent / "recordings", dataset.parent / "recordings"))
     (recordings / "episode_000003.mcap").unlink()
     message = publish("--raw", recordings).error
-    assert message.startswith(f"{recordings}: expected the recording of every episode, found none of 1, first of ")
+    assert message.startswith(f"{recordings}: expected the recording of every episode, found 1 missing, first that of ")
     assert hub.requests == []
 
 
@@ -369,7 +369,7 @@ def test_excluded_episodes_are_sent_only_when_asked_for(hub, dataset, publish):
     assert done.status == 1
     assert "found 1 (1); nothing was uploaded" in done.err
     assert f"copolicy-dataset select {dataset} --out NEW --drop-excluded" in done.err
-    assert "--with-excluded sends them all the same" in done.err
+    assert "--with-excluded uploads them" in done.err
     assert len(done.err.splitlines()) == 1
     assert not hub.repositories
     assert publish("--with-excluded").status == 0

@@ -173,13 +173,17 @@ def tamper(hub: LocalHub, name: str, data: bytes | None) -> None:
     )
 
 
-_UNEXPECTED = "expected the files in its manifest, found that"
+_UNEXPECTED = "expected the files in its manifest, found"
 TAMPERED = {
     "other card": ("README.md", b"theirs", f"{_UNEXPECTED} README.md has other content; nothing was kept"),
     "a file more": ("notes.txt", b"x", f"{_UNEXPECTED} notes.txt is not in the manifest; nothing was kept"),
     "a file less": ("meta/stats.json", None, f"{_UNEXPECTED} meta/stats.json is missing; nothing was kept"),
-    "no manifest": ("meta/manifest.json", None, "what arrived is no release: meta/manifest.json: expected a manifest"),
-    "no release": ("meta/copolicy_release.json", None, "what arrived is no release: expected a release"),
+    "no manifest": (
+        "meta/manifest.json",
+        None,
+        "the download is not a release: meta/manifest.json: expected a manifest",
+    ),
+    "no release": ("meta/copolicy_release.json", None, "the download is not a release: expected a release"),
 }
 
 

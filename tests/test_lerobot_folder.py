@@ -205,7 +205,10 @@ def _change_frames(root, change):
     ("change", "found"),
     [
         (lambda table: table.slice(1), r"expected episode 0 with \d+ frames as in meta/episodes, found episode 0 with"),
-        (lambda table: pa.concat_tables([table, table.slice(0, 1)]), "expected no further episode as in meta/episodes, found"),
+        (
+            lambda table: pa.concat_tables([table, table.slice(0, 1)]),
+            "expected no further episode as in meta/episodes, found",
+        ),
         (lambda table: table.filter(pc.field("episode_index") == 0), "expected the frames of episode 1"),
         (lambda table: table.drop_columns("next.reward"), "none named next.reward"),
     ],

@@ -1,4 +1,4 @@
-"""Brings a published data set back from the Hub and proves that it is what was released."""
+"""Downloads a published data set from the Hub and verifies it against its release."""
 
 import shutil
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from ..versions.release_record import ReleaseRecord, read_release
 
 
 @dataclass(frozen=True)
-class Pulled:
-    """What was downloaded and verified."""
+class PullResult:
+    """A downloaded and verified data set."""
 
     root: str
     repo_id: str
@@ -28,20 +28,20 @@ class Pulled:
     files: int
 
 
-def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> Pulled:
-    """Downloads a data version to `root`, which appears complete and verified or not at all.
+def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> PullResult:
+    """Downloads a data version to `root`, which appears only when complete and verified.
 
-    A download that breaks off leaves its files in a hidden folder beside `root`, and the next call goes on with them.
+    An interrupted download leaves its files in a hidden folder beside `root`, and the next call resumes it.
 
     Args:
         revision: a tag, branch or commit; the newest `data-x.y.z` by default.
-        raw: with the recordings under `raw/`, where there are some.
+        raw: also download the recordings under `raw/`, if there are any.
 
     Raises:
-        OutputExistsError: there is something at `root`.
+        OutputExistsError: `root` exists.
         HubError: the Hub does not answer, or has no such data set or revision.
-        RunError: what arrived is not what its manifest and its release say.
-        OSError: the disk refuses; nothing is kept.
+        RunError: the files differ from the manifest or the release.
+        OSError: the disk is full or not writable; the files are deleted.
     """
     checked_repo_id(repo_id, "data set on the Hub")
     require_new(root)
@@ -61,11 +61,11 @@ def pull(repo_id: str, revision: str | None, root: Path, raw: bool = False) -> P
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
             raise
-    return Pulled(str(root), repo_id, revision, commit, record.version, record.content_hash, files)
+    return PullResult(str(root), repo_id, revision, commit, record.version, record.content_hash, files)
 
 
 def _verify(folder: Path, name: str) -> tuple[ReleaseRecord, int]:
-    """The release in a folder and the number of its files, once every byte and the content hash are as they should."""
+    """Verifies files and content hash of a folder; returns its release and number of files."""
     try:
         record, manifest = read_release(folder), Manifest.read(folder / MANIFEST_FILE)
         differences = manifest.differences(Manifest.from_folder(folder))
@@ -73,18 +73,18 @@ def _verify(folder: Path, name: str) -> tuple[ReleaseRecord, int]:
         files = len(manifest.files) + 1
         if (folder / RAW_MANIFEST_FILE).exists():
             recordings = Manifest.read(folder / RAW_MANIFEST_FILE)
-            found = {
+            entries = {
                 file.relative_to(folder).as_posix(): file_entry(file)
                 for file in visible_files(folder / RAW_FOLDER, "*.mcap")
             }
-            differences += recordings.differences(Manifest(found))
+            differences += recordings.differences(Manifest(entries))
             files += len(recordings.files) + 1
     except FileFormatError as error:
         raise RunError(
-            f"{name}: what arrived is no release: {str(error).replace(f'{folder}', '').lstrip('/: ')}"
+            f"{name}: the download is not a release: {str(error).replace(f'{folder}', '').lstrip('/: ')}"
         ) from None
     if differences:
-        raise RunError(f"{name}: expected the files in its manifest, found that {differences[0]}; nothing was kept")
+        raise RunError(f"{name}: expected the files in its manifest, found {differences[0]}; nothing was kept")
     if content_hash != record.content_hash:
         raise RunError(f"{name}: expected content {record.content_hash}, found {content_hash}; nothing was kept")
     return record, files
