@@ -79,7 +79,7 @@ def test_a_nan_in_any_number_of_the_frames_is_an_error(root, name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is not there"),
+        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is missing"),
         (lambda root: set_columns(root, **{"data/chunk_index": [0, -1, 0]}), "data/chunk_index -1"),
         (lambda root: set_info(root, data_path=None), "data_path None in meta/info.json"),
         (lambda root: set_info(root, data_path="data/{nothing}.parquet"), "data_path"),

@@ -88,7 +88,7 @@ def test_a_column_of_nulls_gets_its_type_back(root):
 @pytest.mark.parametrize(
     ("texts", "error", "line"),
     [
-        (["success=true"], InvalidValueError, "--set: expected a column that somebody states .*found 'success: it is"),
+        (["success=true"], InvalidValueError, "--set: expected a declared column .*found 'success: it is"),
         (["duration_s=3"], InvalidValueError, "it is measured"),
         (["discarded=true"], InvalidValueError, "copolicy-dataset exclude sets it"),
         (["episode_uuid=x"], InvalidValueError, "it is measured, or follows from the data"),
@@ -121,9 +121,9 @@ def test_every_amendable_column_is_an_episode_column():
     [
         (["--set", "license=CC"], 2, "--set license"),
         (["--set", "source=human"], 1, "expected an episode with another value, found none; nothing was changed"),
-        (["--set", "license=mit", "--where", "duration_s < 0"], 1, "expected at least one episode that is meant"),
-        (["--set", "license=mit", "--pairs", "P77"], 1, "--pairs: expected a value that an episode has"),
-        (["--restore-from", "nowhere"], 1, "found that each has an episode_uuid"),
+        (["--set", "license=mit", "--where", "duration_s < 0"], 1, "expected at least one selected episode"),
+        (["--set", "license=mit", "--pairs", "P77"], 1, "--pairs: expected a value of the data set"),
+        (["--restore-from", "nowhere"], 1, "found an episode_uuid in each"),
         (["--restore-from", "nowhere", "--episodes", "1"], 2, "--restore-from: expected no other flag beside it"),
     ],
 )

@@ -213,9 +213,9 @@ def test_record_extra_keys_splits_and_licences_come_along(root, tmp_path):
 @pytest.mark.parametrize(
     ("flags", "status", "line"),
     [
-        (["--where", "duration_s < 0"], 1, "expected at least one episode that is meant, found none"),
-        (["--pairs", "P99"], 1, "--pairs: expected a value that an episode has, found 'P99', which none has"),
-        (["--pairs", "P01", "P99"], 1, "--pairs: expected a value that an episode has, found 'P99'"),
+        (["--where", "duration_s < 0"], 1, "expected at least one selected episode, found none"),
+        (["--pairs", "P99"], 1, "--pairs: expected a value of the data set, found 'P99', which no episode has"),
+        (["--pairs", "P01", "P99"], 1, "--pairs: expected a value of the data set, found 'P99'"),
         (["--episodes", "99"], 2, "--episodes: expected numbers from 0 to 7"),
         (["--results", "won"], 2, "--results: expected one of success, failure, goal"),
         (["--sources", "robot"], 2, "--sources: expected one of human, simulated, upstream, found 'robot'"),
@@ -243,8 +243,8 @@ def test_an_output_that_exists_and_a_set_without_columns(root, tmp_path, capsys)
 def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):
     from copolicy.dataset.edit.subset import writing as subset
 
-    original = subset._moved_statistics
-    monkeypatch.setattr(subset, "_moved_statistics", lambda rows, firsts: original(rows, firsts).slice(0, 1))
+    original = subset._shift_statistics
+    monkeypatch.setattr(subset, "_shift_statistics", lambda rows, firsts: original(rows, firsts).slice(0, 1))
     with pytest.raises(FileFormatError):
         select(root, tmp_path / "new", Selection(episodes=("0-2",)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["set"]

@@ -9,8 +9,8 @@ from edited_data import columns, digests, info, load, make_people
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
-from copolicy.dataset.edit.groups import By, groups
-from copolicy.dataset.edit.parts import deal, parse_parts
+from copolicy.dataset.edit.groups import By, group_episodes
+from copolicy.dataset.edit.parts import assign_groups, parse_parts
 from copolicy.dataset.edit.split import split
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
@@ -27,42 +27,42 @@ def rows(pairs, source="human", **others):
 
 def dealt(episodes, parts, by: By = "pairs", seed=0, same_consent=False):
     motions = list(range(len(episodes)))
-    return deal(episodes, groups(episodes, motions, by, same_consent), parse_parts(parts), by, seed)
+    return assign_groups(episodes, group_episodes(episodes, motions, by, same_consent), parse_parts(parts), by, seed)
 
 
 def test_a_player_with_two_partners_joins_their_pairs():
     episodes = rows(["a/b", "b/c", "d/e", "c/f", "g/h"])
-    assert groups(episodes, range(5), "pairs") == [[0, 1, 3], [2], [4]]
+    assert group_episodes(episodes, range(5), "pairs") == [[0, 1, 3], [2], [4]]
     # Whoever sat where.
-    assert groups(rows(["a/b", "c/a"]), range(2), "pairs") == [[0, 1]]
+    assert group_episodes(rows(["a/b", "c/a"]), range(2), "pairs") == [[0, 1]]
 
 
 def test_a_consent_id_joins_pairs_where_it_means_one_person():
     episodes = rows(["a/b", "c/d", "e/f"], consent_id=["C-1,C-2", "C-2", "C-3"])
-    assert groups(episodes, range(3), "pairs") == [[0], [1], [2]]
-    assert groups(episodes, range(3), "pairs", same_consent=True) == [[0, 1], [2]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0], [1], [2]]
+    assert group_episodes(episodes, range(3), "pairs", same_consent=True) == [[0, 1], [2]]
 
 
 def test_scripted_agents_are_joined_by_their_pair_alone():
     episodes = rows(["s/t", "s/u", "s/t"], source="simulated")
-    assert groups(episodes, range(3), "pairs") == [[0, 2], [1]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0, 2], [1]]
 
 
 def test_people_without_a_name_stay_together():
     episodes = [{"source": "human"}, {"source": "human", "pair_id": ""}, *rows(["a/b"])]
-    assert groups(episodes, range(3), "pairs") == [[0, 1], [2]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0, 1], [2]]
 
 
 def test_copies_stay_together_whatever_is_asked():
     episodes = rows(["a/b", "c/d", "e/f"], source_sha256=["x", "y", "x"])
-    assert groups(episodes, [1, 2, 3], "episodes") == [[0, 2], [1]]
-    assert groups(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "maps") == [[0, 1, 2]]
-    assert groups(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "episodes") == [[0, 2], [1]]
+    assert group_episodes(episodes, [1, 2, 3], "episodes") == [[0, 2], [1]]
+    assert group_episodes(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "maps") == [[0, 1, 2]]
+    assert group_episodes(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "episodes") == [[0, 2], [1]]
 
 
 def test_a_map_stays_with_its_orientations():
     episodes = rows(["a/b"] * 4, map_id=["training-01", "training-02", "training-01-90deg", "training-01-displaced"])
-    assert groups(episodes, range(4), "maps") == [[0, 2, 3], [1]]
+    assert group_episodes(episodes, range(4), "maps") == [[0, 2, 3], [1]]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -120,7 +120,7 @@ def test_named_pairs_go_where_they_are_named():
     ("parts", "line"),
     [
         (["test=a/b", "train=b/c"], "share a person"),
-        (["test=nobody", "train=rest"], "found 'nobody', which none has"),
+        (["test=nobody", "train=rest"], "found 'nobody', which no episode has"),
         (["test=a/b", "train=d/e"], "found 1 in none; add NAME=rest"),
         (["test=a/b", "train=a/b"], "each name in one part"),
     ],

@@ -111,7 +111,7 @@ def test_nothing_is_left_of_what_is_withdrawn(folder, capsys):
 
 
 def test_lerobot_and_the_checks_take_what_is_left(folder):
-    withdraw("C-1", [folder / "set"], really=True)
+    withdraw("C-1", [folder / "set"], delete=True)
     set_columns(folder / "set", consent_id=["C-3"] * 6)
     assert not check_dataset(folder / "set").failed()
     assert load(folder / "set").num_episodes == info(folder / "set")["total_episodes"] == 6
@@ -121,7 +121,7 @@ def test_lerobot_and_the_checks_take_what_is_left(folder):
 def test_the_next_release_says_that_and_not_what(folder):
     root = folder / "set"
     released = read_release(root).content_hash
-    withdraw("C-1", [root], really=True)
+    withdraw("C-1", [root], delete=True)
     withdrawals = json.loads((root / "meta/copolicy_withdrawals.json").read_text(encoding="utf-8"))
     (entry,) = withdrawals["withdrawals"]
     assert (entry.keys(), entry["episodes"]) == ({"date", "episodes"}, 2)
@@ -137,13 +137,13 @@ def test_the_next_release_says_that_and_not_what(folder):
     assert "Sessions of (withdrawn) and P02." in log
     set_columns(root, license=["mit"] * 6)
     assert "withdrawn" not in " ".join(release(root, "patch", "Another licence.").changes)
-    withdraw("C-3", [root], really=True)
+    withdraw("C-3", [root], delete=True)
     assert "2 episodes removed: withdrawn by people who took part" in release(root, "major", "Fewer.").changes
 
 
 def test_a_release_is_compared_with_what_is_left(folder, capsys):
     root = folder / "set"
-    withdraw("C-1", [root], really=True)
+    withdraw("C-1", [root], delete=True)
     assert main(["diff", f"{root}@1.0.1", str(root)]) == 1
     out = capsys.readouterr().out
     assert "2 episodes removed: withdrawn by people who took part (major)" in out
@@ -152,13 +152,13 @@ def test_a_release_is_compared_with_what_is_left(folder, capsys):
 
 def test_what_was_never_released_is_told_at_the_first_release(made, tmp_path):
     root = Path(shutil.copytree(made, tmp_path / "set"))
-    withdraw("C-9", [root], really=True)
+    withdraw("C-9", [root], delete=True)
     changes = release(root, "minor", "The first.").changes
     assert changes[1] == "1 episode removed: withdrawn by people who took part; no release held them"
 
 
 def test_a_consent_id_covers_several_pairs_and_stands_beside_others(folder):
-    withdraw("C-2", [folder / "set", folder / "recordings"], really=True)
+    withdraw("C-2", [folder / "set", folder / "recordings"], delete=True)
     assert [row["pair_id"] for row in columns(folder / "set")] == ["P02", "P02", "P04", "P04"]
     assert len(list((folder / "recordings").glob("*.mcap"))) == 4
 
@@ -168,7 +168,7 @@ def test_an_amended_consent_id_leads_to_copies_that_lack_it(folder, made):
     other = Path(shutil.copytree(made, folder / "other"))
     set_columns(other, consent_id=[""] * 8)
     uuids = [row["episode_uuid"] for row in columns(folder / "set")]
-    summary = withdraw("C-9", [folder], really=True)
+    summary = withdraw("C-9", [folder], delete=True)
     assert (summary["withdrawn"], summary["recordings"], len(summary["data_sets"])) == (1, 1, 2)
     assert uuids[6] not in {row["episode_uuid"] for row in columns(other)}
     assert not (folder / "recordings" / "episode_000006.mcap").exists()
@@ -183,11 +183,11 @@ def test_recordings_in_every_state(folder):
     moved = files[2].rename(recordings / "deeper" / "any name.mcap")
     (recordings / "._episode_000003.mcap").write_bytes(b"macOS")
     shutil.rmtree(folder / "set" / "raw")
-    withdraw("C-1", [folder], really=True)
+    withdraw("C-1", [folder], delete=True)
     assert not os_part.exists()
     assert not undone.exists()
     assert moved.exists()
-    withdraw("C-3", [folder], really=True)
+    withdraw("C-3", [folder], delete=True)
     assert not moved.exists()
     assert not files[3].exists()
     assert not (recordings / "._episode_000003.mcap").exists()
@@ -197,7 +197,7 @@ def test_linked_recordings_are_deleted_where_they_lie(folder):
     elsewhere = folder / "disk"
     (folder / "recordings").rename(elsewhere)
     (folder / "recordings").symlink_to(elsewhere)
-    withdraw("C-3", [folder / "set", folder / "recordings"], really=True)
+    withdraw("C-3", [folder / "set", folder / "recordings"], delete=True)
     assert len(list(elsewhere.glob("*.mcap"))) == 6
 
 
@@ -216,16 +216,16 @@ def test_a_session_goes_with_its_last_recording(folder):
         ]
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (session / "journal.jsonl").write_text(text, encoding="utf-8")
-    withdraw("C-1", [folder / "set", out], really=True)
+    withdraw("C-1", [folder / "set", out], delete=True)
     assert [path.name for path in out.iterdir()] == ["P02-01"]
-    withdraw("C-3", [folder / "set", out], really=True)
+    withdraw("C-3", [folder / "set", out], delete=True)
     journal = (out / "P02-01" / "journal.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
 
 
 def test_a_set_without_an_episode_left_goes(folder):
     set_columns(folder / "set", consent_id=["C-5"] * 8)
-    summary = withdraw("C-5", [folder / "set"], really=True)
+    summary = withdraw("C-5", [folder / "set"], delete=True)
     assert "no episode is left" in str(summary)
     assert not (folder / "set").exists()
 
@@ -241,10 +241,10 @@ def test_a_deletion_that_was_killed_is_finished_and_never_undone(folder, monkeyp
     set_columns(folder / "set", consent_id=["C-5"] * 8)
     monkeypatch.setattr(replace_folder.shutil, "rmtree", half)
     with pytest.raises(Killed):
-        withdraw("C-5", [folder / "set"], really=True)
+        withdraw("C-5", [folder / "set"], delete=True)
     monkeypatch.undo()
     with pytest.raises(FileFormatError, match="no such file or folder"):
-        withdraw("C-5", [folder / "set"], really=True)
+        withdraw("C-5", [folder / "set"], delete=True)
     assert [path.name for path in folder.iterdir()] == ["recordings"]
 
 
@@ -252,7 +252,7 @@ def test_files_of_somebody_else_are_named_and_left(folder):
     notes = folder / "recordings" / "notes.md"
     notes.write_text("C-1 was tired", encoding="utf-8")
     (folder / "set" / "notes.txt").write_text("pair P01 again", encoding="utf-8")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert summary["still_named_in"] == [str(notes)]
     assert summary["data_sets"][str(folder / "set")]["still_named_in"] == ["notes.txt"]
     assert notes.read_text(encoding="utf-8") == "C-1 was tired"
@@ -263,7 +263,7 @@ def test_files_are_searched_whatever_their_name_and_length(folder):
     long.write_text("x" * (1 << 20) + " C-1 " + "y" * (1 << 20), encoding="utf-8")
     odd.write_text("P01", encoding="utf-8")
     (folder / "recordings" / "bytes.bin").write_bytes(b"\0C-1 ")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert summary["still_named_in"] == [str(odd), str(long)]
 
 
@@ -287,7 +287,7 @@ def test_columns_of_another_type_are_refused(folder):
     lists = [[text] for text in table.column("session_id").to_pylist()]
     pq.write_table(table.set_column(column, "session_id", pa.array(lists)), folder / "set" / EPISODES)
     with pytest.raises(FileFormatError, match="texts of session_id, found list"):
-        withdraw("C-1", [folder / "set"], really=True)
+        withdraw("C-1", [folder / "set"], delete=True)
 
 
 def test_an_unreadable_recording_is_named(folder, capsys):
@@ -309,7 +309,7 @@ def test_an_unreadable_recording_is_named(folder, capsys):
 def test_a_wrong_call_changes_nothing(folder, consent, paths, error, line):
     before = contents(folder)
     with pytest.raises(error, match=line):
-        withdraw(consent, [folder / path for path in paths], really=True)
+        withdraw(consent, [folder / path for path in paths], delete=True)
     assert contents(folder) == before
 
 
@@ -319,7 +319,7 @@ def test_a_stripped_set_stops_everything(folder):
     pq.write_table(table.drop_columns(["episode_uuid", "consent_id"]), other / EPISODES)
     before = contents(folder)
     with pytest.raises(FileFormatError, match="--restore-from ORIGINAL"):
-        withdraw("C-1", [folder], really=True)
+        withdraw("C-1", [folder], delete=True)
     assert contents(folder) == before
 
 
@@ -347,12 +347,12 @@ def test_an_interruption_leaves_the_old_or_the_new(folder, monkeypatch, stop):
     else:
         monkeypatch.setattr(replace_folder.shutil, "rmtree", killed)
     with pytest.raises(Killed):
-        withdraw("C-1", [root], really=True)
+        withdraw("C-1", [root], delete=True)
     monkeypatch.undo()
     finish_interrupted(root)
     assert (read_content(root).hash == before) is (stop == "first")
     if stop == "first":
-        withdraw("C-1", [root], really=True)
+        withdraw("C-1", [root], delete=True)
     assert len(columns(root)) == 6
     assert sorted(path.name for path in folder.iterdir()) == ["recordings", "set"]
 
@@ -363,7 +363,7 @@ def test_what_killed_commands_left_beside_a_set_goes_with_it(folder):
     shutil.copytree(root, folder / ".set.0123abcd.partial")
     shutil.copytree(root, folder / ".gone.89abcdef.partial")
     root.rename(folder / ".set.before-edit")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert len(columns(root)) == 6
     assert summary["unfinished"] == [str(folder / ".gone.89abcdef.partial")]
     assert sorted(path.name for path in folder.iterdir()) == [".gone.89abcdef.partial", "recordings", "set"]

@@ -115,7 +115,7 @@ def test_format_v21_is_named_with_the_way_on(name, tmp_path, refused):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_set_without_episodes_is_named(name, tmp_path, refused):
-    assert "found one without any" in refused(name, empty_set(tmp_path / "empty"))
+    assert "found an empty one" in refused(name, empty_set(tmp_path / "empty"))
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name not in ("exclude", "release", "merge")])

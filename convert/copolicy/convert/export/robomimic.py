@@ -17,8 +17,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from copolicy.dataset.edit.groups import By, groups
-from copolicy.dataset.edit.parts import Part, deal
+from copolicy.dataset.edit.groups import By, group_episodes
+from copolicy.dataset.edit.parts import Part, assign_groups
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_file
@@ -112,6 +112,6 @@ def _masks(source: ExportSource, episode: ExportEpisode, splits: bool) -> list[s
 
 def _set_apart(source: ExportSource, motions: list[str], validation: Validation) -> dict[str, list[str]]:
     parts = [Part("train", 1 - validation.proportion), Part("valid", validation.proportion)]
-    together = groups(source.rows, motions, validation.by)
-    dealt = deal(source.rows, together, parts, validation.by, validation.seed, "--valid")
+    together = group_episodes(source.rows, motions, validation.by)
+    dealt = assign_groups(source.rows, together, parts, validation.by, validation.seed, "--valid")
     return {name: [f"demo_{place}" for place in places] for name, places in dealt.items()}

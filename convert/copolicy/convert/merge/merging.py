@@ -78,7 +78,7 @@ def merge_datasets(
         record = _record(sources, prefixes)
         write_record(partial, record)
         write_minimal_card(partial / CARD_FILE, set(expected.column("license").to_pylist()), task_name(sources[0].info))
-    left_behind = {str(source.root): names for source in sources if (names := source.left_behind(licences_too=True))}
+    left_behind = {str(source.root): names for source in sources if (names := source.uncopied_files(licences=True))}
     return {
         "root": str(root),
         "repo_id": repo_id,
