@@ -118,7 +118,7 @@ def test_two_tools_do_not_mix(tmp_path):
     lock = CollectionLock(tmp_path)
     command = [sys.executable, "-m", "copolicy.collect.cli", "play", "--pair", "P01", "--out", str(tmp_path)]
     done = subprocess.run(
-        [*command, "--pilots", "scripted", "scripted", "--headless"], capture_output=True, text=True, timeout=60
+        [*command, "--players", "scripted", "scripted", "--headless"], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (

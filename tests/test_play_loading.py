@@ -27,7 +27,7 @@ def opened(self, *size):
     sys.exit(7)
 
 window.Window.__init__ = opened
-main(["play", "--pilots", *sys.argv[1:], "--mute"])
+main(["play", "--players", *sys.argv[1:], "--mute"])
 """
 
 

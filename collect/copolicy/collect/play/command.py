@@ -30,9 +30,9 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         _play,
         help="two players carry the table (or act in another task) together: a lobby, a session of episodes, one "
         "recording each",
-        example="copolicy-collect play --pilots keyboard policy:pretrained\n"
+        example="copolicy-collect play --players keyboard policy:pretrained\n"
         "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
-        needs=lambda arguments: POLICIES if any(who.startswith("policy") for who in arguments.pilots or ()) else (),
+        needs=lambda arguments: POLICIES if any(who.startswith("policy") for who in arguments.players or ()) else (),
     )
     command.add_argument(
         "--pair", default="guest", help="pseudonym of the pair; its players are PAIR-a and PAIR-b (default: guest)"
@@ -44,7 +44,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         help="folder of all sessions; a session continues there (default: outputs/sessions)",
     )
     command.add_argument(
-        "--pilots",
+        "--players",
         nargs=2,
         metavar=("A", "B"),
         help="who plays: joystick, keyboard, scripted[:PAIR], replay:FILE, policy:CKPT or policy:pretrained, the model "
@@ -97,8 +97,8 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
         CopolicyError: a value that cannot be.
     """
     task, pilots = get_task(arguments.task), None
-    if arguments.pilots:
-        first, second = (PilotSpec.parse(text, arguments.task) for text in arguments.pilots)
+    if arguments.players:
+        first, second = (PilotSpec.parse(text, arguments.task) for text in arguments.players)
         pilots = (first, second)
     return PlaySettings(
         **{name: getattr(arguments, name) for name in _AS_GIVEN},

@@ -10,7 +10,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 from ..angular_limit import ANGULAR_LIMITS
 
-_VIEWER = Path()  # `--rerun` without a file
+_KINDS = {".mp4": "video", ".mkv": "video", ".gif": "gif", ".png": "png", ".rrd": "rerun"}  # by the name's ending
 
 
 def add_replay_command(commands: argparse._SubParsersAction) -> None:
@@ -19,24 +19,23 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         commands,
         "replay",
         _replay,
-        help="play a recording in a window, or write it as video, GIF or pictures, or check it",
+        help="play a recording in a window, or write it as video, GIF or a sheet of images, or check it",
         example="copolicy-collect replay recordings/P01-01/episode_000.mcap\n"
-        "  copolicy-collect replay episode_000.mcap --video episode.mp4 --speed 2\n"
+        "  copolicy-collect replay episode_000.mcap --out episode.mp4 --speed 2\n"
         "  copolicy-collect replay episode_000.mcap --verify",
-        needs=lambda arguments: ("PIL",) if arguments.gif else (),
+        needs=lambda arguments: ("PIL",) if any(_kind(path) == "gif" for path in arguments.out) else (),
     )
     command.add_argument("file", type=Path, help="a recording, NAME.mcap")
-    command.add_argument("--video", type=Path, metavar="OUT.mp4", help="write an H.264 video; needs no display")
-    command.add_argument("--gif", type=Path, metavar="OUT.gif", help="write an endless GIF; needs no display")
-    command.add_argument("--png", type=Path, metavar="OUT.png", help="write a sheet of pictures; needs no display")
     command.add_argument(
-        "--rerun",
+        "--out",
         type=Path,
-        nargs="?",
-        const=_VIEWER,
-        metavar="OUT.rrd",
-        help="open it in Rerun, or write a file for Rerun (pip install rerun-sdk)",
+        nargs="+",
+        default=(),
+        metavar="FILE",
+        help="write, by the ending of the name: .mp4 an H.264 video, .gif an endless GIF, .png a sheet of images, .rrd "
+        "a file for Rerun (pip install rerun-sdk); needs no display",
     )
+    command.add_argument("--rerun", action="store_true", help="open it in Rerun's viewer (pip install rerun-sdk)")
     command.add_argument(
         "--verify", action="store_true", help="simulate the actions again; exit status 1 where they lead elsewhere"
     )
@@ -44,13 +43,13 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         "--speed", type=number("--speed", 0.05, 100), default=1.0, help="of video and GIF, times real time (default 1)"
     )
     command.add_argument(
-        "--fps", type=whole_number("--fps", 1, 120), help="pictures a second (default: video 30, GIF 12)"
+        "--fps", type=whole_number("--fps", 1, 120), help="frames a second (default: video 30, GIF 12)"
     )
     command.add_argument(
         "--width", type=whole_number("--width", 200, 10_000), help="px (default: video 1200, GIF 600, sheet 1800)"
     )
     command.add_argument(
-        "--frames", type=whole_number("--frames", 1, 200), default=12, help="pictures on the sheet (default 12)"
+        "--frames", type=whole_number("--frames", 1, 200), default=12, help="images on the sheet (default 12)"
     )
     command.add_argument(
         "--angular-limit",
@@ -58,13 +57,13 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         help="of --verify: another bound on the angular acceleration than the recording states",
     )
     command.add_argument(
-        "--limit-px",
-        type=number("--limit-px", exclusive=True),
+        "--max-drift-px",
+        type=number("--max-drift-px", exclusive=True),
         help="of --verify: largest drift, px (default 0.01)",
     )
     command.add_argument(
-        "--limit-rad",
-        type=number("--limit-rad", exclusive=True),
+        "--max-drift-rad",
+        type=number("--max-drift-rad", exclusive=True),
         help="of --verify: the same, rad (default 0.0001)",
     )
 
@@ -77,9 +76,12 @@ def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
     from .track import read_track
     from .verify import verify
 
-    if arguments.video:
+    kinds = [_kind(path) for path in arguments.out]
+    if len({*kinds}) < len(kinds):
+        raise InvalidValueError("--out", "one file of each kind", " ".join(map(str, arguments.out)))
+    if "video" in kinds:
         video_encoder()
-    if arguments.rerun is not None:
+    if arguments.rerun or "rerun" in kinds:
         require_rerun()
     track = read_track(arguments.file)
     if not track.steps:
@@ -87,20 +89,35 @@ def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
     summary: dict[str, Any] = {}
     film = {"speed": arguments.speed, "width": arguments.width, "fps": arguments.fps}
     if arguments.verify:
-        summary["verify"] = verify(track, arguments.angular_limit, arguments.limit_px, arguments.limit_rad)
+        summary["verify"] = verify(track, arguments.angular_limit, arguments.max_drift_px, arguments.max_drift_rad)
         summary["exit_status"] = summary["verify"].pop("exit_status")
-    if arguments.video:
-        summary["video"] = write_video(track, arguments.video, **film)
-    if arguments.gif:
-        summary["gif"] = write_gif(track, arguments.gif, **film)
-    if arguments.png:
-        sheet = {} if arguments.width is None else {"width": arguments.width}
-        summary["png"] = write_sheet(track, arguments.png, arguments.frames, **sheet)
-    if arguments.rerun is not None:
-        summary["rerun"] = log_to_rerun(track, None if arguments.rerun == _VIEWER else arguments.rerun)
+    sheet = {} if arguments.width is None else {"width": arguments.width}
+    for kind, path in zip(kinds, arguments.out, strict=True):
+        if kind == "video":
+            summary[kind] = write_video(track, path, **film)
+        elif kind == "gif":
+            summary[kind] = write_gif(track, path, **film)
+        elif kind == "png":
+            summary[kind] = write_sheet(track, path, arguments.frames, **sheet)
+        else:
+            summary[kind] = log_to_rerun(track, path)
+    if arguments.rerun:
+        summary["viewer"] = log_to_rerun(track)
     if not summary:
         from .viewer import Viewer
 
         Viewer(track).run()
         summary = {"file": str(arguments.file), "steps": track.steps}
     return summary
+
+
+def _kind(path: Path) -> str:
+    """What is written under a name, by its ending.
+
+    Raises:
+        InvalidValueError: an ending of no kind.
+    """
+    try:
+        return _KINDS[path.suffix.lower()]
+    except KeyError:
+        raise InvalidValueError("--out", f"names that end with {', '.join(_KINDS)}", str(path)) from None

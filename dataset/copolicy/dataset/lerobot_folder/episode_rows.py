@@ -62,7 +62,7 @@ def select_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping
         requested = set(range(first, min(last, first + len(numbers)) + 1))
         if not requested or not requested <= numbers:
             expected = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or existing episode_uuids"
-            raise InvalidValueError("--episodes", expected, text)
+            raise InvalidValueError("--episode-ids", expected, text)
         chosen |= requested
     return chosen
 

@@ -114,11 +114,13 @@ def add_exclude_command(commands: argparse._SubParsersAction) -> None:
     """Adds `exclude`."""
     parser = add_command(
         commands, "exclude", _exclude, "exclude episodes from training by a flag; no episode is removed",
-        'copolicy-dataset exclude datasets/table --episodes 12 30-33 --reason "joystick of player 1 unplugged"',
+        'copolicy-dataset exclude datasets/table --episode-ids 12 30-33 --reason "joystick of player 1 unplugged"',
         TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
-    parser.add_argument("--episodes", nargs="+", metavar="N", help="numbers, ranges such as 3-5, or episode_uuids")
+    parser.add_argument(
+        "--episode-ids", dest="episodes", nargs="+", metavar="N", help="numbers, ranges such as 3-5, or episode_uuids"
+    )
     parser.add_argument("--reason", help="reason, stored in the data set")
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--undo", action="store_true", help="remove the flag")
@@ -128,7 +130,7 @@ def add_exclude_command(commands: argparse._SubParsersAction) -> None:
 def _exclude(arguments: argparse.Namespace) -> dict:
     if arguments.list:
         if arguments.episodes or arguments.reason:
-            raise InvalidValueError("--list", "neither --episodes nor --reason with it", "one of them")
+            raise InvalidValueError("--list", "neither --episode-ids nor --reason with it", "one")
         listed = [entry._asdict() for entry in excluded_episodes(arguments.root)]
         left_out = {entry["episode"] for entry in listed}
         rows = [row for table in episode_tables(arguments.root, _COLUMNS).values() for row in _rows(table)]
@@ -141,7 +143,7 @@ def _exclude(arguments: argparse.Namespace) -> dict:
             "for_lerobot": f"--dataset.episodes=[{included}]",
         }
     if not arguments.episodes:
-        raise InvalidValueError("--episodes", "numbers, ranges such as 3-5, or episode_uuids", None)
+        raise InvalidValueError("--episode-ids", "numbers, ranges such as 3-5, or episode_uuids", None)
     if arguments.undo:
         if arguments.reason:
             raise InvalidValueError("--reason", "none with --undo", arguments.reason)
