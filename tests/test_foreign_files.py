@@ -32,15 +32,15 @@ KINDS = {
     "json": "a JSON file",
     "zip": "a zip archive",
     "damaged zip": "a damaged zip archive",
-    "zarr zip of another project": "a zipped Zarr store (copolicy-convert upstream takes the original program's)",
+    "zarr zip of another project": "a zipped Zarr store (copolicy-convert upstream reads the original program's)",
     "pipe": "a pipe, socket or device",
     "empty folder": "an empty folder",
     "folder of text": "a folder of other files",
-    "recordings of another project": "a folder of recordings (copolicy-convert mcap takes it)",
+    "recordings of another project": "a folder of recordings (copolicy-convert mcap reads it)",
     "folder of hdf5": "a folder of other files (.hdf5)",
-    "lerobot of another task": "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)",
-    "zarr v2 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
-    "zarr v3 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
+    "lerobot of another task": "a LeRobot data set (copolicy-dataset check and copolicy-convert export read it)",
+    "zarr v2 of another project": "a Zarr store (copolicy-convert upstream reads the original program's)",
+    "zarr v3 of another project": "a Zarr store (copolicy-convert upstream reads the original program's)",
 }
 
 

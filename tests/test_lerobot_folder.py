@@ -130,7 +130,7 @@ def test_training_takes_a_sound_set_of_another_task(tmp_path, sound):
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "check"])
 def test_a_folder_of_recordings_is_named_with_the_command_for_it(name, recordings, refused):
-    assert "found a folder of recordings (copolicy-convert mcap takes it)" in refused(name, recordings)
+    assert "found a folder of recordings (copolicy-convert mcap reads it)" in refused(name, recordings)
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def parse_settings(texts: Sequence[str]) -> dict[str, str]:
 def amend(root: Path, settings: Mapping[str, str], selection: Selection | None = None) -> dict[str, Any]:
     """Changes declared columns of some episodes; frames, videos and statistics stay unchanged.
 
-    `meta/copolicy.json` records the change; for columns that identify people without the old and new values.
+    `meta/copolicy.json` records the change; for columns that identify people it omits the old and new values.
 
     Args:
         settings: new values by column (`parse_settings`).

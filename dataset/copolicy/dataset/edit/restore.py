@@ -65,12 +65,12 @@ def restore(root: Path, originals: Path) -> dict[str, Any]:
     """
     finish_interrupted(root)
     tables = episode_tables(root, ("episode_index", "length"))
-    missing = _missing_columns(tables.values())
-    if not missing:
+    stripped = _episodes_without_columns(tables.values())
+    if not stripped:
         raise RunError(f"{root}: expected an episode without the episode columns, found an episode_uuid in each")
     motions = _motion_digests(read_lerobot(root), root)
-    found = _read_data_set(originals, root) if (originals / "meta").is_dir() else _read_recordings(originals, root)
-    restored = _match(root, originals, found, {number: motions[number] for number in missing})
+    candidates = _read_data_set(originals, root) if (originals / "meta").is_dir() else _read_recordings(originals, root)
+    restored = _match(root, originals, candidates, {number: motions[number] for number in stripped})
     names = {name: None for row in restored.values() for name in row}
     for path, table in tables.items():
         numbers = table.column("episode_index").to_pylist()
@@ -81,8 +81,8 @@ def restore(root: Path, originals: Path) -> dict[str, Any]:
             values = [restored[number].get(name) if number in restored else value for number, value in pairs]
             table = with_column(table, name, values, EPISODE_COLUMNS[name])
         tables[path] = table
-    record = stored_record(root) or _restored_record(found, restored)
-    note = {"date": today(), "episodes": len(restored), "from": found.kind}
+    record = stored_record(root) or _restored_record(candidates, restored)
+    note = {"date": today(), "episodes": len(restored), "from": candidates.kind}
     text = record_text({**record, "restored": [*record.get("restored", []), note]})
     write_tables(tables, {root / RECORD_FILE: text})
     unlicensed = not all(row.get("license") for row in restored.values())
@@ -90,14 +90,14 @@ def restore(root: Path, originals: Path) -> dict[str, Any]:
     return {
         "root": str(root),
         "restored": len(restored),
-        "from": f"{found.kind} {originals}",
-        **({"not_measured": "replay_drift_px, which conversion measures"} if found.kind == "recordings" else {}),
-        **({"unread": found.unread} if found.unread else {}),
+        "from": f"{candidates.kind} {originals}",
+        **({"not_measured": "replay_drift_px, which conversion measures"} if candidates.kind == "recordings" else {}),
+        **({"unread": candidates.unread} if candidates.unread else {}),
         "next": f"{licence}copolicy-dataset check {root}",
     }
 
 
-def _missing_columns(tables: Any) -> list[int]:
+def _episodes_without_columns(tables: Any) -> list[int]:
     """Numbers of the episodes without an `episode_uuid`."""
     numbers = []
     for table in tables:

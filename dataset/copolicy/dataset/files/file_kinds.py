@@ -78,7 +78,7 @@ def _zip_kind(path: Path) -> str:
     if any(name.endswith(("/data.pkl", "/version")) for name in names):
         return "a PyTorch file"
     if any(name.rpartition("/")[2] in (".zarray", ".zgroup", "zarr.json") for name in names):
-        return "a zipped Zarr store (copolicy-convert upstream takes the original program's)"
+        return "a zipped Zarr store (copolicy-convert upstream reads the original program's)"
     return "a zip archive"
 
 
@@ -96,21 +96,21 @@ def _text_kind(head: bytes) -> str:
 
 def _folder_kind(path: Path) -> str:
     if (path / INFO_FILE).is_file():
-        return "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)"
+        return "a LeRobot data set (copolicy-dataset check and copolicy-convert export read it)"
     if any((path / name).is_file() for name in (".zgroup", ".zarray", "zarr.json")):
-        return "a Zarr store (copolicy-convert upstream takes the original program's)"
+        return "a Zarr store (copolicy-convert upstream reads the original program's)"
     if (path / "config.json").is_file() and (path / "model.safetensors").is_file():
-        return "a policy checkpoint (copolicy-eval and copolicy-cards take it)"
+        return "a policy checkpoint (copolicy-eval and copolicy-cards read it)"
     if next(path.iterdir(), None) is None:
         return "an empty folder"
     files = visible_files(path, "*.mcap", "*.mcap.part", "*.pkl", "*.npz", "*.hdf5", "*.h5", "*.db3", "info.json")
     names = [file.name for file in files]
     if any(name.endswith(".mcap") for name in names):
-        return "a folder of recordings (copolicy-convert mcap takes it)"
+        return "a folder of recordings (copolicy-convert mcap reads it)"
     if any(name.endswith(".part") for name in names):
-        return "a folder of unfinished recordings (copolicy-collect recover takes it)"
+        return "a folder of unfinished recordings (copolicy-collect recover reads it)"
     if any(file.match("trajectories/*.pkl") or file.stem == file.parent.name for file in files):
-        return "a folder of the original program's files (copolicy-convert upstream takes it)"
+        return "a folder of the original program's files (copolicy-convert upstream reads it)"
     if any(file.match(INFO_FILE) for file in files):
         return "a folder that contains LeRobot data sets (name one of them)"
     suffixes = sorted({file.suffix for file in files})

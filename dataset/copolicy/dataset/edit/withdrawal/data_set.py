@@ -95,7 +95,7 @@ def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -
         return {"removed": "the whole data set: no episode is left"}
     with replaced_folder(root) as partial:
         write_subset(source, numbers, partial, remaining_splits(source.info, numbers))
-        _copy_other_files(root, partial, set(data_set.recordings))
+        _link_other_files(root, partial, set(data_set.recordings))
         uuids = {source.rows[number]["episode_uuid"] for number in withdrawn}
         write_record(partial, traces.redact_json(drop_notes(source.record, uuids)))
         _clean_releases(partial, traces, [source.content.episodes[number] for number in sorted(withdrawn)])
@@ -107,7 +107,7 @@ def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -
     return {"make_anew": regenerate, **({"still_named_in": files_with_names} if files_with_names else {})}
 
 
-def _copy_other_files(root: Path, partial: Path, withdrawn: set[str]) -> None:
+def _link_other_files(root: Path, partial: Path, withdrawn: set[str]) -> None:
     """Links all files except withdrawn recordings and files that are rewritten or regenerated."""
     side_files = {Path(name).with_name(f"._{Path(name).name}").as_posix() for name in withdrawn}
     dropped = withdrawn | side_files | _WRITTEN | REGENERATED.keys()
