@@ -1,4 +1,4 @@
-"""`copolicy-dataset split`: parts near the proportions asked for, and nothing in two of them."""
+"""`copolicy-dataset split`: parts close to the requested proportions, without overlap."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def test_people_without_a_name_stay_together():
     assert group_episodes(episodes, range(3), "pairs") == [[0, 1], [2]]
 
 
-def test_copies_stay_together_whatever_is_asked():
+def test_copies_always_stay_together():
     episodes = rows(["a/b", "c/d", "e/f"], source_sha256=["x", "y", "x"])
     assert group_episodes(episodes, [1, 2, 3], "episodes") == [[0, 2], [1]]
     assert group_episodes(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "maps") == [[0, 1, 2]]
@@ -94,13 +94,13 @@ def test_single_episodes_are_spread_over_pairs_maps_and_results():
     assert sorted(sum(row["pair_id"] == f"{n}a/{n}b" for row in inside) for n in range(4)) == [10] * 4
 
 
-def test_the_seed_decides_and_the_same_one_gives_the_same():
+def test_the_seed_determines_the_split():
     episodes = rows([f"{n}a/{n}b" for n in range(30)])
     parts = [dealt(episodes, ["train=0.5", "test=0.5"], seed=seed)["test"] for seed in (1, 1, 2)]
     assert parts[0] == parts[1] != parts[2]
 
 
-def test_every_part_gets_something():
+def test_no_part_is_empty():
     episodes = rows(["a/b"] * 98 + ["c/d", "e/f"])
     parts = dealt(episodes, ["train=0.98", "valid=0.01", "test=0.01"])
     assert all(parts.values())
@@ -108,7 +108,7 @@ def test_every_part_gets_something():
         dealt(rows(["a/b", "c/d"]), ["train=0.8", "valid=0.1", "test=0.1"])
 
 
-def test_named_pairs_go_where_they_are_named():
+def test_named_pairs_go_to_the_part_that_names_them():
     episodes = rows(["a/b", "b/c", "d/e", "f/g"])
     assert dealt(episodes, ["test=a/b", "train=rest"]) == {"test": [0, 1], "train": [2, 3]}
     assert dealt(episodes, ["test=d", "train=0.5", "valid=0.5"])["test"] == [2]
@@ -125,7 +125,7 @@ def test_named_pairs_go_where_they_are_named():
         (["test=a/b", "train=a/b"], "each name in one part"),
     ],
 )
-def test_names_that_cannot_be_parted(parts, line):
+def test_names_that_cannot_be_separated_are_refused(parts, line):
     with pytest.raises((RunError, InvalidValueError), match=line):
         dealt(rows(["a/b", "b/c", "d/e", "f/g"]), parts)
 
@@ -138,7 +138,7 @@ def test_names_that_cannot_be_parted(parts, line):
         ["..=0.5", "test=0.5"], ["train=nan", "test=0.5"], ["train=inf", "test=0.5"], ["train=0", "test=1"],
     ],
 )  # fmt: skip
-def test_parts_of_another_form(texts):
+def test_invalid_parts_are_refused(texts):
     with pytest.raises(InvalidValueError, match="--parts: expected "):
         parse_parts(texts)
 
@@ -148,7 +148,7 @@ def made(tmp_path_factory) -> Path:
     return make_people(tmp_path_factory.mktemp("split"))
 
 
-def test_folders_that_share_nobody(made, tmp_path, capsys):
+def test_folders_share_no_person(made, tmp_path, capsys):
     out = tmp_path / "parts"
     assert main(["split", str(made), "--out", str(out), "--parts", "train=0.75", "test=0.25"]) == 0
     shown = capsys.readouterr().out
@@ -181,7 +181,7 @@ def test_one_data_set_whose_splits_the_checks_and_robomimic_read(made, tmp_path,
     assert "a data set without a split of its own" in capsys.readouterr().err
 
 
-def test_robomimics_valid_key_shares_nobody_with_train(made, tmp_path):
+def test_robomimics_valid_key_shares_no_person_with_train(made, tmp_path):
     h5py = pytest.importorskip("h5py")
     flags = ["--format", "robomimic", "--out", str(tmp_path / "a.hdf5"), "--valid", "0.25", "--seed", "1"]
     assert convert(["export", str(made), *flags]) == 0

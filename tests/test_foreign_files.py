@@ -1,4 +1,4 @@
-"""What is not what a command takes, or is broken, gives one line and exit status 1 or 2, in every command.
+"""Foreign and damaged files give one line and exit status 1 or 2 in every command.
 
 Samples of tests/benchmarks/foreign_sweep.py.
 """
@@ -45,7 +45,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_and_folders_are_called_what_they_are(tmp_path, kind):
+def test_describe_path(tmp_path, kind):
     assert describe_path(FOREIGN[kind](tmp_path)) == KINDS[kind]
 
 
@@ -53,7 +53,7 @@ OWN_READERS = ("collect replay", "collect recover", "convert mcap", "convert ups
 
 
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_each_gives_one_line_in_each_command(tmp_path, kind, monkeypatch):
+def test_foreign_files_give_one_line_in_each_command(tmp_path, kind, monkeypatch):
     commands = {name: COMMANDS[name] for name in OWN_READERS}
     if kind in ("text", "lerobot of another task", "recordings of another project", "zarr v3 of another project"):
         commands = {name: build for name, build in COMMANDS.items() if name != "dataset stats"}
@@ -86,7 +86,7 @@ for name in ("a.mcap", "a.zarr.zip"):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
-def test_what_may_not_be_read_is_said_so(tmp_path):
+def test_unreadable_files_give_one_line(tmp_path):
     # Root may read anything, unless it gives that right up.
     rights = "-dac_override,-dac_read_search"
     prefix = ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []

@@ -1,4 +1,4 @@
-"""A disk that takes no more: one line with the path, exit status 1, and nothing left, in every command that writes.
+"""A full disk: every writing command prints one line with the path, exits with 1 and leaves nothing.
 
 A limit on the size of a file stands in for the full disk: no right to mount anything is needed, and the system answers
 in the same place, with EFBIG for ENOSPC.
@@ -59,7 +59,7 @@ NAMES = {"png": "x.png", "gif": "x.gif", "minari": "x-v0", "robomimic": "x.hdf5"
 
 
 @pytest.mark.parametrize("what", NEW)
-def test_what_is_new_is_not_there_at_all(what, made, tmp_path, capsys):
+def test_new_outputs_do_not_appear(what, made, tmp_path, capsys):
     command, arguments, limit = NEW[what]
     (recording,) = (made / "one-recordings").glob("*.mcap")
     filled = [part.format(made=made, recording=recording) for part in arguments]
@@ -87,7 +87,7 @@ CHANGED = {  # what changes a data set
 
 
 @pytest.mark.parametrize("what", CHANGED)
-def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
+def test_an_existing_data_set_stays_unchanged(what, made, tmp_path, capsys):
     command, arguments, limit = CHANGED[what]
     root = Path(shutil.copytree(made / "one", tmp_path / "set"))
     before = _files(tmp_path)
@@ -101,7 +101,7 @@ def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
     assert _files(tmp_path) == before
 
 
-def test_a_check_says_that_its_findings_were_not_kept(made, tmp_path, capsys):
+def test_a_check_reports_that_its_findings_were_not_stored(made, tmp_path, capsys):
     root = Path(shutil.copytree(made / "one", tmp_path / "set"))
     before = _files(tmp_path)
     with full_disk(500):
@@ -109,7 +109,7 @@ def test_a_check_says_that_its_findings_were_not_kept(made, tmp_path, capsys):
     assert _files(tmp_path) == before
 
 
-def test_a_training_that_comes_to_no_checkpoint_leaves_none(made, tmp_path, capfd):
+def test_training_without_a_checkpoint_leaves_nothing(made, tmp_path, capfd):
     flags = ["--policy.preset=small", "--policy.device=cpu", "--steps=1", "--batch_size=2", "--env_eval_freq=0"]
     with full_disk(100_000):
         status = train([f"--dataset.root={made / 'one'}", f"--output_dir={tmp_path / 'run'}", *flags])
@@ -133,7 +133,7 @@ def _build(path: Path) -> None:
         (partial / "array").write_bytes(bytes(200))
 
 
-def test_several_files_take_their_places_together_or_not_at_all(tmp_path):
+def test_several_files_are_replaced_together_or_not_at_all(tmp_path):
     names = [tmp_path / "a", tmp_path / "b"]
     for name in names:
         name.write_text("old", encoding="utf-8")
@@ -143,7 +143,7 @@ def test_several_files_take_their_places_together_or_not_at_all(tmp_path):
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == {"a": "old", "b": "old"}
 
 
-def test_the_path_is_that_of_the_finished_file(tmp_path):
+def test_the_error_names_the_final_path(tmp_path):
     with full_disk(100), pytest.raises(OSError, match=os.strerror(errno.EFBIG)) as refused:
         _build(tmp_path / "set")
     assert str(system_line(refused.value)).startswith(str(tmp_path / "set"))
@@ -153,7 +153,7 @@ def test_the_path_is_that_of_the_finished_file(tmp_path):
     assert missing.value.filename == str(tmp_path / "set" / "deep" / "file")
 
 
-def test_an_error_that_is_called_otherwise_is_known_by_its_text(tmp_path):
+def test_a_disk_error_is_recognised_by_its_message(tmp_path):
     with pytest.raises(OSError, match="No space left") as refused, new_file(tmp_path / "weights"):
         raise ValueError("I/O error: No space left on device (os error 28)")
     assert system_line(refused.value) == f"{tmp_path / 'weights'}: No space left on device"

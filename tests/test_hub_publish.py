@@ -73,7 +73,7 @@ def is_published(hub: LocalHub, root: Path) -> bool:
     return there == files and set(repository.tags.values()) == {repository.branches["main"]}
 
 
-def test_everything_goes_up_in_one_commit_with_both_tags(hub, dataset, publish):
+def test_all_files_are_uploaded_in_one_commit_with_both_tags(hub, dataset, publish):
     (dataset / "figures").mkdir()
     (dataset / "figures" / "routes.png").write_bytes(b"\x89PNG")
     done = publish()
@@ -95,7 +95,7 @@ def test_everything_goes_up_in_one_commit_with_both_tags(hub, dataset, publish):
     assert not repository.private
 
 
-def test_the_token_is_nowhere(hub, dataset, publish):
+def test_the_token_is_not_written_anywhere(hub, dataset, publish):
     hub.fail("POST", COMMIT, 500)
     assert publish().status == 1
     assert publish().status == 0
@@ -112,7 +112,7 @@ def test_the_same_version_is_refused_a_second_time(hub, dataset, publish):
     assert hub.data_set("lab/table").commits == before
 
 
-def test_another_content_under_the_same_version_is_refused(hub, dataset, publish, released_once, tmp_path):
+def test_other_content_under_the_same_version_is_refused(hub, dataset, publish, released_once, tmp_path):
     assert publish().status == 0
     other = Path(shutil.copytree(released_once, tmp_path / "other"))
     (other / "meta/copolicy_release.json").unlink()
@@ -124,7 +124,7 @@ def test_another_content_under_the_same_version_is_refused(hub, dataset, publish
     )
 
 
-def test_the_next_version_moves_the_format_tag_and_leaves_nothing_behind(hub, dataset, publish, released_once):
+def test_the_next_version_moves_the_format_tag_and_deletes_stale_files(hub, dataset, publish, released_once):
     (dataset / "old.txt").write_text("to go", encoding="utf-8")
     assert publish().status == 0
     first = hub.data_set("lab/table").branches["main"]
@@ -189,7 +189,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("reason", REFUSED)
-def test_what_is_not_ready_is_refused_before_the_hub_is_asked(hub, dataset, publish, reason):
+def test_an_unready_data_set_is_refused_before_the_hub_is_queried(hub, dataset, publish, reason):
     change, status, message = REFUSED[reason]
     change(dataset)
     done = publish()
@@ -199,7 +199,7 @@ def test_what_is_not_ready_is_refused_before_the_hub_is_asked(hub, dataset, publ
     assert hub.requests == []
 
 
-def test_private_is_private_or_nothing(hub, user, dataset, publish):
+def test_private_refuses_a_public_repository(hub, user, dataset, publish):
     assert publish("--private").status == 0
     assert hub.data_set("lab/table").private
     public = Repository(private=False)
@@ -222,7 +222,7 @@ REJECTED = "the Hub rejected the token, or a private data set needs one; set HF_
          "to the repository"),
     ],
 )  # fmt: skip
-def test_a_token_that_does_not_do_is_named_and_not_shown(hub, dataset, publish, token, message):
+def test_a_rejected_token_is_reported_but_not_shown(hub, dataset, publish, token, message):
     done = publish(token=token)
     assert done.error == message
     assert token is None or token not in done.err
@@ -231,7 +231,7 @@ def test_a_token_that_does_not_do_is_named_and_not_shown(hub, dataset, publish, 
 
 
 @pytest.mark.parametrize("path", [r"/preupload/", r"/objects/batch$", r"^/lfs/"])
-def test_a_hub_that_stumbles_is_asked_again(hub, dataset, publish, path):
+def test_a_failed_request_is_retried(hub, dataset, publish, path):
     hub.fail("PUT" if "lfs/" in path else "POST", path, 503, times=2)
     done = publish()
     assert done.status == 0, done.err
@@ -241,7 +241,7 @@ def test_a_hub_that_stumbles_is_asked_again(hub, dataset, publish, path):
 TROUBLE = "the Hub failed (HTTP 500); run the command again to continue"
 
 
-def test_an_upload_that_fails_for_good_goes_on_where_it_stopped(hub, dataset, publish):
+def test_a_failed_upload_resumes(hub, dataset, publish):
     oid = hashlib.sha256((dataset / FRAMES).read_bytes()).hexdigest()
     hub.fail("PUT", rf"^/lfs/{oid}", 500, times=6)  # one try and five more
     assert publish().error == f"lab/table: uploading: {TROUBLE}"
@@ -264,7 +264,7 @@ def test_a_connection_that_drops_while_uploading(hub, dataset, publish):
     assert is_published(hub, dataset)
 
 
-def test_a_commit_that_fails_sends_no_large_file_again(hub, dataset, publish):
+def test_large_files_are_not_sent_again_after_a_failed_commit(hub, dataset, publish):
     hub.fail("POST", COMMIT, 500)
     assert publish().error == f"lab/table: uploading: {TROUBLE}"
     assert set(hub.data_set("lab/table").head) == {".gitattributes"}
@@ -281,7 +281,7 @@ FAULTS_AFTER_THE_COMMIT = {
 
 
 @pytest.mark.parametrize("fault", FAULTS_AFTER_THE_COMMIT)
-def test_a_commit_that_arrived_is_not_made_again(hub, dataset, publish, fault):
+def test_an_existing_commit_is_not_repeated(hub, dataset, publish, fault):
     FAULTS_AFTER_THE_COMMIT[fault](hub)
     assert publish().error.endswith("run the command again to continue")
     assert "data-1.0.0" not in hub.data_set("lab/table").tags
@@ -292,7 +292,7 @@ def test_a_commit_that_arrived_is_not_made_again(hub, dataset, publish, fault):
     assert len(hub.data_set("lab/table").commits) == 2
 
 
-def test_a_format_tag_that_was_taken_off_and_not_set_again(hub, dataset, publish):
+def test_a_deleted_format_tag_is_set_again(hub, dataset, publish):
     assert publish().status == 0
     set_value(dataset, EPISODES, "pair_id", 0, "pair-9")
     release(dataset, "patch", "Corrected.")
@@ -305,7 +305,7 @@ def test_a_format_tag_that_was_taken_off_and_not_set_again(hub, dataset, publish
     assert repository.tags["v3.0"] == repository.tags["data-1.0.1"] == repository.branches["main"]
 
 
-def test_somebody_elses_commit_is_not_lost_unseen(hub, dataset, publish):
+def test_a_concurrent_commit_is_not_overwritten(hub, dataset, publish):
     def commit():
         repository = hub.data_set("lab/table")
         repository.commit({**repository.head, "README.md": b"theirs"}, "their card")
@@ -329,7 +329,7 @@ def test_a_conflict_that_the_hub_reports_itself(hub, dataset, publish):
     assert publish().status == 0
 
 
-def test_only_the_recordings_of_the_episodes_go_up(hub, dataset, publish, released_once):
+def test_only_the_recordings_of_the_episodes_are_uploaded(hub, dataset, publish, released_once):
     recordings = Path(shutil.copytree(released_once.parent / "recordings", dataset.parent / "recordings"))
     (recordings / "discarded.mcap").write_bytes(b"nobody agreed to this")
     done = publish("--raw", recordings)
@@ -345,7 +345,7 @@ def test_only_the_recordings_of_the_episodes_go_up(hub, dataset, publish, releas
     assert left == [*(f"raw/episode_{index:06}.mcap" for index in (0, 2, 3, 4, 5)), "raw/manifest.json"]
 
 
-def test_recordings_that_are_not_complete_are_refused(hub, dataset, publish, released_once):
+def test_missing_recordings_are_refused(hub, dataset, publish, released_once):
     recordings = Path(shutil.copytree(released_once.parent / "recordings", dataset.parent / "recordings"))
     (recordings / "episode_000003.mcap").unlink()
     message = publish("--raw", recordings).error
@@ -353,7 +353,7 @@ def test_recordings_that_are_not_complete_are_refused(hub, dataset, publish, rel
     assert hub.requests == []
 
 
-def test_a_name_that_is_none_is_refused(hub, user, dataset):
+def test_an_invalid_name_is_refused(hub, user, dataset):
     done = user.run("publish", dataset, "--repo-id", "table")
     assert (done.status, hub.requests) == (2, [])
     assert done.err == (
@@ -362,7 +362,7 @@ def test_a_name_that_is_none_is_refused(hub, user, dataset):
     )
 
 
-def test_excluded_episodes_are_sent_only_when_asked_for(hub, dataset, publish):
+def test_excluded_episodes_are_uploaded_only_with_the_flag(hub, dataset, publish):
     exclude(dataset, ["1"], "a stick was unplugged")
     release(dataset, "minor", "One episode excluded.")
     done = publish()

@@ -1,4 +1,4 @@
-"""Linked folders and files: entered by every command, counted once, and named where they lead nowhere."""
+"""Links are followed by every command, files are counted once, and broken links are reported."""
 
 import json
 import os
@@ -50,19 +50,19 @@ def without_record(root: Path) -> dict[str, bytes]:
     return {name: data for name, data in contents(root).items() if name != "meta/copolicy.json"}
 
 
-def test_a_conversion_enters_links(made, linked, tmp_path):
+def test_a_conversion_follows_links(made, linked, tmp_path):
     assert converted(linked, tmp_path / "set") == 0
     assert contents(tmp_path / "set") == contents(made / "whole")
 
 
-def test_a_recording_counts_once_however_it_is_named(made, linked, tmp_path):
+def test_a_recording_counts_once_whatever_its_paths(made, linked, tmp_path):
     folders = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
     arguments = ["--out", str(tmp_path / "set"), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     assert convert(["mcap", *folders, *arguments]) == 0
     assert contents(tmp_path / "set") == contents(made / "whole")
 
 
-def test_shards_and_append_enter_links(made, linked, tmp_path, capsys):
+def test_shards_and_append_follow_links(made, linked, tmp_path, capsys):
     assert converted(linked, tmp_path / "set", "--shard-episodes", "2") == 0
     assert load(tmp_path / "set").num_episodes == 3
     make_data_set(made / "both" / "a", tmp_path / "first")
@@ -72,7 +72,7 @@ def test_shards_and_append_enter_links(made, linked, tmp_path, capsys):
     assert summary["already_there"] == 2
 
 
-def test_check_recover_and_raw_recordings_enter_links(made, linked, tmp_path, capsys):
+def test_check_recover_and_raw_recordings_follow_links(made, linked, tmp_path, capsys):
     result = check_dataset(linked)
     assert result.table.labels == ("a/episode_000000.mcap", "a/episode_000001.mcap", "b/episode_000000.mcap")
     assert result.count("error") == 0
@@ -111,7 +111,7 @@ def test_the_originals_files_are_found_behind_links(examples, tmp_path):
         assert (source.format, len(source.readers)) == (format, len(expected.readers))
 
 
-def test_a_data_set_behind_links_is_read_added_to_and_released_whole(made, tmp_path, capsys):
+def test_a_linked_data_set_is_read_appended_to_and_released(made, tmp_path, capsys):
     make_data_set(made / "both" / "a", tmp_path / "disk" / "set")
     root = tmp_path / "set"
     root.mkdir()
@@ -129,7 +129,7 @@ def test_a_data_set_behind_links_is_read_added_to_and_released_whole(made, tmp_p
     assert sorted(path.name for path in tmp_path.iterdir()) == ["disk", "set"]
 
 
-def test_a_recording_whose_link_leads_nowhere_is_named(made, linked, tmp_path, capsys):
+def test_a_broken_link_to_a_recording_is_reported(made, linked, tmp_path, capsys):
     lost = linked / "a" / "lost.mcap"
     os.symlink("/nowhere/lost.mcap", lost)
     assert converted(linked, tmp_path / "set") == 1
@@ -151,7 +151,7 @@ def test_a_recording_whose_link_leads_nowhere_is_named(made, linked, tmp_path, c
     assert (summary["damaged"], list(summary["files"])) == (1, ["a/lost.mcap"])
 
 
-def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, caplog):
+def test_a_broken_link_to_a_session_is_reported(linked, tmp_path, capsys, caplog):
     shutil.rmtree(tmp_path / "disk")
     assert converted(linked, tmp_path / "set") == 0
     captured = capsys.readouterr()
@@ -170,7 +170,7 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
     assert "session: expected a folder of recordings, found a link that leads nowhere" in capsys.readouterr().err
 
 
-def test_a_file_of_a_data_set_whose_link_leads_nowhere_is_named(made, tmp_path, capsys):
+def test_a_broken_link_in_a_data_set_is_reported(made, tmp_path, capsys):
     root = Path(shutil.copytree(made / "whole", tmp_path / "set"))
     os.symlink("/nowhere", root / "meta" / "notes.txt")
     with pytest.raises(CopolicyError, match=r"notes\.txt: expected a file, found a broken link"):
