@@ -259,6 +259,6 @@ def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):
             yield table
 
     monkeypatch.setattr(subset, "_frames", shifted)
-    with pytest.raises(RunError, match="expected episode 1 unchanged in what was written"):
+    with pytest.raises(RunError, match="expected episode 1 unchanged in the new data set"):
         select(root, tmp_path / "new", Selection(episodes=("0-2",)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["set"]

@@ -121,7 +121,7 @@ def test_named_pairs_go_to_the_part_that_names_them():
     [
         (["test=a/b", "train=b/c"], "share a person"),
         (["test=nobody", "train=rest"], "found 'nobody', which no episode has"),
-        (["test=a/b", "train=d/e"], "found 1 in none; add NAME=rest"),
+        (["test=a/b", "train=d/e"], "found 1 without one; add NAME=rest"),
         (["test=a/b", "train=a/b"], "each name in one part"),
     ],
 )

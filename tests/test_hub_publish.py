@@ -3,7 +3,7 @@
 | fault | what the user sees | what a rerun does |
 |---|---|---|
 | no token, or a wrong one | one line: the Hub rejected the token; nothing changed | publishes, with a token |
-| a token that may only read | one line: the token may not do this | publishes, with another token |
+| a token that may only read | one line: the token has no write access | publishes, with another token |
 | 500 once or twice | nothing: the client tries again | |
 | 500 for good, or a connection that drops, while uploading | one line; no commit | sends only what did not arrive |
 | 500 at the commit | one line; no commit | commits; sends no large file again |
@@ -218,8 +218,7 @@ REJECTED = "the Hub rejected the token, or a private data set needs one; set HF_
     [
         ("hf_" + "w" * 34, f"lab/table: querying the Hub: {REJECTED}"),
         (None, f"lab/table: querying the Hub: {REJECTED}"),
-        (READ_TOKEN, "lab/table: creating the repository: the token may not do this; it needs the right to write "
-         "to the repository"),
+        (READ_TOKEN, "lab/table: creating the repository: the token has no write access to the repository"),
     ],
 )  # fmt: skip
 def test_a_rejected_token_is_reported_but_not_shown(hub, dataset, publish, token, message):
