@@ -166,4 +166,4 @@ def _rows(tables: Any) -> list[list[dict[str, Any]]]:
 
 def _column_types(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     types = {"episode_index": "int", "length": "int", **EPISODE_COLUMNS}
-    return {name: kind for name, kind in types.items() if any(name in row for row in rows)}
+    return {name: type_name for name, type_name in types.items() if any(name in row for row in rows)}

@@ -129,8 +129,6 @@ def _split(arguments: argparse.Namespace) -> dict:
     from .split import split
 
     parts = parse_parts(arguments.parts)
-    if arguments.seed < 0:
-        raise InvalidValueError("--seed", "at least 0", arguments.seed)
     if arguments.same_consent and arguments.by != "pairs":
         raise InvalidValueError("--same-consent", "--by pairs with it", arguments.by)
     return split(

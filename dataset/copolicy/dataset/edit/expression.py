@@ -58,8 +58,8 @@ def _parse_bool(node: ast.expr, columns: Mapping[str, str], text: str, flag: str
         return lambda row: not inner(row)
     if isinstance(node, ast.Compare):
         return _parse_comparison(node, columns, text, flag)
-    kind, value = _parse_value(node, columns, text, flag)
-    if kind != "bool":
+    value_type, value = _parse_value(node, columns, text, flag)
+    if value_type != "bool":
         raise InvalidValueError(flag, "a comparison, or a boolean column such as success", ast.unparse(node))
     return lambda row: bool(value(row))
 
@@ -99,14 +99,14 @@ def _parse_membership(node: ast.expr, columns: Mapping[str, str], text: str, fla
     if isinstance(node, (ast.Tuple, ast.List, ast.Set)):
         types, values = set(), []
         for element in node.elts:
-            kind, value = _parse_value(element, {}, text, flag)
-            types.add(kind)
+            value_type, value = _parse_value(element, {}, text, flag)
+            types.add(value_type)
             values.append(value({}))
         return types, lambda _: values
-    kind, value = _parse_value(node, columns, text, flag)
-    if kind != "str":
+    value_type, value = _parse_value(node, columns, text, flag)
+    if value_type != "str":
         raise InvalidValueError(flag, 'values in brackets, such as ("a", "b"), or a text after in', ast.unparse(node))
-    return {kind}, value
+    return {value_type}, value
 
 
 def _parse_value(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> tuple[str, Condition]:

@@ -108,16 +108,16 @@ def _facts(source: StoredSet, part: Part, numbers: list[int], total: int) -> dic
 
 def _shared_names(parts: list[list[Row]]) -> dict[str, list[str]]:
     """Pairs, players, consents and maps that are in more than one part."""
-    kinds = {
+    ids_of_row = {
         "pairs": lambda row: {row.get("pair_id")},
         "players": lambda row: {row.get("player_0_id"), row.get("player_1_id")},
         "consents": consent_ids,
         "maps": lambda row: {base_map(row)},
     }
     shared: dict[str, list[str]] = {}
-    for kind, values_of in kinds.items():
-        values = [{value for row in rows for value in values_of(row) if value} for rows in parts]
-        repeated = sorted(value for value in set().union(*values) if sum(value in part for part in values) > 1)
+    for category, ids_of in ids_of_row.items():
+        ids_of_parts = [{name for row in rows for name in ids_of(row) if name} for rows in parts]
+        repeated = sorted(name for name in set().union(*ids_of_parts) if sum(name in part for part in ids_of_parts) > 1)
         if repeated:
-            shared[kind] = repeated
+            shared[category] = repeated
     return shared

@@ -97,11 +97,11 @@ def is_list(column_type: pa.DataType) -> bool:
     return any(test(column_type) for test in _LISTS)
 
 
-def scalars(column: pa.ChunkedArray, kind: str, unknown: Any = None) -> np.ndarray:
+def scalars(column: pa.ChunkedArray, type_name: str, unknown: Any = None) -> np.ndarray:
     """Converts a column of single values to an array `(N,)`.
 
     Args:
-        kind: `str`, `int`, `float` or `bool`, as in `EPISODE_COLUMNS`; whole numbers may be stored as floats.
+        type_name: `str`, `int`, `float` or `bool`, as in `EPISODE_COLUMNS`; whole numbers may be stored as floats.
         unknown: replaces nulls; None if nulls are an error.
 
     Raises:
@@ -110,25 +110,25 @@ def scalars(column: pa.ChunkedArray, kind: str, unknown: Any = None) -> np.ndarr
     values = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if pa.types.is_dictionary(values.type):
         values = values.dictionary_decode()
-    expected = f"{_TYPE_NAMES[kind]} in every row" if unknown is None else _TYPE_NAMES[kind]
-    if not (_has_type(values.type, kind) or (pa.types.is_null(values.type) and unknown is not None)):
+    expected = f"{_TYPE_NAMES[type_name]} in every row" if unknown is None else _TYPE_NAMES[type_name]
+    if not (_has_type(values.type, type_name) or (pa.types.is_null(values.type) and unknown is not None)):
         raise ColumnError(expected, str(values.type))
     empty = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
     if len(empty) and unknown is None:
         raise ColumnError(expected, "nothing", empty.tolist())
-    if kind == "str":
+    if type_name == "str":
         return np.array([unknown if value is None else value for value in values.to_pylist()], str)
     if pa.types.is_null(values.type):
-        return np.full(len(values), unknown, _DTYPES[kind])
+        return np.full(len(values), unknown, _DTYPES[type_name])
     numbers = pc.fill_null(values, pa.scalar(unknown, values.type)) if len(empty) else values
     array = numbers.to_numpy(zero_copy_only=False)
-    if kind == "int" and array.dtype.kind == "f":
+    if type_name == "int" and array.dtype.kind == "f":
         invalid = np.flatnonzero(~(np.isfinite(array) & (array == np.rint(array)) & (np.abs(array) < 2**62)))
         if len(invalid):
             raise ColumnError(expected, "others", invalid.tolist())
-    if kind == "int" and array.dtype == np.uint64 and array.size and array.max() >= 2**63:
+    if type_name == "int" and array.dtype == np.uint64 and array.size and array.max() >= 2**63:
         raise ColumnError(expected, f"{array.max()}")
-    return array.astype(_DTYPES[kind])
+    return array.astype(_DTYPES[type_name])
 
 
 def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
@@ -219,7 +219,7 @@ def type_mismatch(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> 
     return ""
 
 
-def episode_values(table: pa.Table, name: str, kind: str, path: Path, unknown: Any = None) -> np.ndarray:
+def episode_values(table: pa.Table, name: str, type_name: str, path: Path, unknown: Any = None) -> np.ndarray:
     """Converts an episode column to an array `(E,)`, see `scalars`.
 
     Raises:
@@ -228,7 +228,7 @@ def episode_values(table: pa.Table, name: str, kind: str, path: Path, unknown: A
     if name not in table.column_names:
         raise FileFormatError(path, f"a column {name}", "none")
     try:
-        return scalars(table.column(name), kind, unknown)
+        return scalars(table.column(name), type_name, unknown)
     except ColumnError as error:
         raise FileFormatError(path, f"{error.expected} of {name}", _found_with_rows(error)) from None
 
@@ -244,10 +244,10 @@ def _found_with_rows(error: ColumnError) -> str:
     return f"{error.found} in row {rows}" if len(error.rows) == 1 else f"{error.found} in rows {rows}"
 
 
-def _has_type(column_type: pa.DataType, kind: str) -> bool:
-    if kind == "str":
+def _has_type(column_type: pa.DataType, type_name: str) -> bool:
+    if type_name == "str":
         return pa.types.is_string(column_type) or pa.types.is_large_string(column_type)
-    if kind == "bool":
+    if type_name == "bool":
         return pa.types.is_boolean(column_type)
     return pa.types.is_integer(column_type) or pa.types.is_floating(column_type)
 

@@ -45,8 +45,7 @@ def add_pull_command(commands: argparse._SubParsersAction) -> None:
 def _publish(arguments: argparse.Namespace) -> dict:
     from .publish import publish
 
-    published = publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw, arguments.with_excluded)
-    return asdict(published)
+    return asdict(publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw, arguments.with_excluded))
 
 
 def _pull(arguments: argparse.Namespace) -> dict:

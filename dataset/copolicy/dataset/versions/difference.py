@@ -128,11 +128,11 @@ def _schema_changes(before: Content, after: Content) -> Iterable[Change]:
         yield from _set_changes("episode column", _columns(before.episodes), _columns(after.episodes))
 
 
-def _set_changes(kind: str, before: Iterable[str], after: Iterable[str]) -> Iterable[Change]:
+def _set_changes(noun: str, before: Iterable[str], after: Iterable[str]) -> Iterable[Change]:
     for name in sorted(set(before) - set(after)):
-        yield Change("major", f"{kind} {name!r} removed")
+        yield Change("major", f"{noun} {name!r} removed")
     for name in sorted(set(after) - set(before)):
-        yield Change("minor", f"{kind} {name!r} added")
+        yield Change("minor", f"{noun} {name!r} added")
 
 
 def _columns(episodes: tuple[EpisodeContent, ...]) -> Iterable[str]:

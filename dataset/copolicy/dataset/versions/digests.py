@@ -53,8 +53,8 @@ def digest(value: Value) -> str:
     return hashlib.sha256(encode(value)).hexdigest()
 
 
-def _sized(kind: bytes, content: bytes) -> bytes:
-    return b"%s%d:" % (kind, len(content)) + content
+def _sized(prefix: bytes, content: bytes) -> bytes:
+    return b"%s%d:" % (prefix, len(content)) + content
 
 
 @dataclass(frozen=True)

@@ -61,12 +61,12 @@ def _aggregate_feature(stacked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         counts = np.expand_dims(counts, axis=-1)
     mean = (means * counts).sum(axis=0) / total
     variance = ((stacked["std"] ** 2 + (means - mean) ** 2) * counts).sum(axis=0) / total
-    quantiles = [kind for kind in stacked if kind.startswith("q") and kind[1:].isdigit()]
+    quantiles = [name for name in stacked if name.startswith("q") and name[1:].isdigit()]
     return {
         "min": stacked["min"].min(axis=0),
         "max": stacked["max"].max(axis=0),
         "mean": mean,
         "std": np.sqrt(variance),
         "count": total,
-        **{kind: (stacked[kind] * counts).sum(axis=0) / total for kind in quantiles},
+        **{name: (stacked[name] * counts).sum(axis=0) / total for name in quantiles},
     }
