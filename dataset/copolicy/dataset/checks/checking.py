@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
 from ..task import PairTask
@@ -66,7 +66,7 @@ def read_data(root: Path) -> EpisodeData:
         return read_lerobot(root)
     if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
         broken = next(iter(broken_links(root)), None) if root.is_dir() else None
-        actual = kind_of(root) if broken is None else f"a link that leads nowhere, {broken.name}"
+        actual = describe_path(root) if broken is None else f"a link that leads nowhere, {broken.name}"
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", actual)
     return read_recordings(root)
 

@@ -42,7 +42,7 @@ def _manifest(data: EpisodeData) -> Iterator[Finding]:
         return
     try:
         # This command writes the check report, also after a release.
-        differences = Manifest.read(path).differences(Manifest.of_folder(data.root), without={CHECK_FILE})
+        differences = Manifest.read(path).differences(Manifest.from_folder(data.root), without={CHECK_FILE})
     except CopolicyError as error:
         yield Finding("", "check_sum", None, None, "error", str(error).replace(str(path), MANIFEST_FILE))
         return

@@ -29,7 +29,7 @@ def _tasks(data: EpisodeData) -> Iterator[Finding]:
 
 
 def _statistics(data: EpisodeData) -> Iterator[Finding]:
-    from ..lerobot_folder.loading import read_statistics, statistics_problems
+    from ..lerobot_folder.loading import read_frame_statistics, statistics_problems
 
     problems = list(statistics_problems(data.root, data.info))
     for problem in problems:
@@ -37,7 +37,7 @@ def _statistics(data: EpisodeData) -> Iterator[Finding]:
     if problems or len(data.framed) < len(data.labels):
         return
     try:
-        stored = read_statistics(data.root)
+        stored = read_frame_statistics(data.root)
     except CopolicyError:
         return
     # LeRobot's merge does not update the statistics of the running numbers (index, episode_index).
@@ -49,12 +49,12 @@ def _statistics(data: EpisodeData) -> Iterator[Finding]:
 
 
 def _compare(data: EpisodeData, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
-    from ..lerobot_folder.loading import STATISTICS, numbers
+    from ..lerobot_folder.loading import STATISTICS, number_array
 
     warning, error = (data.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))
     computed = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     scale = 1 + np.abs(rows).max(axis=0)
-    errors = {key: float((np.abs(numbers(stored[key], None) - computed[key]) / scale).max()) for key in STATISTICS}
+    errors = {key: float((np.abs(number_array(stored[key], None) - computed[key]) / scale).max()) for key in STATISTICS}
     statistic = max(errors, key=lambda key: errors[key])
     if not errors[statistic] <= warning:
         severity: Severity = "error" if not errors[statistic] <= error else "warning"
