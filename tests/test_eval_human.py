@@ -295,10 +295,7 @@ def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsy
         "none: expected a folder of recordings, found nothing there"
     )
     status, error = _summarise(capsys, tmp_path, "--ratings", tmp_path / "r.csv")
-    assert (
-        error
-        == "copolicy-eval: --ratings: expected --plan beside it, which tells the robot of each block, found 'none'"
-    )
+    assert error == "copolicy-eval: --ratings: expected --plan too, which names the robot of each block, found 'none'"
 
 
 def test_other_weights_than_the_plans_are_refused(study, tmp_path):
