@@ -191,7 +191,7 @@ def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
     plan = tmp_path / "plan.json"
     robots = [f"A={fast}", f"B={fast}"]
     assert evaluate(["human", "plan", *robots, "--participants", "1", "--out", str(plan)]) == 0
-    assert StudyPlan.read(plan).physics.angular_acceleration_limit == math.pi / 8
+    assert StudyPlan.read(plan).world_settings.angular_acceleration_limit == math.pi / 8
 
 
 class _Fast:
