@@ -67,7 +67,7 @@ def test_a_chunk_is_that_of_lerobots_own_batch(runs, name, frames, longest):
     expected = policy._postprocess(policy.policy.predict_action_chunk(policy._preprocess(batch)))
     np.testing.assert_array_equal(chunk, expected.detach().numpy())
     policy.reset(5)
-    policy.wanted = 3
+    policy.n_predicted_actions = 3
     np.testing.assert_array_equal(policy.predict_action_chunk(seen), chunk[:, :3])
 
 
@@ -105,7 +105,7 @@ def test_what_select_action_alone_can_do_is_asked_frame_by_frame(random_table, t
     assert policy.keeps_history
     agent = PolicyAgent(policy, task)
     maps = task.scenario_sets["unseen"][:2]
-    rollout = Rollout(task, maps, (agent, agent.other_half()))
+    rollout = Rollout(task, maps, (agent, agent.human_half()))
     seen = []
     for _ in range(9):
         seen.append([world.observation for world in rollout.worlds])
