@@ -60,7 +60,7 @@ def lobby(tmp_path, **changes):
         on_short_map(application)
         application.phase.enter()
         yield Hands(application)
-        application.game.break_off("quit")
+        application.game.end_trial("quit")
 
 
 def flags(path):

@@ -10,8 +10,8 @@ from typing import Any
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.play.application import Application
-from copolicy.collect.play.settings import PilotSpec, PlaySettings
-from copolicy.collect.session import Balance
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
+from copolicy.collect.session import BalancedSchedule
 from copolicy.collect.ticker import MonotonicClock
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -27,7 +27,7 @@ def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
     values: dict[str, Any] = {
         "pair": "P01",
         "out": tmp_path / "recordings",
-        "pilots": (PilotSpec("joystick"), PilotSpec("joystick")),
+        "players": (PlayerSpec("joystick"), PlayerSpec("joystick")),
         "episodes": 4,
         "config_folder": tmp_path / "config",
         "window": (400, 320),
@@ -40,8 +40,10 @@ def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
 def on_short_map(application: Application) -> None:
     """Puts every episode of a session on the short map."""
     game = application.game
-    game.maps = (SHORT_MAP,)
-    game.balance = Balance(game.maps, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False)
+    game.scenarios = (SHORT_MAP,)
+    game.schedule = BalancedSchedule(
+        game.scenarios, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False
+    )
 
 
 class SimulatedClock(MonotonicClock):
@@ -154,7 +156,7 @@ class Players(threading.Thread):
         limit = self.clock() + 40e9
         while trial.steps < last and not trial.outcome.done and self.clock() < limit:
             x, y, _ = trial.world.pose
-            dx, dy = trial.map_config.goal[0] - x, trial.map_config.goal[1] - y
+            dx, dy = trial.scenario.goal[0] - x, trial.scenario.goal[1] - y
             for pad in pads:
                 pad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
             self.sleep(0.01)
@@ -163,5 +165,5 @@ class Players(threading.Thread):
 
     def result(self) -> None:
         """Waits for the result, and until it listens."""
-        self.phase("Result")
+        self.phase("ResultPhase")
         self.sleep(0.5)

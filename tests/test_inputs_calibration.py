@@ -46,12 +46,12 @@ def test_a_device_with_one_axis_has_no_other():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"dead_zone": 1.0}, "calibration dead_zone: expected a share in [0, 1), found 1.0"),
+        ({"dead_zone": 1.0}, "calibration dead_zone: expected a proportion in [0, 1), found 1.0"),
         (
             {"low": (0.0, -1.0)},
             "calibration: expected low < centre < high, found ((0.0, -1.0), (0.0, 0.0), (1.0, 1.0))",
         ),
-        ({"axes": (-1, 0)}, "calibration axes: expected two numbers of axes, from 0, found (-1, 0)"),
+        ({"axes": (-1, 0)}, "calibration axes: expected two axis indices, from 0, found (-1, 0)"),
         ({"high": (1.0,)}, "calibration high: expected two finite numbers, found (1.0,)"),
     ],
 )

@@ -10,7 +10,7 @@ from checked_data import contents, make_data_set, make_recordings
 from loaded_sets import load
 
 from copolicy.collect.cli import main as collect
-from copolicy.collect.session import SessionFolder, recordings
+from copolicy.collect.session import SessionFolder, iter_recordings
 from copolicy.convert.cli import main as convert
 from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
@@ -94,7 +94,7 @@ def test_a_linked_session_is_counted(tmp_path):
     _record(first)
     (tmp_path / "sessions").mkdir()
     os.symlink(first.path, tmp_path / "sessions" / "P01-01")
-    assert len(list(recordings(tmp_path / "sessions"))) == 1
+    assert len(list(iter_recordings(tmp_path / "sessions"))) == 1
     # The linked session is complete: the next one is begun, and nothing is added to it.
     following = SessionFolder(tmp_path / "sessions", "P01", FIXED, 1)
     assert (following.path.name, following.continued) == ("P01-02", False)
@@ -160,7 +160,7 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
     assert f"warning: {message}; what it led to is left out" in caplog.text
     found = [(f.episode, f.message) for f in check_dataset(linked).findings if f.severity == "error"]
     assert found == [("b", "a link that leads nowhere")]
-    assert len(list(recordings(linked))) == 2
+    assert len(list(iter_recordings(linked))) == 2
     assert f"not counted: {message}" in caplog.text
     (tmp_path / "empty").mkdir()
     os.symlink("/nowhere", tmp_path / "empty" / "session")

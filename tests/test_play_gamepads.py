@@ -46,7 +46,7 @@ def test_a_pad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
     with lobby(tmp_path) as hands:
         hands.press(5, strange)  # joins with any button
         assert hands.panel().prompt == "button 0: choose   button 1: next"
-        assert hands.panel().notice == "the buttons of this pad are not known: set them up"
+        assert hands.panel().notice == "the buttons of this gamepad are unknown: set them up"
         for _ in range(5):
             hands.press(1, strange)
         assert hands.panel().items[hands.panel().cursor] == "set up the buttons"
@@ -77,8 +77,8 @@ def test_a_pad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
         assert hands.panel().progress is None
     mapping = MappingStore(config).get(strange.guid)
     assert mapping is not None
-    assert mapping.of_button(11) == "start"
-    assert mapping.of_button(7) is None
+    assert mapping.control_of_button(11) == "start"
+    assert mapping.control_of_button(7) is None
     assert mapping.stick("left") == ((3, 2), (True, False))
     assert CalibrationStore(config).get(strange.guid) == StickCalibration(axes=(3, 2), invert=(True, False))
 
@@ -114,7 +114,7 @@ def test_a_pad_with_nothing_but_a_hat_steers_by_it(tmp_path):
         plain.hat(1, -1)
         hands.ticks(1)
         assert hands.panel().force == pytest.approx((0.5**0.5, 0.5**0.5))
-        assert hands.panel().notice.startswith("the buttons of this pad")
+        assert hands.panel().notice.startswith("the buttons of this gamepad")
         plain.hat(0, 0)
         hands.press(0, other)
         hands.start(plain, other)
@@ -136,7 +136,7 @@ def test_a_device_that_cannot_steer_does_not_join_and_is_told_so(tmp_path):
 
 def test_without_pilots_named_only_what_can_steer_counts(tmp_path):
     VirtualJoystick("Buttons", product=5, axes=1, hats=0, mapping=None)
-    with lobby(tmp_path, pilots=None) as hands:
+    with lobby(tmp_path, players=None) as hands:
         assert [player.spec.kind for player in hands.game.players] == ["keyboard", "keyboard"]
 
 

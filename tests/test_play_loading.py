@@ -11,7 +11,7 @@ from play_session import settings
 from copolicy.collect.play import loading as loading_module
 from copolicy.collect.play.loading import Loading
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.screen.window import Window
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import RunError
@@ -91,15 +91,15 @@ def test_a_session_is_loaded_under_its_window_and_named_once_it_is_there(tmp_pat
         "_draw",
         lambda self, *rest: (seen.append((rest[1], pygame.display.get_caption()[0])), drawn(self, *rest)),
     )
-    pilots = (PilotSpec("scripted", "S01"), PilotSpec("keyboard"))
-    with prepared(settings(tmp_path, pilots=pilots), ("the robots", list)):
+    pilots = (PlayerSpec("scripted", "S01"), PlayerSpec("keyboard"))
+    with prepared(settings(tmp_path, players=pilots), ("the robots", list)):
         assert pygame.display.get_caption()[0].startswith("copolicy")
     steps = list(dict.fromkeys(what for what, _ in seen))
     assert steps == [
         "the table and its recorder",
         "the robots",
-        "recordings that broke off",
+        "interrupted recordings",
         "the players",
-        "what was played before",
+        "earlier episodes",
     ]
     assert {title for _, title in seen} == {"loading: carry the table together"}

@@ -109,7 +109,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         spare.append(VirtualJoystick("Beta pad", product=2))
         assert spare[0].instance_id != b.instance_id
         players.press(spare[0], A)  # joins again
-        assert game.roster.missing() == []
+        assert game.roster.without_device() == []
         players.press(a, A)
         players.phase("Running")
         players.carry(a, spare[0])
@@ -178,15 +178,15 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
     def second_day(players):
         game = players.application.game
         assert game.folder.continued
-        assert game.folder.counts.kept_here.total() == 1
+        assert game.folder.counts.kept_in_session.total() == 1
         _join_and_start(players, *pads)
         players.carry(*pads)
         players.result()
         players.press(pads[0], 5)  # undoes the keep of yesterday
-        players.until(lambda: game.folder.counts.kept_here.total() == 0, "the undo")
+        players.until(lambda: game.folder.counts.kept_in_session.total() == 0, "the undo")
         players.press(pads[0], A)
         players.phase("Ready")
-        players.until(lambda: game.folder.counts.kept_here.total() == 1, "the keep")
+        players.until(lambda: game.folder.counts.kept_in_session.total() == 1, "the keep")
 
     # SDL forgets its virtual joysticks when the program closes it.
     pads[:] = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
@@ -224,7 +224,7 @@ def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
         players.press(a, A)
         players.phase("Ready")
         assert game.folder.counts.kept.total() == 0
-        assert game.folder.counts.tried.total() == 1
+        assert game.folder.counts.attempted.total() == 1
 
     with prepared(settings(tmp_path), clock=SimulatedClock(2)) as application:
         _run(application, play)

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("own_joysticks")
 @pytest.fixture
 def sticks():
     """Two pads of one make: nothing but a press tells them apart."""
-    plugged = [VirtualJoystick("Pad"), VirtualJoystick("Pad")]
+    plugged = [VirtualJoystick("Gamepad"), VirtualJoystick("Gamepad")]
     yield plugged
     for stick in plugged:
         stick.unplug()
@@ -119,7 +119,7 @@ def test_a_pad_that_is_listed_twice_does_not_get_both_seats(teleoperator, listed
 
     player = threading.Thread(target=presses)
     player.start()
-    with pytest.raises(DeviceNotConnectedError, match="found none on another pad: Pad was pressed together"):
+    with pytest.raises(DeviceNotConnectedError, match="found none on another pad: Gamepad was pressed together"):
         pair.connect(calibrate=False)
     player.join()
     assert not pair.is_connected
@@ -133,7 +133,7 @@ def test_two_pads_that_never_differ_are_refused(teleoperator, listed_twice):
         listed_twice.act(x=0.04 * step)
         pair.get_action()
     listed_twice.act(x=0.5)
-    with pytest.raises(DeviceNotConnectedError, match=r"found one that is listed twice \(Pad and Pad\)"):
+    with pytest.raises(DeviceNotConnectedError, match=r"found one that is listed twice \(Gamepad and Gamepad\)"):
         pair.get_action()
     pair.disconnect()
 
@@ -195,13 +195,13 @@ def test_an_unplugged_pad_is_an_error_and_not_a_zero_force(teleoperator, sticks)
     pair.connect(calibrate=False)
     sticks[1].unplug()
     with pytest.raises(
-        DeviceNotConnectedError, match=r"copolicy_pair: the pad of the human seat \(Pad\) was unplugged"
+        DeviceNotConnectedError, match=r"copolicy_pair: the pad of the human seat \(Gamepad\) was unplugged"
     ):
         pair.get_action()
     assert not pair.is_connected
     with pytest.raises(DeviceNotConnectedError, match="is not connected"):
         pair.get_action()
-    again = VirtualJoystick("Pad")
+    again = VirtualJoystick("Gamepad")
     pair.connect(calibrate=False)
     again.move(-1.0, 0.0)
     assert pair.get_action()["human_fx"] == pytest.approx(-1.0, abs=1e-4)

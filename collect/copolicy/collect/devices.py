@@ -7,7 +7,7 @@ from typing import Any, TextIO
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
-from .inputs import CalibrationStore, InputSample, MappingStore, Pad, Pads, StickCalibration, user_config_folder
+from .inputs import CalibrationStore, Gamepad, Gamepads, InputSample, MappingStore, StickCalibration, user_config_folder
 from .sdl import init_events, pygame
 
 _PICTURES_HZ = 20
@@ -26,7 +26,7 @@ _OF_JOYSTICKS = (
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
-def open_pads(config_folder: Path | None = None) -> Pads:
+def open_pads(config_folder: Path | None = None) -> Gamepads:
     """All pads that are plugged in; needs neither a window nor a display.
 
     Args:
@@ -37,14 +37,14 @@ def open_pads(config_folder: Path | None = None) -> Pads:
     """
     mappings = MappingStore(config_folder or user_config_folder())
     init_events()
-    pads = Pads(mappings)
+    pads = Gamepads(mappings)
     # Where somebody in this process has taken the events that tell of them, the pads are there all the same.
     for index in range(pygame.joystick.get_count()):
         pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
     return pads
 
 
-def follow_pads(pads: Pads) -> list[Pad]:
+def follow_pads(pads: Gamepads) -> list[Gamepad]:
     """Reads the sticks, and the events of plugging and unplugging; returns the pads that went.
 
     Takes all events of joysticks from the queue, so that it never fills up, and leaves those of the window.
@@ -57,7 +57,7 @@ def follow_pads(pads: Pads) -> list[Pad]:
     return gone
 
 
-def list_devices(pads: Pads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
+def list_devices(pads: Gamepads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
     """Every pad by its instance id, JSON-able."""
     return [
         {
@@ -84,7 +84,7 @@ def table(devices: list[dict[str, Any]]) -> list[str]:
 
 
 def watch(
-    pads: Pads,
+    pads: Gamepads,
     calibrations: CalibrationStore,
     seconds: float,
     out: TextIO,
@@ -118,7 +118,7 @@ def watch(
         for pad in pads:
             sample = pad.sample(time.monotonic_ns())
             _remember(found, pad, sample)
-            lines += _picture(pad, sample, calibrations.of(pad))
+            lines += _picture(pad, sample, calibrations.for_gamepad(pad))
         if out.isatty():
             # Up over the last picture, and clear what is below.
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
@@ -143,7 +143,7 @@ def devices_command(seconds: float | None, as_json: bool, config_folder: Path | 
     return {"devices": devices, "test": found} if as_json else {}
 
 
-def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:
+def _remember(found: dict[int, dict[str, Any]], pad: Gamepad, sample: InputSample) -> None:
     new = {"name": pad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
     one = found.setdefault(pad.instance_id, new)
     one["readings"] += 1
@@ -156,7 +156,7 @@ def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -
     one["buttons"] = sorted(pressed | set(one["buttons"]))
 
 
-def _picture(pad: Pad, sample: InputSample, calibration: StickCalibration) -> list[str]:
+def _picture(pad: Gamepad, sample: InputSample, calibration: StickCalibration) -> list[str]:
     x, y = pad.force(sample, calibration)
     lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}", f"  {_about(pad, calibration)}"]
     lines += [f"  axis {index:<3} {_bar(value)} {value:+.2f}" for index, value in enumerate(sample.axes)]
@@ -167,9 +167,13 @@ def _picture(pad: Pad, sample: InputSample, calibration: StickCalibration) -> li
     return [*lines, f"  buttons  {pressed or '-'}"]
 
 
-def _about(pad: Pad, calibration: StickCalibration) -> str:
-    known = "buttons known" if pad.mapping.known else "buttons not known: the lobby of play sets them up"
-    steers = f"steers with: {pad.steering(calibration).label}" if pad.steerings else "cannot steer: no stick, no d-pad"
+def _about(pad: Gamepad, calibration: StickCalibration) -> str:
+    known = "buttons known" if pad.mapping.is_known else "buttons not known: the lobby of play sets them up"
+    steers = (
+        f"steers with: {pad.steering(calibration).label}"
+        if pad.steering_options
+        else "cannot steer: no stick, no d-pad"
+    )
     return f"{steers}; {known}"
 
 

@@ -67,8 +67,8 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     # Loading torch and pygame takes a moment that `--help` should not.
     from ..agents import load_policy
     from ..agents.simulated import pair_name
-    from ..replay.film import save_gif
-    from ..replay.pictures import picture_count
+    from ..replay.frames import frame_count
+    from ..replay.video import save_gif
     from .film import SIZE, demonstrate, pictures
 
     task.required_outline  # noqa: B018 (a film needs one)
@@ -79,7 +79,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     film = (size, arguments.fps, arguments.speed)
     frames = itertools.chain.from_iterable(pictures(track, *film) for track in tracks)
-    count = sum(picture_count(track, arguments.fps, arguments.speed) for track in tracks)
+    count = sum(frame_count(track, arguments.fps, arguments.speed) for track in tracks)
     if arguments.overwrite:
         path.unlink(missing_ok=True)
     save_gif(progress(frames, count, "pictures"), path, size, arguments.fps, colours=64)

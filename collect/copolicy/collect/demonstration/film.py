@@ -8,8 +8,8 @@ from copolicy.dataset.task import PairTask, SceneView, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
 from ..episodes import episode_of
-from ..replay.pictures import LAST_S
-from ..replay.track import Track, sampled, track_of
+from ..replay.frames import LAST_FRAME_S
+from ..replay.track import Track, frame_positions, track_from_episode
 from ..rollout import Rollout, Trace
 from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
@@ -58,7 +58,9 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    return track_of(Path(task.name_of(scenario).scenario), episode_of(rollout, trace, 0, scenario, seed, settings))
+    return track_from_episode(
+        Path(task.name_of(scenario).scenario), episode_of(rollout, trace, 0, scenario, seed, settings)
+    )
 
 
 def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
@@ -72,8 +74,8 @@ def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed:
     """
     surface = new_surface(size)
     view = scene_view(track.task, track.episode.scenario)
-    positions = sampled(track, frames_per_second, speed)
-    for position in [*positions, *[positions[-1]] * round(LAST_S * frames_per_second)]:
+    positions = frame_positions(track, frames_per_second, speed)
+    for position in [*positions, *[positions[-1]] * round(LAST_FRAME_S * frames_per_second)]:
         _draw(surface, view, track, position, speed)
         yield surface
 

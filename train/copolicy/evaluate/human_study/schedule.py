@@ -9,7 +9,7 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.play.settings import PlaySettings
-from copolicy.collect.session import Balance, Counts
+from copolicy.collect.session import BalancedSchedule, EpisodeCounts
 
 from .plan import PlannedTrial, StudyPlan
 
@@ -27,15 +27,16 @@ class StudySettings(PlaySettings):
     plan: StudyPlan = field(kw_only=True)
 
     @property
-    def physics(self) -> Any:
+    def world_settings(self) -> Any:
         """The plan's."""
         return self.plan.physics
 
-    def map_configs(self) -> tuple[Any, ...]:
+    @property
+    def scenarios(self) -> tuple[Any, ...]:
         """The plan's starts."""
         return self.plan.configurations
 
-    def fixed(self) -> dict[str, Any]:
+    def session_settings(self) -> dict[str, Any]:
         """A session belongs to one plan."""
         return {"study_plan": self.plan.plan_id, "participant": self.pair}
 
@@ -71,7 +72,7 @@ class BlindPolicy:
             return self._present.predict_action_chunk(observations)
 
 
-class StudySchedule(Balance):
+class StudySchedule(BalancedSchedule):
     """Plays a participant's trials in their order; a discarded one comes again at once, the seats never change."""
 
     def __init__(self, plan: StudyPlan, participant: str, policy: BlindPolicy, agent: PolicyAgent):
@@ -82,9 +83,9 @@ class StudySchedule(Balance):
         self._agent = agent
         super().__init__(plan.configurations, len(self._trials), plan.seed, participant, swap=False, task=plan.task)
 
-    def next(self, counts: Counts) -> tuple[Any, int]:
+    def next(self, counts: EpisodeCounts) -> tuple[Any, int]:
         """Start and seats of the next trial; puts its robot in charge."""
-        trial = self._trials[min(counts.kept_here.total(), len(self._trials) - 1)]
+        trial = self._trials[min(counts.kept_in_session.total(), len(self._trials) - 1)]
         return self._play(trial, trial.code), 0
 
     def practice(self, number: int) -> Any:
