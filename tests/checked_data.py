@@ -25,7 +25,7 @@ def make_recordings(folder: Path, episodes: int = 6, seed: int = 1) -> Path:
 
 def make_data_set(recordings: Path, root: Path, *flags: str) -> Path:
     """The recordings as a data set at 10 Hz."""
-    arguments = ["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
+    arguments = ["mcap", str(recordings), "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     with contextlib.redirect_stdout(io.StringIO()):
         assert convert([*arguments, *flags]) == 0
     return root

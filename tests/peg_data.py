@@ -18,7 +18,7 @@ def record_pegs(folder: Path, episodes: int = 4, seed: int = 1, maps: str = "rig
 
 def convert_pegs(recordings: Path, root: Path, *flags: str) -> Path:
     """A data set at 10 Hz of them."""
-    arguments = [str(recordings), "--root", str(root), "--repo-id", "lab/peg", "--license", "cc0-1.0", *flags]
+    arguments = [str(recordings), "--out", str(root), "--repo-id", "lab/peg", "--license", "cc0-1.0", *flags]
     with contextlib.redirect_stdout(io.StringIO()):
         assert convert(["mcap", *arguments]) == 0
     return root

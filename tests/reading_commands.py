@@ -16,7 +16,7 @@ Main = Callable[[list[str]], int]
 
 
 def _out(scratch: Path) -> list[str]:
-    return ["--root", str(scratch / "out"), "--repo-id", "lab/x"]
+    return ["--out", str(scratch / "out"), "--repo-id", "lab/x"]
 
 
 COMMANDS: dict[str, Callable[[Path, Path], tuple[Main, list[str]]]] = {
@@ -24,7 +24,7 @@ COMMANDS: dict[str, Callable[[Path, Path], tuple[Main, list[str]]]] = {
     "collect recover": lambda path, scratch: (collect, ["recover", str(path)]),
     "collect play": lambda path, scratch: (
         collect,
-        ["play", "--out", str(scratch / "play"), "--pair", "P01", "--episodes", "1", "--headless", "--pilots",
+        ["play", "--out", str(scratch / "play"), "--pair", "P01", "--episodes", "1", "--headless", "--players",
          f"replay:{path}", "scripted"],
     ),
     "convert mcap": lambda path, scratch: (convert, ["mcap", str(path), *_out(scratch)]),

@@ -70,7 +70,7 @@ def make_data_set(folder: Path, episodes: int) -> Path:
     root = folder / "table"
     with contextlib.redirect_stdout(io.StringIO()):
         assert (
-            convert(["mcap", str(folder / "raw"), "--root", str(root), "--repo-id", "local/table", "--license", "mit"])
+            convert(["mcap", str(folder / "raw"), "--out", str(root), "--repo-id", "local/table", "--license", "mit"])
             == 0
         )
     return root

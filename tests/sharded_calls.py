@@ -15,7 +15,7 @@ EPISODES = 6
 
 
 def call(recordings: Path, root: Path, *flags: str) -> list[str]:
-    return ["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0", *flags]
+    return ["mcap", str(recordings), "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0", *flags]
 
 
 def content(root: Path) -> str:

@@ -25,7 +25,7 @@ def dataset(tmp_path_factory, upstream) -> Path:
     """The original program's raw example episodes as a released LeRobot data set with Croissant metadata."""
     root = tmp_path_factory.mktemp("croissant") / "table"
     raw = str(upstream / "examples_scripted" / "raw")
-    assert convert(["upstream", raw, "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]) == 0
+    assert convert(["upstream", raw, "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]) == 0
     release(root, "minor", "the first")
     assert main(["dataset", str(root), "--repo-id", "lab/table", "--croissant", "--no-figures"]) == 0
     return root

@@ -26,7 +26,7 @@ def converted(tmp_path_factory, upstream) -> Path:
     """The original program's raw example episodes as a LeRobot data set."""
     root = tmp_path_factory.mktemp("cards") / "table"
     raw = str(upstream / "examples_scripted" / "raw")
-    assert convert(["upstream", raw, "--root", str(root), "--repo-id", "local/table", "--license", "cc-by-4.0"]) == 0
+    assert convert(["upstream", raw, "--out", str(root), "--repo-id", "local/table", "--license", "cc-by-4.0"]) == 0
     return root
 
 
@@ -270,7 +270,7 @@ def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
 
 def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
     assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
-    assert dataset_command(["exclude", str(dataset), "--episodes", "1", "3", "--reason", "stick unplugged"]) == 0
+    assert dataset_command(["exclude", str(dataset), "--episode-ids", "1", "3", "--reason", "stick unplugged"]) == 0
     text = render(DatasetFacts.read(dataset), "lab/table")
     assert "2 of 6 episodes are kept and marked as not to be used" in text
     assert "| 3 | stick unplugged |" in text
@@ -284,7 +284,7 @@ def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):
     assert collect(["maps", "make", "--count", "1", "--bounds", "obstacles=1", "--seed", "1", "--out", str(lab)]) == 0
     simulate = ["simulate", "--maps", str(lab), "--episodes", "10", "--seed", "1", "--out", str(recordings)]
     assert collect([*simulate, "--workers", "1"]) == 0
-    assert convert(["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/one", "--license", "cc0-1.0"]) == 0
+    assert convert(["mcap", str(recordings), "--out", str(root), "--repo-id", "lab/one", "--license", "cc0-1.0"]) == 0
     assert dataset_command(["stats", str(root)]) == 0
     stored = json.loads((root / "meta" / "copolicy_stats.json").read_text(encoding="utf-8"))["statistics"]
     estimates = [estimate for family in stored.values() for estimate in family.values()]

@@ -58,7 +58,7 @@ def dataset(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("model_card")
     simulate(folder / "raw", 4, 3, workers=1)
     root = folder / "table"
-    flags = ["--root", str(root), "--repo-id", "lab/table", "--license", "cc0-1.0"]
+    flags = ["--out", str(root), "--repo-id", "lab/table", "--license", "cc0-1.0"]
     assert convert(["mcap", str(folder / "raw"), *flags]) == 0
     return root
 
@@ -173,7 +173,7 @@ def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
     folder = exported.rename(tmp_path / "pretrained")
     assert main(["model", str(folder)]) == 0
     text = (folder / "README.md").read_text(encoding="utf-8")
-    assert "copolicy-collect play --pilots keyboard policy:pretrained\n" in text
+    assert "copolicy-collect play --players keyboard policy:pretrained\n" in text
     assert "copolicy-eval coplan --policy pretrained --maps holdout --out eval.json\n" in text
     assert "`copolicy-train pretrained` says where it is" in text
 

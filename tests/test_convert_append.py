@@ -37,7 +37,7 @@ def root(made, tmp_path) -> Path:
 
 
 def add(folder: Path, root: Path, *flags: str) -> int:
-    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
+    arguments = ["mcap", str(folder), "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     return main([*arguments, "--append", "--json", *flags])
 
 
@@ -145,7 +145,7 @@ def test_a_damaged_recording_changes_nothing(made, root, tmp_path, capsys):
     ("flags", "message"),
     [
         (["--fps", "30"], "--fps: expected 10, as {root} has it, found 30"),
-        (["--hold", "first"], "--hold: expected 'mean', as {root} has it, found 'first'"),
+        (["--downsampling", "first"], "--downsampling: expected 'mean', as {root} has it, found 'first'"),
     ],
 )
 def test_another_clock_is_refused(made, root, capsys, flags, message):

@@ -84,7 +84,7 @@ def test_a_store_pairs_a_state_with_the_action_taken_in_it(data_set, tmp_path):
 
 def test_a_store_with_the_originals_alignment_comes_back_through_the_importer(data_set, tmp_path):
     store = export(data_set, "zarr", tmp_path / "table.zarr", "--alignment", "upstream")
-    run("upstream", store, "--root", tmp_path / "back", "--repo-id", "lab/back")
+    run("upstream", store, "--out", tmp_path / "back", "--repo-id", "lab/back")
     for before, after in zip(episodes(data_set), episodes(tmp_path / "back"), strict=True):
         np.testing.assert_allclose(after.actions, before.actions, atol=1e-6)
         np.testing.assert_array_equal(after.environment, before.environment)
@@ -98,7 +98,7 @@ def test_a_store_with_the_originals_alignment_comes_back_through_the_importer(da
 
 def test_the_originals_raw_files_at_30_hz_give_the_originals_store(upstream, tmp_path):
     examples = upstream / "examples_scripted"
-    run("upstream", examples / "raw", "--fps", 30, "--root", tmp_path / "raw", "--repo-id", "lab/raw")
+    run("upstream", examples / "raw", "--fps", 30, "--out", tmp_path / "raw", "--repo-id", "lab/raw")
     ours = arrays(export(tmp_path / "raw", "zarr", tmp_path / "table.zarr", "--alignment", "upstream"))
     theirs = arrays(examples / "table_10Hz.zarr")
     places = {

@@ -45,7 +45,7 @@ def roots(made, tmp_path) -> tuple[Path, Path]:
 
 
 def merge(out: Path, *arguments: object) -> int:
-    return main(["merge", *map(str, arguments), "--root", str(out), "--repo-id", "lab/both", "--json"])
+    return main(["merge", *map(str, arguments), "--out", str(out), "--repo-id", "lab/both", "--json"])
 
 
 def episodes(root: Path) -> pa.Table:
@@ -163,7 +163,7 @@ def test_players_are_compared_across_the_seats(roots, tmp_path, capsys):
     ],
 )
 def test_a_call_that_cannot_be_met_says_why(made, tmp_path, capsys, flags, message):
-    arguments = ["merge", str(made / "a"), str(made / "b"), "--root", str(tmp_path / "x"), "--repo-id", "l/b", *flags]
+    arguments = ["merge", str(made / "a"), str(made / "b"), "--out", str(tmp_path / "x"), "--repo-id", "l/b", *flags]
     assert main(arguments) == 2
     assert capsys.readouterr().err.startswith(f"copolicy-convert: {message}")
 

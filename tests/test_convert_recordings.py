@@ -42,7 +42,7 @@ def recordings(tmp_path):
 
 
 def convert(folder, root, *flags) -> int:
-    return main(["mcap", str(folder), "--root", str(root), "--repo-id", "me/table", *flags])
+    return main(["mcap", str(folder), "--out", str(root), "--repo-id", "me/table", *flags])
 
 
 def load(root: Path) -> Any:
@@ -92,7 +92,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
 
 def test_flags_do_what_they_say(recordings, tmp_path):
     root = tmp_path / "set"
-    assert convert(recordings, root, "--fps", "30", "--hold", "first", "--keep-discarded", "--no-drift") == 0
+    assert convert(recordings, root, "--fps", "30", "--downsampling", "first", "--keep-discarded", "--no-drift") == 0
     dataset = load(root)
     assert (dataset.fps, dataset.num_episodes, dataset.num_frames) == (30, 4, 4 * 31)
     assert dataset.meta.episodes["discarded"] == [False, False, True, False]

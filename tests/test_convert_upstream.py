@@ -195,7 +195,7 @@ def load(root: Path) -> Any:
 
 
 def convert(path: Path, root: Path, *flags: str) -> int:
-    return main(["upstream", str(path), "--root", str(root), "--repo-id", "me/table", *flags])
+    return main(["upstream", str(path), "--out", str(root), "--repo-id", "me/table", *flags])
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_files_come_in_the_order_of_their_numbers(examples, tmp_path):
 def test_a_store_has_one_rate_and_one_hold(examples, tmp_path, capsys):
     store = examples / "table_10Hz.zarr"
     assert convert(store, tmp_path / "set", "--fps", "30") == 2
-    assert convert(store, tmp_path / "set", "--hold", "mean") == 2
+    assert convert(store, tmp_path / "set", "--downsampling", "mean") == 2
     assert capsys.readouterr().err.splitlines() == [
         "copolicy-convert: fps: expected 10: the store holds every third step only, found 30",
         "copolicy-convert: hold: expected 'first': the store holds the first of three actions only, found 'mean'",

@@ -134,7 +134,7 @@ def map_findings(root: Path) -> list[tuple[str, str, str]]:
 def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, capsys):
     root = tmp_path / "set"
     store = str(examples / "table_10Hz.zarr")
-    assert main(["upstream", store, "--root", str(root), "--repo-id", "me/table", "--json"]) == 0
+    assert main(["upstream", store, "--out", str(root), "--repo-id", "me/table", "--json"]) == 0
     capsys.readouterr()
     place = zarr_places(examples)[1]
     assert [(entry.episode, entry.reason) for entry in excluded_episodes(root)] == [(place, "map_mismatch")]
@@ -147,7 +147,7 @@ def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, ca
 def test_an_episode_whose_map_was_recovered_is_used(examples, tmp_path, capsys):
     root = tmp_path / "set"
     files = str(examples / "processed_npz")
-    assert main(["upstream", files, "--root", str(root), "--repo-id", "me/table", "--json"]) == 0
+    assert main(["upstream", files, "--out", str(root), "--repo-id", "me/table", "--json"]) == 0
     assert excluded_episodes(root) == []
     ((episode, severity, message),) = map_findings(root)
     assert (episode, severity) == ("0", "warning")

@@ -166,7 +166,7 @@ def test_the_content_does_not_depend_on_what_stands_beside_an_episode(made):
 
 
 def append(folder: Path, root: Path, *flags: str) -> int:
-    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
+    arguments = ["mcap", str(folder), "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     return main([*arguments, "--append", "--no-drift", *flags])
 
 
@@ -204,7 +204,7 @@ def test_another_size_or_a_video_where_there_is_none_is_refused(made, root, tmp_
 
 
 def test_merging_gives_what_one_conversion_gives(made, tmp_path, capsys):
-    arguments = ["merge", str(made / "a"), str(made / "b"), "--root", str(tmp_path / "m"), "--repo-id", "lab/both"]
+    arguments = ["merge", str(made / "a"), str(made / "b"), "--out", str(tmp_path / "m"), "--repo-id", "lab/both"]
     assert main([*arguments, "--json"]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""

@@ -255,7 +255,7 @@ def test_damaged_zip_files(tmp_path):
     for damaged in (content[:-30], content[: len(content) // 2], b"PK\3\4" + bytes(40), b""):
         path.write_bytes(damaged)
         refusal(path)
-        assert main(["upstream", str(path), "--root", str(tmp_path / "set"), "--repo-id", "lab/x"]) == 2
+        assert main(["upstream", str(path), "--out", str(tmp_path / "set"), "--repo-id", "lab/x"]) == 2
     flipped = bytearray(content)
     flipped[40] ^= 0xFF  # within the first member
     path.write_bytes(flipped)

@@ -162,8 +162,8 @@ def test_a_folder_without_a_checkpoint_is_named(tmp_path, capsys):
 
 
 def test_more_actions_than_a_plan_holds_are_refused(checkpoint, tmp_path, capsys):
-    assert _command(checkpoint, tmp_path / "eval.json", "--actions-per-plan", "11") == 2
-    assert "--actions-per-plan: expected at most the plan's 10, found 11" in capsys.readouterr().err
+    assert _command(checkpoint, tmp_path / "eval.json", "--n-action-steps", "11") == 2
+    assert "--n-action-steps: expected at most the plan's 10, found 11" in capsys.readouterr().err
 
 
 def test_a_setting_that_the_policy_lacks_is_refused(checkpoint):

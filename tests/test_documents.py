@@ -74,13 +74,13 @@ def test_every_command_of_a_guide_is_run_or_says_why_not(name):
 
 
 def test_a_command_is_taken_from_its_block_as_people_type_it():
-    play = "copolicy-collect play \\\n  --pilots keyboard joystick"
+    play = "copolicy-collect play \\\n  --players keyboard joystick"
     text = f"<!-- hub -->\n```bash\nuv run copolicy-dataset stats A   # why\n{play}\n```\n"
     (block,) = blocks(text)
     assert (block.kind, block.language) == ("hub", "bash")
     stats, play = commands(block)
     assert stats == "copolicy-dataset stats A"
-    assert play.split() == "copolicy-collect play --pilots scripted scripted --headless --episodes 1".split()
+    assert play.split() == "copolicy-collect play --players scripted scripted --headless --episodes 1".split()
 
 
 def test_the_guide_to_the_format_names_everything_that_is_stored():

@@ -122,9 +122,9 @@ def test_every_amendable_column_is_an_episode_column():
         (["--set", "license=CC"], 2, "--set license"),
         (["--set", "source=human"], 1, "expected an episode with another value, found none; nothing was changed"),
         (["--set", "license=mit", "--where", "duration_s < 0"], 1, "expected at least one episode that is meant"),
-        (["--set", "license=mit", "--pairs", "P77"], 1, "--pairs: expected a value that an episode has"),
+        (["--set", "license=mit", "--pair-ids", "P77"], 1, "--pair-ids: expected a value that an episode has"),
         (["--restore-from", "nowhere"], 1, "found that each has an episode_uuid"),
-        (["--restore-from", "nowhere", "--episodes", "1"], 2, "--restore-from: expected no other flag beside it"),
+        (["--restore-from", "nowhere", "--episode-ids", "1"], 2, "--restore-from: expected no other flag beside it"),
     ],
 )
 def test_a_wrong_call_changes_nothing(root, capsys, flags, status, line):
@@ -156,7 +156,7 @@ def test_a_stripped_set_is_named_with_the_way_on(left, capsys):
     assert "copolicy-dataset select" in out
     assert main(["exclude", str(left), "--list"]) == 2
     assert "--restore-from ORIGINAL" in capsys.readouterr().err
-    assert main(["select", str(left), "--out", str(left.parent / "new"), "--episodes", "0"]) == 2
+    assert main(["select", str(left), "--out", str(left.parent / "new"), "--episode-ids", "0"]) == 2
     assert "--restore-from ORIGINAL" in capsys.readouterr().err
 
 

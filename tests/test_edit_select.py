@@ -214,12 +214,12 @@ def test_record_extra_keys_splits_and_licences_come_along(root, tmp_path):
     ("flags", "status", "line"),
     [
         (["--where", "duration_s < 0"], 1, "expected at least one episode that is meant, found none"),
-        (["--pairs", "P99"], 1, "--pairs: expected a value that an episode has, found 'P99', which none has"),
-        (["--pairs", "P01", "P99"], 1, "--pairs: expected a value that an episode has, found 'P99'"),
-        (["--episodes", "99"], 2, "--episodes: expected numbers from 0 to 7"),
+        (["--pair-ids", "P99"], 1, "--pair-ids: expected a value that an episode has, found 'P99', which none has"),
+        (["--pair-ids", "P01", "P99"], 1, "--pair-ids: expected a value that an episode has, found 'P99'"),
+        (["--episode-ids", "99"], 2, "--episode-ids: expected numbers from 0 to 7"),
         (["--results", "won"], 2, "--results: expected one of success, failure, goal"),
         (["--sources", "robot"], 2, "--sources: expected one of human, simulated, upstream, found 'robot'"),
-        ([], 2, "select: expected at least one of --episodes"),
+        ([], 2, "select: expected at least one of --episode-ids"),
     ],
 )
 def test_nothing_is_written_for_a_wrong_call(root, tmp_path, capsys, flags, status, line):
@@ -234,9 +234,9 @@ def test_nothing_is_written_for_a_wrong_call(root, tmp_path, capsys, flags, stat
 
 def test_an_output_that_exists_and_a_set_without_columns(root, tmp_path, capsys):
     (tmp_path / "new").mkdir()
-    assert main(["select", str(root), "--out", str(tmp_path / "new"), "--episodes", "0"]) == 2
+    assert main(["select", str(root), "--out", str(tmp_path / "new"), "--episode-ids", "0"]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
-    assert main(["select", str(tmp_path / "none"), "--out", str(tmp_path / "b"), "--episodes", "0"]) == 2
+    assert main(["select", str(tmp_path / "none"), "--out", str(tmp_path / "b"), "--episode-ids", "0"]) == 2
     assert "expected a LeRobot v3 data set with meta/info.json, found nothing there" in capsys.readouterr().err
 
 

@@ -251,7 +251,7 @@ def _digest(folder):
         (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
         (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
         (["--repeats", "0"], "--repeats: expected at least 1, found 0"),
-        (["--actions-per-plan", "11"], "--actions-per-plan: expected at most the plan's 10, found 11"),
+        (["--n-action-steps", "11"], "--n-action-steps: expected at most the plan's 10, found 11"),
         (
             ["--baseline", "passive", "passive"],
             "--baseline: expected robots of different names (NAME=CKPT gives one), "

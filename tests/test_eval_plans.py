@@ -234,7 +234,7 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         (["--seconds", "-1"], 2, "--seconds: expected a number of at least 0, found -1.0"),
         (["--seconds", "nan"], 2, "--seconds: expected a number of at least 0, found nan"),
         (["--seconds", "5"], 1, "--seconds: expected a moment before the end, found one at 2.0 s"),
-        (["--actions-per-plan", "11"], 2, "--actions-per-plan: expected at most the plan's 10, found 11"),
+        (["--n-action-steps", "11"], 2, "--n-action-steps: expected at most the plan's 10, found 11"),
     ],
 )
 def test_wrong_calls_say_what_is_wrong(checkpoint, tmp_path, capsys, flags, status, text):

@@ -82,7 +82,7 @@ def test_what_an_operator_discarded_is_left_alone(root):
 
 
 def test_the_command(root, capsys):
-    assert main(["exclude", str(root), "--episodes", "0", "2-3", "--reason", REASON, "--json"]) == 0
+    assert main(["exclude", str(root), "--episode-ids", "0", "2-3", "--reason", REASON, "--json"]) == 0
     expected = {"root": str(root), "excluded": [0, 2, 3], "already_discarded": []}
     assert json.loads(capsys.readouterr().out) == expected
     assert main(["exclude", str(root), "--list", "--json"]) == 0
@@ -90,22 +90,22 @@ def test_the_command(root, capsys):
     assert listed[0] == {"episode": 0, "episode_uuid": uuids(root)[0], "reason": REASON}
     assert main(["exclude", str(root), "--list"]) == 0
     assert capsys.readouterr().out.splitlines()[1] == f"  episode 0  {REASON}"
-    assert main(["exclude", str(root), "--undo", "--episodes", "2"]) == 0
+    assert main(["exclude", str(root), "--undo", "--episode-ids", "2"]) == 0
     assert [entry.episode for entry in excluded_episodes(root)] == [0, 3]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--episodes", "1"), "--reason: expected why the episodes are excluded, found ''"),
-        (("--reason", "x"), "--episodes: expected numbers, ranges such as 3-5, or episode_uuids, found None"),
+        (("--episode-ids", "1"), "--reason: expected why the episodes are excluded, found ''"),
+        (("--reason", "x"), "--episode-ids: expected numbers, ranges such as 3-5, or episode_uuids, found None"),
         (
-            ("--episodes", "1", "3-9", "--reason", "x"),
-            "--episodes: expected numbers from 0 to 4, ranges such as 3-5, or episode_uuids of the data set, "
+            ("--episode-ids", "1", "3-9", "--reason", "x"),
+            "--episode-ids: expected numbers from 0 to 4, ranges such as 3-5, or episode_uuids of the data set, "
             "found '3-9'",
         ),
-        (("--episodes", "1", "--reason", "x", "--undo"), "--reason: expected none with --undo, found 'x'"),
-        (("--list", "--reason", "x"), "--list: expected no --episodes and no --reason beside it, found 'one'"),
+        (("--episode-ids", "1", "--reason", "x", "--undo"), "--reason: expected none with --undo, found 'x'"),
+        (("--list", "--reason", "x"), "--list: expected no --episode-ids and no --reason beside it, found 'one'"),
     ],
 )
 def test_a_wrong_call_changes_nothing(root, capsys, arguments, message):

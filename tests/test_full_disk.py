@@ -28,7 +28,7 @@ def made(tmp_path_factory) -> Path:
     for seed, name in ((0, "one"), (1, "two")):
         arguments = ["simulate", "--episodes", "1", "--seed", str(seed), "--maps", "training", "--workers", "1"]
         assert collect([*arguments, "--out", str(folder / f"{name}-recordings")]) == 0
-        flags = ["--root", str(folder / name), "--repo-id", "lab/table", "--license", "cc0-1.0"]
+        flags = ["--out", str(folder / name), "--repo-id", "lab/table", "--license", "cc0-1.0"]
         assert convert(["mcap", str(folder / f"{name}-recordings"), *flags]) == 0
     return folder
 
@@ -39,15 +39,15 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 NEW = {  # what makes a new file or folder, and how many bytes a file may have
     "simulate": (collect, ["simulate", "--episodes", "2", "--maps", "training", "--workers", "1", "--out"], 20_000),
-    "png": (collect, ["replay", "{recording}", "--png"], 2_000),
-    "gif": (collect, ["replay", "{recording}", "--gif"], 2_000),
-    "mcap": (convert, ["mcap", "{made}/one-recordings", "--repo-id", "a/b", "--root"], 10_000),
+    "png": (collect, ["replay", "{recording}", "--out"], 2_000),
+    "gif": (collect, ["replay", "{recording}", "--out"], 2_000),
+    "mcap": (convert, ["mcap", "{made}/one-recordings", "--repo-id", "a/b", "--out"], 10_000),
     "shards": (
         convert,
-        ["mcap", "{made}/one-recordings", "--shard-episodes", "1", "--repo-id", "a/b", "--root"],
+        ["mcap", "{made}/one-recordings", "--shard-episodes", "1", "--repo-id", "a/b", "--out"],
         9_000,
     ),
-    "merge": (convert, ["merge", "{made}/one", "{made}/two", "--same-people", "--repo-id", "a/b", "--root"], 9_000),
+    "merge": (convert, ["merge", "{made}/one", "{made}/two", "--same-people", "--repo-id", "a/b", "--out"], 9_000),
     "zarr": (convert, ["export", "{made}/one", "--format", "zarr", "--out"], 1_000),
     "robomimic": (convert, ["export", "{made}/one", "--format", "robomimic", "--out"], 9_000),
     "minari": (convert, ["export", "{made}/one", "--format", "minari", "--out"], 9_000),
@@ -78,11 +78,11 @@ def test_what_is_new_is_not_there_at_all(what, made, tmp_path, capsys):
 
 CHANGED = {  # what changes a data set
     "stats": (dataset, ["stats", "{set}"], 500),
-    "exclude": (dataset, ["exclude", "{set}", "--episodes", "0", "--reason", "why"], 5_000),
+    "exclude": (dataset, ["exclude", "{set}", "--episode-ids", "0", "--reason", "why"], 5_000),
     "release": (dataset, ["release", "{set}", "--bump", "minor", "--notes", "first"], 500),
     "card": (cards, ["dataset", "{set}", "--overwrite", "--no-figures"], 500),
     "figures": (cards, ["dataset", "{set}", "--overwrite"], 9_000),
-    "append": (convert, ["mcap", "{made}/two-recordings", "--append", "--root", "{set}", "--repo-id", "a/b"], 9_000),
+    "append": (convert, ["mcap", "{made}/two-recordings", "--append", "--out", "{set}", "--repo-id", "a/b"], 9_000),
 }
 
 

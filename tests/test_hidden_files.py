@@ -57,7 +57,7 @@ def ok(main, *arguments: object) -> dict:
 def test_recordings_are_converted_checked_and_found(made, tmp_path):
     raw = made / "littered" / "raw"
     video = ("--video", "--video-size", "160x80", "--license", "cc-by-4.0")
-    ok(convert, "mcap", raw, "--root", tmp_path / "set", "--repo-id", "lab/table", *video)
+    ok(convert, "mcap", raw, "--out", tmp_path / "set", "--repo-id", "lab/table", *video)
     assert contents(tmp_path / "set").keys() == contents(made / "set").keys()
     assert check_dataset(raw).findings == check_dataset(made / "raw").findings
     assert len(find_raw_recordings(made / "set", raw).files) == len(list(iter_recordings(raw))) == 4
@@ -67,7 +67,7 @@ def test_recordings_are_converted_checked_and_found(made, tmp_path):
 def test_a_data_set_is_checked_described_and_released(made, root):
     assert check_dataset(root).findings == check_dataset(made / "set").findings
     assert Manifest.of_folder(root).files == Manifest.of_folder(made / "set").files
-    ok(dataset, "exclude", root, "--episodes", 1, "--reason", "stick unplugged")
+    ok(dataset, "exclude", root, "--episode-ids", 1, "--reason", "stick unplugged")
     ok(dataset, "stats", root)
     ok(dataset, "release", root, "--bump", "minor", "--notes", "The first.")
     litter(root)
@@ -86,13 +86,13 @@ def test_a_data_set_is_exported(root, tmp_path, format, name):
 
 def test_data_sets_are_added_to_and_merged(made, root, tmp_path):
     make_recordings(tmp_path / "new", 2, seed=7)
-    added = ok(convert, "mcap", tmp_path / "new", "--root", root, "--repo-id", "lab/table", "--append")
+    added = ok(convert, "mcap", tmp_path / "new", "--out", root, "--repo-id", "lab/table", "--append")
     assert added["episodes"] == 6
     ok(
         convert,
         "mcap",
         tmp_path / "new",
-        "--root",
+        "--out",
         tmp_path / "b",
         "--repo-id",
         "lab/b",
@@ -101,7 +101,7 @@ def test_data_sets_are_added_to_and_merged(made, root, tmp_path):
         "160x80",
     )
     litter(tmp_path / "b")
-    merged = ok(convert, "merge", made / "littered/set", tmp_path / "b", "--root", tmp_path / "c", "--repo-id", "lab/c")
+    merged = ok(convert, "merge", made / "littered/set", tmp_path / "b", "--out", tmp_path / "c", "--repo-id", "lab/c")
     assert merged["episodes"] == 6
     assert not any("._" in name or "Thumbs" in name for name in contents(tmp_path / "c"))
 
@@ -116,7 +116,7 @@ def test_a_data_set_is_trained_on(random_table, tmp_path):
 def test_the_originals_files_are_imported(examples, tmp_path):
     for name in ("raw", "processed_npz", "table_10Hz.zarr"):
         folder = litter(Path(shutil.copytree(examples / name, tmp_path / name)))
-        summary = ok(convert, "upstream", folder, "--root", tmp_path / f"{name}-set", "--repo-id", "lab/table")
+        summary = ok(convert, "upstream", folder, "--out", tmp_path / f"{name}-set", "--repo-id", "lab/table")
         assert summary["episodes"] == len(open_upstream(examples / name).readers)
         assert summary["damaged_left_out"] == []
 

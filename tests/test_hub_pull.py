@@ -60,7 +60,7 @@ def files_of(root: Path) -> dict[str, bytes]:
 
 
 def test_what_comes_back_is_what_went_up(user, hub, released, tmp_path):
-    done = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out", "--json")
+    done = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out", "--json")
     assert done.status == 0, done.err
     assert files_of(tmp_path / "out") == files_of(released)
     assert json.loads(done.out) == {
@@ -80,18 +80,18 @@ def test_a_full_disk_leaves_nothing_at_out(user, hub, tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     with full_disk(3_000), HubUser(hub, home) as limited:  # its process inherits the limit
-        done = limited.run("pull", "lab/table", "--root", tmp_path / "out")
+        done = limited.run("pull", "lab/table", "--out", tmp_path / "out")
     assert done.status == 1
     assert len(done.err.splitlines()) == 1, done.err
     assert done.err.startswith(f"copolicy-dataset: {tmp_path / 'out'}")
     assert os.strerror(errno.EFBIG) in done.err
     assert not (tmp_path / "out").exists()
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out").status == 0
     assert {path.name for path in tmp_path.iterdir()} == {"home", "out"}
 
 
 def test_recordings_come_when_asked_for(user, hub, released, tmp_path):
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out", "--raw").status == 0
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out", "--with-raw").status == 0
     recordings = files_of(released.parent / "recordings")
     assert {name: (tmp_path / "out" / "raw" / name).read_bytes() for name in recordings} == recordings
     # What was pulled can be published as it is.
@@ -106,8 +106,8 @@ def test_the_newest_version_is_pulled_by_default_and_an_older_one_by_name(user, 
     set_value(other, EPISODES, "pair_id", 0, "pair-9")
     release(other, "patch", "Corrected.")
     assert user.run("publish", other, "--repo-id", "lab/table").status == 0
-    assert user.run("pull", "lab/table", "--root", tmp_path / "new").status == 0
-    assert user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "old").status == 0
+    assert user.run("pull", "lab/table", "--out", tmp_path / "new").status == 0
+    assert user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "old").status == 0
     assert read_content(tmp_path / "new").hash == read_content(other).hash
     assert read_content(tmp_path / "old").hash == read_content(released).hash
     assert user.run("diff", "lab/table@data-1.0.0", "lab/table@data-1.0.1").status == 1
@@ -138,7 +138,7 @@ for revision in ("data-1.0.0", None):
 
 def test_a_file_that_breaks_off_in_the_middle_is_asked_for_again(user, hub, released, tmp_path):
     hub.drop("GET", rf"/resolve/.*/{FRAMES}$", "middle")
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out").status == 0
     assert files_of(tmp_path / "out") == files_of(released)
     assert sum(method == "GET" and path.endswith(FRAMES) for method, path, _ in hub.requests) == 2
 
@@ -150,13 +150,13 @@ def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, rele
         hub.fail("GET", path, 500, times=100)
     else:
         hub.drop("GET", path, "before", times=100)
-    message = user.run("pull", "lab/table", "--root", tmp_path / "out").error
+    message = user.run("pull", "lab/table", "--out", tmp_path / "out").error
     assert message.startswith("lab/table: downloading: ")
     assert message.endswith("; run the command again, it goes on where it stopped")
     assert not (tmp_path / "out").exists()
     hub.faults.clear()
     hub.requests.clear()
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out").status == 0
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out").status == 0
     assert files_of(tmp_path / "out") == files_of(released)
     fetched = [path for method, path, _ in hub.requests if method == "GET" and "/resolve/" in path]
     assert any(path.endswith(FRAMES) for path in fetched)
@@ -187,7 +187,7 @@ TAMPERED = {
 def test_what_is_not_as_released_is_not_kept(user, hub, tmp_path, what):
     name, data, message = TAMPERED[what]
     tamper(hub, name, data)
-    found = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out").error
+    found = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out").error
     assert found.startswith(f"lab/table@data-1.0.0: {message}")
     assert list(tmp_path.iterdir()) == []
 
@@ -198,7 +198,7 @@ def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, 
     (other / MANIFEST_FILE).write_text(Manifest.of_folder(other).to_text(), encoding="utf-8")
     for name in (FRAMES, MANIFEST_FILE):
         tamper(hub, name, (other / name).read_bytes())
-    found = user.run("pull", "lab/table@data-1.0.0", "--root", tmp_path / "out").error
+    found = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out").error
     expected = f"expected content {read_content(released).hash}, found {read_content(other).hash}; nothing was kept"
     assert found == f"lab/table@data-1.0.0: {expected}"
 
@@ -211,13 +211,13 @@ def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, 
     ],
 )
 def test_what_is_not_there_is_named(user, hub, tmp_path, name, message):
-    assert user.run("pull", name, "--root", tmp_path / "out").error == message
+    assert user.run("pull", name, "--out", tmp_path / "out").error == message
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_private_data_set_asks_for_a_token(user, hub, tmp_path):
     hub.data_set("lab/table").private = True
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out", token=None).error == (
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out", token=None).error == (
         "lab/table: asking the Hub: the Hub does not accept the token, or a private data set needs one; "
         "set HF_TOKEN or run `hf auth login`"
     )
@@ -225,13 +225,13 @@ def test_a_private_data_set_asks_for_a_token(user, hub, tmp_path):
 
 def test_a_data_set_without_versions_is_no_release(user, hub, tmp_path):
     hub.data_set("lab/table").tags = {"v3.0": hub.data_set("lab/table").branches["main"]}
-    assert user.run("pull", "lab/table", "--root", tmp_path / "out").error == (
+    assert user.run("pull", "lab/table", "--out", tmp_path / "out").error == (
         "lab/table: expected a tag data-x.y.z on the Hub, found ['v3.0']"
     )
 
 
 def test_nothing_is_overwritten(user, hub, tmp_path):
     (tmp_path / "out").mkdir()
-    done = user.run("pull", "lab/table", "--root", tmp_path / "out")
+    done = user.run("pull", "lab/table", "--out", tmp_path / "out")
     assert (done.status, hub.requests) == (2, [])
     assert "found one; nothing was overwritten" in done.err

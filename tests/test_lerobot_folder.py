@@ -28,7 +28,7 @@ COMMANDS = {
     "zarr": (convert, "export", "ROOT", "--format", "zarr", "--out", "OUT.zarr"),
     "robomimic": (convert, "export", "ROOT", "--format", "robomimic", "--out", "OUT.hdf5"),
     "minari": (convert, "export", "ROOT", "--format", "minari", "--out", "OUT-v0"),
-    "merge": (convert, "merge", "ROOT", "SOUND", "--root", "OUT", "--repo-id", "lab/merged"),
+    "merge": (convert, "merge", "ROOT", "SOUND", "--out", "OUT", "--repo-id", "lab/merged"),
 }
 
 

@@ -87,8 +87,8 @@ def test_it_is_judged_by_co_planning(runs, name, tmp_path, capsys):
 def test_it_plays_at_a_seat(runs, name, seat, tmp_path):
     # The other one pulls hard towards a goal nearby: the episode is over in seconds.
     puller = record(tmp_path / "puller.mcap", config=MapConfig((620.0, 300.0, 3.0), (820.0, 300.0)), push=(1, 0, 1, 0))
-    pilots = (PlayerSpec("policy", str(runs[name])), PlayerSpec("replay", str(puller)))
-    with prepared(settings(tmp_path, players=pilots, episodes=1, headless=True, swap_seats=False)) as application:
+    players = (PlayerSpec("policy", str(runs[name])), PlayerSpec("replay", str(puller)))
+    with prepared(settings(tmp_path, players=players, episodes=1, headless=True, swap_seats=False)) as application:
         if seat:
             application.game.exchange_seats()
         application.run()

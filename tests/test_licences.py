@@ -53,8 +53,8 @@ def test_no_licence_is_stated():
     ("command", "arguments"),
     [
         (collect, ["play", "--pair", "P01", "--out", "{out}"]),
-        (convert, ["mcap", "{here}", "--root", "{out}", "--repo-id", "me/table"]),
-        (convert, ["upstream", "{here}", "--root", "{out}", "--repo-id", "me/table"]),
+        (convert, ["mcap", "{here}", "--out", "{out}", "--repo-id", "me/table"]),
+        (convert, ["upstream", "{here}", "--out", "{out}", "--repo-id", "me/table"]),
         (evaluate, ["human", "run", "{plan}", "--participant", "P01", "--out", "{out}"]),
         (cards, ["model", "{here}"]),
     ],

@@ -42,7 +42,7 @@ def linked(made, tmp_path) -> Path:
 
 
 def converted(folder: Path, root: Path, *flags: str) -> int:
-    arguments = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
+    arguments = ["mcap", str(folder), "--out", str(root), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     return convert([*arguments, "--json", *flags])
 
 
@@ -57,7 +57,7 @@ def test_a_conversion_enters_links(made, linked, tmp_path):
 
 def test_a_recording_counts_once_however_it_is_named(made, linked, tmp_path):
     folders = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
-    arguments = ["--root", str(tmp_path / "set"), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
+    arguments = ["--out", str(tmp_path / "set"), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
     assert convert(["mcap", *folders, *arguments]) == 0
     assert contents(tmp_path / "set") == contents(made / "whole")
 

@@ -121,7 +121,7 @@ def walked(tmp_path_factory):
     path = write_lab(folder)
     command = ["simulate", "--maps", str(path), "--episodes", "5", "--out", str(folder / "rec"), "--workers", "1"]
     assert main(command) == 0
-    assert convert(["mcap", str(folder / "rec"), "--root", str(folder / "set"), "--repo-id", "lab/doors"]) == 0
+    assert convert(["mcap", str(folder / "rec"), "--out", str(folder / "set"), "--repo-id", "lab/doors"]) == 0
     return folder
 
 

@@ -83,7 +83,7 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
     assert np.array_equal(ReplayAgent(file)._actions[0], truth.episode.actions)
     assert read_track(file).events == read_track(path).events
 
-    status, summary, lines = run(collect, "replay", file, "--verify", "--png", tmp_path / "sheet.png")
+    status, summary, lines = run(collect, "replay", file, "--verify", "--out", tmp_path / "sheet.png")
     assert (status, summary["verify"]["reproduced"], lines) == (0, True, [])
     assert said(summary["verify"]["not_verified"])
     status, summary, lines = run(collect, "recover", folder)
@@ -96,7 +96,7 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
     assert said([finding.message for finding in findings])
 
     root = tmp_path / "set"
-    status, summary, lines = run(convert, "mcap", folder, "--root", root, "--repo-id", "lab/x", "--keep-discarded")
+    status, summary, lines = run(convert, "mcap", folder, "--out", root, "--repo-id", "lab/x", "--keep-discarded")
     assert (status, summary["episodes"], lines) == (0, 1, [])
     assert said([note.removeprefix("episode layouts: ") for note in summary["not_verified"]])
     notes = json.loads((root / "meta" / "copolicy.json").read_text(encoding="utf-8"))["notes"]
@@ -158,7 +158,7 @@ def test_another_projects_file_is_named_as_such(source, tmp_path, options, caplo
     status, document, _ = run(dataset, "check", folder)
     assert status == 1
     assert [(one["rule"], one["message"]) for one in document["findings"]] == [("foreign", expected)]
-    status, _, lines = run(convert, "mcap", folder, "--root", tmp_path / "set", "--repo-id", "lab/x")
+    status, _, lines = run(convert, "mcap", folder, "--out", tmp_path / "set", "--repo-id", "lab/x")
     skip = "nothing was written (--skip-damaged leaves such files out)"
     assert (status, lines) == (1, [f"copolicy-convert: {line}; {skip}"])
     assert list(iter_recordings(folder)) == []

@@ -33,7 +33,7 @@ def made(tmp_path_factory) -> Path:
 
 
 def _convert(made: Path, name: str, root: Path, *flags: str) -> int:
-    return convert(["mcap", str(made / f"{name}-recordings"), "--root", str(root), "--repo-id", "lab/table", *flags])
+    return convert(["mcap", str(made / f"{name}-recordings"), "--out", str(root), "--repo-id", "lab/table", *flags])
 
 
 def _metadata(root: Path) -> dict:
@@ -62,7 +62,7 @@ def test_both_tables_load_by_name(how, made, tmp_path, monkeypatch):
         assert _convert(made, "two", root, "--append", "--license", "mit") == 0
         episodes, licence = 4, None
     elif how == "merged":
-        flags = ["--same-people", "--root", str(root), "--repo-id", "lab/both"]
+        flags = ["--same-people", "--out", str(root), "--repo-id", "lab/both"]
         assert convert(["merge", str(made / "one"), str(made / "two"), *flags]) == 0
         episodes, licence = 4, None
     else:
@@ -107,7 +107,7 @@ def test_nan_of_an_earlier_version_is_the_same_content(made, tmp_path):
     assert table.column("achieved_hz").null_count == 0
     pq.write_table(table, earlier / EPISODES)
     assert read_content(earlier).hash == read_content(made / "one").hash
-    flags = ["--same-people", "--root", str(tmp_path / "merged"), "--repo-id", "lab/both"]
+    flags = ["--same-people", "--out", str(tmp_path / "merged"), "--repo-id", "lab/both"]
     assert convert(["merge", str(earlier), str(made / "two"), *flags]) == 0
     merged = pq.ParquetFile(tmp_path / "merged" / EPISODES).read()
     assert merged.column("achieved_hz").to_pylist() == [None] * 4

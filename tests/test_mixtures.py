@@ -89,17 +89,17 @@ def test_the_physics_of_each_episode_is_in_the_data_set(made):
 
 
 def test_a_conversion_says_what_it_mixes(made, tmp_path, run):
-    summary, errors = run("mcap", made / "raw", "--root", tmp_path / "set", "--repo-id", "lab/table")
+    summary, errors = run("mcap", made / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table")
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
     assert summary["mixed"] == [f"physics: 3 episodes {HALF_WORDS}; 2 episodes {EIGHTH_WORDS}"]
     assert errors == [f"warning: this data set mixes {summary['mixed'][0]}"]
-    summary, errors = run("mcap", made / "raw/half", "--root", tmp_path / "one", "--repo-id", "lab/table")
+    summary, errors = run("mcap", made / "raw/half", "--out", tmp_path / "one", "--repo-id", "lab/table")
     assert (summary["physics"], "mixed" in summary, errors) == ({HALF_WORDS: 3}, False, [])
 
 
 def test_a_conversion_in_shards_says_so_too(made, tmp_path, run):
     flags = ("--shard-episodes", 2, "--workers", 1)
-    summary, _ = run("mcap", made / "raw", "--root", tmp_path / "set", "--repo-id", "lab/table", *flags)
+    summary, _ = run("mcap", made / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table", *flags)
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
     assert any(line.startswith("warning: physics: episodes of several physics") for line in summary["findings"])
     assert physics_in(tmp_path / "set") == physics_in(made / "both")
@@ -108,11 +108,11 @@ def test_a_conversion_in_shards_says_so_too(made, tmp_path, run):
 def test_append_and_merge_keep_the_physics_and_say_the_mixture(made, copied, tmp_path, run):
     line = f"physics: 3 episodes {HALF_WORDS}; 2 episodes {EIGHTH_WORDS}"
     root = copied("half")
-    summary, errors = run("mcap", made / "raw/eighth", "--root", root, "--repo-id", "lab/table", "--append")
+    summary, errors = run("mcap", made / "raw/eighth", "--out", root, "--repo-id", "lab/table", "--append")
     assert (summary["physics"], summary["mixed"][0]) == ({HALF_WORDS: 3, EIGHTH_WORDS: 2}, line)
     assert errors == [f"warning: this data set mixes {line}"]
     summary, errors = run(
-        "merge", made / "half", made / "eighth", "--root", tmp_path / "merged", "--repo-id", "lab/both"
+        "merge", made / "half", made / "eighth", "--out", tmp_path / "merged", "--repo-id", "lab/both"
     )
     assert (summary["physics"], summary["mixed"]) == ({HALF_WORDS: 3, EIGHTH_WORDS: 2}, [line])
     assert errors == [f"warning: this data set mixes {line}"]
@@ -123,10 +123,10 @@ def test_append_and_merge_keep_the_physics_and_say_the_mixture(made, copied, tmp
 
 def test_a_data_set_of_an_earlier_version_can_be_added_to_and_merged(made, copied, tmp_path, run):
     old = without_later_columns(copied("half"))
-    summary, _ = run("merge", old, made / "eighth", "--root", tmp_path / "merged", "--repo-id", "lab/both")
+    summary, _ = run("merge", old, made / "eighth", "--out", tmp_path / "merged", "--repo-id", "lab/both")
     assert summary["physics"] == {"unknown": 3, EIGHTH_WORDS: 2}
     before = pq.ParquetFile(old / EPISODES).read()
-    summary, _ = run("mcap", made / "raw/eighth", "--root", old, "--repo-id", "lab/table", "--append")
+    summary, _ = run("mcap", made / "raw/eighth", "--out", old, "--repo-id", "lab/table", "--append")
     assert summary["columns_added"] == list(LATER_COLUMNS)
     assert summary["physics"] == {"unknown": 3, EIGHTH_WORDS: 2}
     after = pq.ParquetFile(old / EPISODES).read()
@@ -271,7 +271,7 @@ def test_obstacles_of_several_sizes_are_said_and_found(tmp_path, run):
     training = MAP_SETS["training"][0]
     wrong = MapConfig(training.start, training.goal, training.obstacles, 45)
     record(tmp_path / "raw" / "dddd.mcap", wrong, map_id="training-00", map_set="training")
-    summary, errors = run("mcap", tmp_path / "raw", "--root", tmp_path / "set", "--repo-id", "lab/table")
+    summary, errors = run("mcap", tmp_path / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table")
     assert summary["mixed"] == ["obstacles of map set custom: 1 episode 50 px; 2 episodes 30 px"]
     assert errors == [f"warning: this data set mixes {summary['mixed'][0]}"]
     expected = [("error", {"set": "3", "raw": "dddd.mcap"}, 45), ("warning", {"set": "", "raw": ""}, 2)]
@@ -288,7 +288,7 @@ def test_other_software_sources_and_rewards_are_said(made, copied, tmp_path, run
     record.write_text(
         json.dumps({**json.loads(record.read_text(encoding="utf-8")), "version": "0.0.1"}), encoding="utf-8"
     )
-    summary, errors = run("merge", one, other, "--root", tmp_path / "out", "--repo-id", "lab/both")
+    summary, errors = run("merge", one, other, "--out", tmp_path / "out", "--repo-id", "lab/both")
     version = json.loads((one / "meta" / "copolicy.json").read_text(encoding="utf-8"))["version"]
     assert summary["mixed"] == [
         "source: 3 episodes simulated; 2 episodes upstream",
@@ -299,6 +299,6 @@ def test_other_software_sources_and_rewards_are_said(made, copied, tmp_path, run
     assert errors == [f"warning: this data set mixes {summary['mixed'][-1]}"]
     assert findings(tmp_path / "out", "mixture") == [("info", "", 2), ("info", "", 2)]
     assert (tmp_path / "out" / FRAMES).is_file()
-    summary, _ = run("mcap", made / "raw/half", "--root", other, "--repo-id", "lab/table", "--append")
+    summary, _ = run("mcap", made / "raw/half", "--out", other, "--repo-id", "lab/table", "--append")
     assert "rewards: those of eighth differ by up to 1 from this version's definition" in summary["mixed"]
     assert f"converted by versions 0.0.1, {version}" in summary["mixed"]

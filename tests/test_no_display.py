@@ -38,7 +38,7 @@ def run(*arguments, module="copolicy.collect.cli", **environment):
 )
 def test_play_ends_in_one_line_and_leaves_nothing(tmp_path, environment, why):
     out = tmp_path / "recordings"
-    done = run("play", "--out", out, "--pilots", "scripted", "scripted", "--episodes", "1", **environment)
+    done = run("play", "--out", out, "--players", "scripted", "scripted", "--episodes", "1", **environment)
     assert done.returncode == 1
     assert done.stderr == f"copolicy-collect: expected a display (or --headless), found none: {why}\n"
     assert not out.exists()
@@ -47,11 +47,11 @@ def test_play_ends_in_one_line_and_leaves_nothing(tmp_path, environment, why):
 def test_a_replay_ends_in_one_line(recording):
     done = run("replay", recording)
     assert done.returncode == 1
-    assert done.stderr == f"copolicy-collect: expected a display (or --video, --gif, --png), found none: {NONE}\n"
+    assert done.stderr == f"copolicy-collect: expected a display (or --out FILE), found none: {NONE}\n"
 
 
 def test_what_needs_no_window_runs(recording, tmp_path):
-    assert run("replay", recording, "--png", tmp_path / "a.png").returncode == 0
+    assert run("replay", recording, "--out", tmp_path / "a.png").returncode == 0
     done = run("devices", "--json")
     assert (done.returncode, json.loads(done.stdout)) == (0, {"devices": []}), done.stderr
 

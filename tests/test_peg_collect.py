@@ -108,7 +108,7 @@ def test_a_state_that_the_actions_do_not_lead_to_is_found(simulated, shift, repr
 @pytest.mark.parametrize(
     ("flags", "line"),
     [
-        (("--limit-px", "1"), "--limit-px: expected none: drift is measured as position, velocity"),
+        (("--max-drift-px", "1"), "--max-drift-px: expected none: drift is measured as position, velocity"),
         (("--angular-limit", "pi/8"), "--angular-limit: expected no such flag"),
     ],
 )
@@ -119,8 +119,8 @@ def test_limits_of_the_table_are_refused(simulated, capsys, flags, line):
 
 def test_films_and_sheets_are_made_from_the_outline(simulated, tmp_path, capsys):
     out = {kind: tmp_path / f"film.{kind}" for kind in ("gif", "mp4", "png")}
-    call = ["replay", str(simulated[0]), "--json", "--gif", str(out["gif"]), "--video", str(out["mp4"])]
-    assert main([*call, "--png", str(out["png"]), "--width", "320"]) == 0
+    call = ["replay", str(simulated[0]), "--json", "--width", "320", "--out", *map(str, out.values())]
+    assert main(call) == 0
     told = json.loads(capsys.readouterr().out)
     track = read_track(simulated[0])
     assert track.seconds == track.steps / 20
@@ -167,12 +167,12 @@ def test_a_task_without_an_outline_is_verified_and_not_drawn(peg, simulated, tmp
     monkeypatch.setattr(type(peg), "outline", None)
     assert main(["replay", str(simulated[0]), "--verify"]) == 0
     capsys.readouterr()
-    for flag, name in (("--png", "a.png"), ("--gif", "a.gif")):
-        assert main(["replay", str(simulated[0]), flag, str(tmp_path / name)]) == 2
+    for name in ("a.png", "a.gif"):
+        assert main(["replay", str(simulated[0]), "--out", str(tmp_path / name)]) == 2
         assert "left out: the task 'peg' has no outline" in capsys.readouterr().err
     call = ["maps", "show", "right", "--task", "peg", "--out", str(tmp_path / "new" / "maps.png")]
     assert main(call) == 2
-    assert main(["play", "--task", "peg", "--pilots", "scripted", "scripted", "--out", str(tmp_path / "out")]) == 2
+    assert main(["play", "--task", "peg", "--players", "scripted", "scripted", "--out", str(tmp_path / "out")]) == 2
     assert "left out: the task 'peg' has no outline" in capsys.readouterr().err.splitlines()[-1]
     assert not [path for path in tmp_path.iterdir() if path.name != "simulated"]
 
@@ -242,7 +242,7 @@ def test_two_simulated_players_play_a_session(peg, tmp_path):
 
 
 def test_the_command_plays_another_task(peg, tmp_path, capsys):
-    call = ["play", "--task", "peg", "--pilots", "scripted", "scripted:lazy", "--headless", "--countdown", "0"]
+    call = ["play", "--task", "peg", "--players", "scripted", "scripted:lazy", "--headless", "--countdown", "0"]
     call += ["--episodes", "1", "--out", str(tmp_path), "--json"]
     assert main(call) == 0
     assert json.loads(capsys.readouterr().out)["kept"] == 1
@@ -281,8 +281,8 @@ def test_recordings_of_another_task_do_not_count(peg, tmp_path):
 
 
 def test_the_screen_speaks_of_the_task(peg, tmp_path):
-    pilots = (PlayerSpec("keyboard"), PlayerSpec("scripted", "even"))
-    with prepared(_session(tmp_path, players=pilots, headless=False), clock=SimulatedClock()) as application:
+    players = (PlayerSpec("keyboard"), PlayerSpec("scripted", "even"))
+    with prepared(_session(tmp_path, players=players, headless=False), clock=SimulatedClock()) as application:
         game = application.game
         assert pygame.display.get_caption()[0] == "copolicy: pushing a peg"
         game.roster.assign(next(iter(HALVES.values())))
@@ -324,7 +324,7 @@ def test_one_number_is_the_stick_from_side_to_side(low, high, pushes):
     [Vector(("x", "y", "z"), ("N",) * 3, (-1.0,) * 3, (1.0,) * 3), Vector(("grip",), ("N",), (0.5,), (1.0,))],
 )
 def test_an_action_that_no_stick_gives_is_refused(action):
-    with pytest.raises(InvalidValueError, match="--pilots joystick: expected a task whose players act by one or two"):
+    with pytest.raises(InvalidValueError, match="--players joystick: expected a task whose players act by one or two"):
         PersonAgent("joystick", action=action)
 
 

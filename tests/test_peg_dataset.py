@@ -36,7 +36,7 @@ def recordings(peg, tmp_path) -> Path:
 def root(recordings, tmp_path, capsys) -> Path:
     """Their data set at 10 Hz."""
     assert (
-        convert(["mcap", str(recordings), "--root", str(tmp_path / "set"), "--repo-id", "lab/peg", "--fps", "10"]) == 0
+        convert(["mcap", str(recordings), "--out", str(tmp_path / "set"), "--repo-id", "lab/peg", "--fps", "10"]) == 0
     )
     capsys.readouterr()
     return tmp_path / "set"
@@ -171,8 +171,8 @@ def test_edits_releases_and_differences(peg, recordings, root, tmp_path, capsys)
     document = json_of(capsys, "check", tmp_path / "parts/test", "--against", tmp_path / "parts/train")
     assert document["counts"]["error"] == 0
     assert json_of(capsys, "check", root, "--against", tmp_path / "parts/test", status=1)["counts"]["error"] > 0
-    json_of(capsys, "amend", root, "--set", "consent_id=C-7", "--episodes", "0")
-    json_of(capsys, "exclude", root, "--episodes", "4", "--reason", "late")
+    json_of(capsys, "amend", root, "--set", "consent_id=C-7", "--episode-ids", "0")
+    json_of(capsys, "exclude", root, "--episode-ids", "4", "--reason", "late")
     json_of(capsys, "release", root, "--bump", "major", "--notes", "The first.")
     json_of(capsys, "withdraw", "C-7", root)
     assert len(read_table(root).labels) == 5
@@ -189,7 +189,7 @@ def test_published_and_pulled(root, peg, tmp_path):
         (root / "README.md").write_text("---\nlicense: cc-by-4.0\n---\n# Pegs that two push\n", encoding="utf-8")
         done = user.run("publish", root, "--repo-id", "lab/peg", "--raw", tmp_path / "recordings", "--json")
         assert done.status == 0, done.err
-        done = user.run("pull", "lab/peg", "--root", tmp_path / "pulled", "--raw", "--json")
+        done = user.run("pull", "lab/peg", "--out", tmp_path / "pulled", "--with-raw", "--json")
         assert done.status == 0, done.err
         assert user.run("check", "lab/peg", "--revision", "data-1.0.0").status == 0
     assert read_table(tmp_path / "pulled").task == peg

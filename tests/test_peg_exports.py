@@ -103,16 +103,16 @@ def test_settings_that_all_episodes_share_go_to_the_environment(peg):
 
 def test_sets_grow_and_join(recordings, peg_set, tmp_path, capsys):
     more = record_pegs(tmp_path / "more", 2, 7, "left")
-    added = run(capsys, "mcap", more, "--root", peg_set, "--repo-id", "lab/peg", "--append", "--license", "cc0-1.0")
+    added = run(capsys, "mcap", more, "--out", peg_set, "--repo-id", "lab/peg", "--append", "--license", "cc0-1.0")
     assert (added["episodes_added"], added["episodes"]) == (2, 6)
     first, second = convert_pegs(recordings, tmp_path / "a"), convert_pegs(more, tmp_path / "b")
-    merged = run(capsys, "merge", first, second, "--root", tmp_path / "whole", "--repo-id", "lab/whole")
+    merged = run(capsys, "merge", first, second, "--out", tmp_path / "whole", "--repo-id", "lab/whole")
     assert (merged["episodes"], merged["content_hash"]) == (6, read_content(peg_set).hash)
 
 
 def test_shards_give_the_set_of_one_conversion(recordings, peg_set, tmp_path, capsys):
     whole = tmp_path / "whole"
-    call = ("mcap", recordings, "--root", whole, "--repo-id", "lab/peg", "--license", "cc0-1.0", "--shard-episodes", 3)
+    call = ("mcap", recordings, "--out", whole, "--repo-id", "lab/peg", "--license", "cc0-1.0", "--shard-episodes", 3)
     summary = run(capsys, *call)
     assert (summary["shards"], summary["episodes"]) == (2, 4)
     assert read_content(whole).hash == read_content(peg_set).hash
@@ -120,7 +120,7 @@ def test_shards_give_the_set_of_one_conversion(recordings, peg_set, tmp_path, ca
 
 def test_rates_are_held_against_the_rate_of_the_recordings(recordings, tmp_path, capsys):
     for flags in ((), ("--shard-episodes", "2")):
-        call = ["mcap", str(recordings), "--root", str(tmp_path / "odd"), "--repo-id", "lab/peg", "--fps", "15", *flags]
+        call = ["mcap", str(recordings), "--out", str(tmp_path / "odd"), "--repo-id", "lab/peg", "--fps", "15", *flags]
         assert main(call) == 2
         assert "fps: expected a divisor of 20 [1, 2, 4, 5, 10, 20], found 15" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recordings"]

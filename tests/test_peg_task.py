@@ -118,7 +118,7 @@ def test_recordings_become_a_data_set(peg, tmp_path, capsys):
     folder, root = tmp_path / "recordings", tmp_path / "set"
     folder.mkdir()
     written = [record(peg, folder / f"{index}.mcap", index) for index in range(3)]
-    call = ["mcap", str(folder), "--root", str(root), "--repo-id", "lab/peg"]
+    call = ["mcap", str(folder), "--out", str(root), "--repo-id", "lab/peg"]
     assert main([*call, "--fps", "10", "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["episodes"], summary["successes"], summary["physics"]) == (3, 3, {"default": 3})
@@ -152,6 +152,6 @@ def test_a_data_set_is_of_one_task(peg, tmp_path, capsys):
 
     record(peg, tmp_path / "a.mcap")
     carry(tmp_path / "b.mcap")
-    assert main(["mcap", str(tmp_path), "--root", str(tmp_path / "set"), "--repo-id", "lab/both", "--fps", "10"]) == 1
+    assert main(["mcap", str(tmp_path), "--out", str(tmp_path / "set"), "--repo-id", "lab/both", "--fps", "10"]) == 1
     assert "expected an episode of the task 'peg', found one of 'table'" in capsys.readouterr().err
     assert not (tmp_path / "set").exists()

@@ -19,7 +19,7 @@ from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
 
 def _command(out: Path, *flags: str) -> list[str]:
     command = [sys.executable, "-m", "copolicy.collect.cli", "play", "--pair", "P01", "--out", str(out), "--json"]
-    return [*command, "--pilots", "scripted", "scripted", "--headless", "--countdown", "0", *flags]
+    return [*command, "--players", "scripted", "scripted", "--headless", "--countdown", "0", *flags]
 
 
 def _start(out: Path, *flags: str, seconds: float = 2.0, limit: int | None = None) -> subprocess.Popen:

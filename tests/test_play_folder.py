@@ -118,7 +118,7 @@ def test_two_tools_do_not_mix(tmp_path):
     lock = CollectionLock(tmp_path)
     command = [sys.executable, "-m", "copolicy.collect.cli", "play", "--pair", "P01", "--out", str(tmp_path)]
     done = subprocess.run(
-        [*command, "--pilots", "scripted", "scripted", "--headless"], capture_output=True, text=True, timeout=60
+        [*command, "--players", "scripted", "scripted", "--headless"], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
@@ -206,10 +206,10 @@ def test_settings_that_cannot_be(changes, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("robot", "unknown pilot 'robot'; available: joystick, keyboard, policy, replay, scripted"),
+        ("robot", "unknown player 'robot'; available: joystick, keyboard, policy, replay, scripted"),
         ("scripted:S99", "unknown simulated pair 'S99'; available: S01, S02, S03, S04, S05"),
-        ("policy", "pilots: expected policy:CKPT, found 'policy'"),
-        ("joystick:1", "pilots: expected joystick, found 'joystick:1'"),
+        ("policy", "player: expected policy:CKPT, found 'policy'"),
+        ("joystick:1", "player: expected joystick, found 'joystick:1'"),
     ],
 )
 def test_pilots_that_cannot_be(text, message):

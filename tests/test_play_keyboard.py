@@ -43,7 +43,7 @@ class Keyboard:
         } | {"DISPLAY": display, "SDL_AUDIODRIVER": "dummy", "COPOLICY_PROGRESS": "0"}
         command = [sys.executable, "-m", "copolicy.collect.cli", "play", "--pair", "K01", "--out", str(out)]
         command += [
-            "--pilots",
+            "--players",
             "keyboard",
             "keyboard",
             "--countdown",

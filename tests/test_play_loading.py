@@ -27,7 +27,7 @@ def opened(self, *size):
     sys.exit(7)
 
 window.Window.__init__ = opened
-main(["play", "--pilots", *sys.argv[1:], "--mute"])
+main(["play", "--players", *sys.argv[1:], "--mute"])
 """
 
 
@@ -38,9 +38,11 @@ def window():
     pygame.display.quit()
 
 
-@pytest.mark.parametrize("pilots", [("joystick", "keyboard"), ("keyboard", "policy:pretrained"), ("scripted:S02",) * 2])
-def test_the_window_opens_before_anything_heavy_is_imported(pilots, tmp_path):
-    command = [sys.executable, "-c", FIRST_WINDOW, *pilots]
+@pytest.mark.parametrize(
+    "players", [("joystick", "keyboard"), ("keyboard", "policy:pretrained"), ("scripted:S02",) * 2]
+)
+def test_the_window_opens_before_anything_heavy_is_imported(players, tmp_path):
+    command = [sys.executable, "-c", FIRST_WINDOW, *players]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (7, "[]\n"), done.stderr
 
@@ -91,8 +93,8 @@ def test_a_session_is_loaded_under_its_window_and_named_once_it_is_there(tmp_pat
         "_draw",
         lambda self, *rest: (seen.append((rest[1], pygame.display.get_caption()[0])), drawn(self, *rest)),
     )
-    pilots = (PlayerSpec("scripted", "S01"), PlayerSpec("keyboard"))
-    with prepared(settings(tmp_path, players=pilots), ("the robots", list)):
+    players = (PlayerSpec("scripted", "S01"), PlayerSpec("keyboard"))
+    with prepared(settings(tmp_path, players=players), ("the robots", list)):
         assert pygame.display.get_caption()[0].startswith("copolicy")
     steps = list(dict.fromkeys(what for what, _ in seen))
     assert steps == [

@@ -219,7 +219,7 @@ def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_p
         recorder.finish(True, "goal")
     out = tmp_path / "out"
     flags = ["--pair", "H1", "--out", str(out), "--headless", "--episodes", "1", "--countdown", "0.5", "--json"]
-    assert main(["play", *flags, "--pilots", f"policy:{checkpoint}", f"replay:{path}"]) == 0
+    assert main(["play", *flags, "--players", f"policy:{checkpoint}", f"replay:{path}"]) == 0
     assert '"complete": true' in capsys.readouterr().out
     (recorded,) = out.rglob("*.mcap")
     episode = read_episode(recorded)

@@ -31,7 +31,7 @@ def test_training_says_it_and_the_checkpoint_keeps_it(copied_table, tmp_path, ca
 
 def test_an_evaluation_on_such_maps_says_it(tmp_path, caplog):
     checkpoint, maps = save_untrained_policy(tmp_path / "policy"), write_lab(tmp_path)
-    call = ["coplan", "--policy", str(checkpoint), "--step-limit", "3", "--actions-per-plan", "1"]
+    call = ["coplan", "--policy", str(checkpoint), "--step-limit", "3", "--n-action-steps", "1"]
     for name, said in ((f"{maps}#train", f"1 of 3 {SIZES}"), (f"{maps}#test", None)):
         caplog.clear()
         assert evaluate([*call, "--maps", name, "--out", str(tmp_path / "eval.json"), "--overwrite"]) == 0

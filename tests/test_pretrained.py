@@ -107,7 +107,7 @@ def test_without_the_extra_it_is_one_clear_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(MissingExtraError):
         load_policy("pretrained")
-    flags = ["--out", str(tmp_path), "--headless", "--pilots", "scripted", "policy:pretrained"]
+    flags = ["--out", str(tmp_path), "--headless", "--players", "scripted", "policy:pretrained"]
     assert collect(["play", *flags]) == 2
     assert capsys.readouterr().err == (
         "copolicy-collect: torch is not installed: this command needs the extra, "
@@ -140,15 +140,15 @@ def test_with_a_simulated_partner_it_finishes_an_easy_map(shipped):
     np.testing.assert_array_equal(track.episode.actions, again.episode.actions)
 
 
-@pytest.mark.parametrize("pilots", [("scripted", "policy:pretrained"), ("policy:pretrained", "scripted")])
-def test_it_plays_on_the_robots_seat_in_real_time(tmp_path, pilots):
+@pytest.mark.parametrize("players", [("scripted", "policy:pretrained"), ("policy:pretrained", "scripted")])
+def test_it_plays_on_the_robots_seat_in_real_time(tmp_path, players):
     """In whichever order the two are named: it learned the robot's half of the plans."""
-    specs = tuple(map(PlayerSpec.parse, pilots))
+    specs = tuple(map(PlayerSpec.parse, players))
     with prepared(settings(tmp_path, players=specs, episodes=1, headless=True)) as application:
         game = application.game
         assert game.seats()[0].spec.kind == "policy"
         game.scenarios = (SHORT_MAP,)
-        game.schedule = BalancedSchedule(game.scenarios, 1, 0, "P01", swap=False, seating=int(pilots[0] == "scripted"))
+        game.schedule = BalancedSchedule(game.scenarios, 1, 0, "P01", swap=False, seating=int(players[0] == "scripted"))
         application.run()
     (recorded,) = tmp_path.rglob("*.mcap")
     episode = read_episode(recorded)
@@ -169,7 +169,7 @@ def test_the_studies_know_it_by_name(tmp_path, capsys):
 
 def test_a_film_of_it(tmp_path, capsys):
     film = tmp_path / "demo.gif"
-    flags = ["--gif", str(film), "--width", "240", "--fps", "4", "--speed", "8", "--map", "0", "1", "--json"]
+    flags = ["--out", str(film), "--width", "240", "--fps", "4", "--speed", "8", "--map", "0", "1", "--json"]
     assert collect(["demo", *flags]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert [line.split(":")[0] for line in summary["episodes"]] == ["unseen 0", "unseen 1"]
@@ -186,11 +186,11 @@ def test_a_film_of_it(tmp_path, capsys):
     [
         (["--map", "84"], "--map: expected 0 to 83, found 84"),
         (["--fps", "0"], "--fps: expected 1 to 50, found 0"),
-        (["--gif", "demo.mp4"], "--gif: expected a name that ends with .gif, found 'demo.mp4'"),
+        (["--out", "demo.mp4"], "--out: expected a name that ends with .gif, found 'demo.mp4'"),
         (["--policy", "nowhere"], "nowhere: expected a checkpoint folder with config.json and model.safetensors"),
     ],
 )
 def test_wrong_calls_of_the_film(tmp_path, capsys, flags, message):
-    assert collect(["demo", "--gif", str(tmp_path / "demo.gif"), *flags]) == 2
+    assert collect(["demo", "--out", str(tmp_path / "demo.gif"), *flags]) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -367,7 +367,7 @@ def fake_ffmpeg(folder, fails=False):
 def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
     out = tmp_path / "a.mp4"
     run = run_without(
-        ["av"], "replay", recording, "--video", out, "--speed", "8", "--width", "300", "--json",
+        ["av"], "replay", recording, "--out", out, "--speed", "8", "--width", "300", "--json",
         PATH=fake_ffmpeg(tmp_path / "bin"),
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
@@ -376,7 +376,7 @@ def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
     assert int(size) == told["pictures"] * 300 * 220 * 3
     assert command[command.index("-s") + 1] == "300x220"
     failing = fake_ffmpeg(tmp_path / "bad", fails=True)
-    run = run_without(["av"], "replay", recording, "--video", tmp_path / "b.mp4", "--speed", "8", PATH=failing)
+    run = run_without(["av"], "replay", recording, "--out", tmp_path / "b.mp4", "--speed", "8", PATH=failing)
     assert run.returncode == 1
     assert run.stderr == (
         "copolicy-collect: b.mp4: expected ffmpeg to encode the video, found Unknown encoder 'libx264'\n"
@@ -385,26 +385,26 @@ def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("blocked", "flag", "name", "text"),
+    ("blocked", "name", "text"),
     [
-        (["av"], "--video", "a.mp4", "--video: expected PyAV (pip install av) or the program ffmpeg, found neither"),
-        (["PIL"], "--gif", "a.gif", str(MissingExtraError("Pillow"))),
-        (["rerun"], "--rerun", "a.rrd", "--rerun: expected the package rerun-sdk, found none: pip install rerun-sdk"),
+        (["av"], "a.mp4", "video: expected PyAV (pip install av) or the program ffmpeg, found neither"),
+        (["PIL"], "a.gif", str(MissingExtraError("Pillow"))),
+        (["rerun"], "a.rrd", "Rerun: expected the package rerun-sdk, found none: pip install rerun-sdk"),
     ],
 )
-def test_a_missing_package_is_one_line(recording, tmp_path, blocked, flag, name, text):
-    run = run_without(blocked, "replay", recording, flag, tmp_path / name, PATH="")
+def test_a_missing_package_is_one_line(recording, tmp_path, blocked, name, text):
+    run = run_without(blocked, "replay", recording, "--out", tmp_path / name, PATH="")
     assert (run.returncode, run.stderr) == (2, f"copolicy-collect: {text}\n")
     assert not list(tmp_path.iterdir())
 
 
 def test_pictures_need_no_display(recording, tmp_path):
-    run = run_without([], "replay", recording, "--png", tmp_path / "a.png", "--json", SDL_VIDEODRIVER="none")
+    run = run_without([], "replay", recording, "--out", tmp_path / "a.png", "--json", SDL_VIDEODRIVER="none")
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["png"]["out"] == str(tmp_path / "a.png")
     run = run_without([], "replay", recording, SDL_VIDEODRIVER="none")
     assert run.returncode == 1
-    assert "expected a display (or --video, --gif, --png), found none" in run.stderr
+    assert "expected a display (or --out FILE), found none" in run.stderr
 
 
 # The check
@@ -466,7 +466,7 @@ def test_limits_that_cannot_be(track, options, text):
 def test_the_command_checks_and_its_exit_status_tells(recording, tmp_path, capsys):
     assert main(["replay", str(recording), "--verify", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verify"]["reproduced"] is True
-    assert main(["replay", str(recording), "--verify", "--limit-px", "1e-300", "--limit-rad", "1e-300"]) == 1
+    assert main(["replay", str(recording), "--verify", "--max-drift-px", "1e-300", "--max-drift-rad", "1e-300"]) == 1
     assert "first_step_beyond" in capsys.readouterr().out
     assert main(["replay", str(tmp_path / "none.mcap"), "--verify"]) == 2
     assert "expected a readable MCAP file, found No such file or directory" in capsys.readouterr().err

@@ -53,7 +53,7 @@ rerun, blueprint = Named("rerun"), Named("rerun.blueprint")
 rerun.RecordingStream = Stream
 sys.modules["rerun"], sys.modules["rerun.blueprint"] = rerun, blueprint
 from copolicy.collect.cli import main
-status = main(["replay", sys.argv[1], "--rerun", sys.argv[2], "--json"])
+status = main(["replay", sys.argv[1], "--out", sys.argv[2], "--json"])
 if status:
     raise SystemExit(status)
 from collections import Counter

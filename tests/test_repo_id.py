@@ -68,15 +68,15 @@ def test_the_rule_that_is_broken_is_named(text, reason):
 @pytest.mark.parametrize(
     ("command", "arguments"),
     [
-        (convert, ["mcap", "{here}", "--root", "{out}", "--repo-id"]),
-        (convert, ["mcap", "{here}", "--root", "{out}", "--append", "--repo-id"]),
-        (convert, ["mcap", "{here}", "--root", "{out}", "--shard-episodes", "2", "--repo-id"]),
-        (convert, ["upstream", "{here}", "--root", "{out}", "--repo-id"]),
-        (convert, ["merge", "{here}", "{here}", "--root", "{out}", "--repo-id"]),
+        (convert, ["mcap", "{here}", "--out", "{out}", "--repo-id"]),
+        (convert, ["mcap", "{here}", "--out", "{out}", "--append", "--repo-id"]),
+        (convert, ["mcap", "{here}", "--out", "{out}", "--shard-episodes", "2", "--repo-id"]),
+        (convert, ["upstream", "{here}", "--out", "{out}", "--repo-id"]),
+        (convert, ["merge", "{here}", "{here}", "--out", "{out}", "--repo-id"]),
         (cards, ["dataset", "{here}", "--repo-id"]),
         (cards, ["model", "{here}", "--repo-id"]),
         (dataset, ["publish", "{here}", "--repo-id"]),
-        (dataset, ["pull", "--root", "{out}"]),
+        (dataset, ["pull", "--out", "{out}"]),
         (dataset, ["check", "--revision", "main"]),
     ],
 )

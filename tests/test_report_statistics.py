@@ -111,7 +111,7 @@ def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_
     page = visit.open(root / "report.html")
     expect(page.locator("#finding-list")).to_contain_text(f"Checked on {date} by version {RULES_VERSION} of the rules.")
     expect(page.locator("#finding-list")).not_to_contain_text("stale")
-    assert dataset_command(["exclude", str(root), "--episodes", "0", "--reason", "a test"]) == 0
+    assert dataset_command(["exclude", str(root), "--episode-ids", "0", "--reason", "a test"]) == 0
     capsys.readouterr()
     assert main(["report", str(root), "--json", "--overwrite"]) == 0
     reason = "The content of the data set changed since it was checked."

@@ -138,7 +138,7 @@ def test_frames_in_several_files_and_any_order_are_put_together(constructed, fol
 def test_files_of_the_original_program(tmp_path, upstream):
     root = tmp_path / "table"
     raw = str(upstream / "examples_scripted" / "raw")
-    assert convert(["upstream", raw, "--root", str(root), "--repo-id", "local/t"]) == 0
+    assert convert(["upstream", raw, "--out", str(root), "--repo-id", "local/t"]) == 0
     data, _ = read_trajectories(root)
     known = [(row.route_class, route_class(data.path(n), row.map_config)) for n, row in enumerate(data.rows)]
     assert all(column == word for (column, word), row in zip(known, data.rows, strict=True) if row.success)

@@ -15,7 +15,7 @@ CALLS = {
     "simulate": ["collect", "simulate", "--episodes", "200", "--workers", "2", "--out", "{new}"],
     "mcap": [
         *("convert", "mcap", "{recordings}", "--workers", "2", "--no-drift"),
-        *("--repo-id", "lab/table", "--root", "{new}"),
+        *("--repo-id", "lab/table", "--out", "{new}"),
     ],
 }
 

@@ -21,7 +21,7 @@ def simulated_data_set(root: Path) -> Path:
     """Six simulated episodes as a data set with a card; their recordings lie beside it in `recordings/`."""
     recordings = root.parent / "recordings"
     simulate(recordings, COUNT, seed=1, workers=1)
-    assert convert(["mcap", str(recordings), "--root", str(root), "--repo-id", "lab/table", "--license", "mit"]) == 0
+    assert convert(["mcap", str(recordings), "--out", str(root), "--repo-id", "lab/table", "--license", "mit"]) == 0
     (root / "README.md").write_text("---\nlicense: mit\n---\n\n# Table\n", encoding="utf-8")
     return root
 

@@ -43,11 +43,11 @@ def commands(root: Path, scratch: Path, sound: Path, before: bool) -> Iterator[t
     yield "zarr", convert, ["export", str(root), "--out", str(scratch / "b.zarr"), "--format", "zarr"]
     yield "robomimic", convert, ["export", str(root), "--out", str(scratch / "r.hdf5"), "--format", "robomimic"]
     yield "minari", convert, ["export", str(root), "--out", str(scratch / "m-v0"), "--format", "minari"]
-    yield "merge", convert, ["merge", str(root), str(sound), "--root", str(scratch / "merged"), "--repo-id", "l/m"]
+    yield "merge", convert, ["merge", str(root), str(sound), "--out", str(scratch / "merged"), "--repo-id", "l/m"]
     yield "train", train, [str(root)]
     if not before:
         part = str(scratch / "part")
-        yield "select", dataset, ["select", str(root), "--out", part, "--episodes", "1"]
+        yield "select", dataset, ["select", str(root), "--out", part, "--episode-ids", "1"]
         yield "split", dataset, ["split", str(root), "--out", part, "--parts", "a=0.5", "b=rest", "--by", "episodes"]
         yield "amend", dataset, ["amend", str(root), "--set", "session_id=S9"]
         yield "restore", dataset, ["amend", str(root), "--restore-from", str(sound)]

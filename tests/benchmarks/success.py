@@ -154,7 +154,7 @@ def _data_set(out: Path, recipe: str) -> Path:
         log = out / "data" / f"{recipe}.log"
         _command("copolicy-collect", "simulate", "--recipe", recipe, "--out", str(recordings), log=log)
         _command(
-            "copolicy-convert", "mcap", str(recordings), "--root", str(dataset), "--repo-id", f"local/{recipe}",
+            "copolicy-convert", "mcap", str(recordings), "--out", str(dataset), "--repo-id", f"local/{recipe}",
             "--license", "cc0-1.0", log=log,
         )  # fmt: skip
     return dataset

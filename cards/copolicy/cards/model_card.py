@@ -155,7 +155,7 @@ def _usage(checkpoint: Checkpoint, name: str, evaluations: Sequence[dict[str, An
     elif _on_hub(name):
         commands.append(f"hf download {name} --local-dir checkpoint")
     commands += [
-        f"copolicy-collect play --pilots keyboard policy:{place}",
+        f"copolicy-collect play --players keyboard policy:{place}",
         f"copolicy-eval coplan --policy {place} --maps {maps} --out eval.json",
     ]
     text = "## How to use it\n\n```bash\n" + "\n".join(commands) + "\n```"

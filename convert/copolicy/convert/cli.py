@@ -34,7 +34,7 @@ def _parser() -> argparse.ArgumentParser:
     parser, commands = command_parser("copolicy-convert", "Make LeRobot v3 data sets, and export them.")
     mcap = add_command(
         commands, "mcap", _mcap, "convert recordings, one MCAP file an episode, to a LeRobot v3 data set",
-        "copolicy-convert mcap recordings --root datasets/table --repo-id me/table",
+        "copolicy-convert mcap recordings --out datasets/table --repo-id me/table",
         lambda arguments: (
             *DATASETS, *(("av",) if arguments.video else ()), *(("datatrove",) if asks_for_shards(arguments) else ())
         ),
@@ -43,7 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_output_flags(mcap)
     mcap.add_argument(
         "--append", action="store_true",
-        help="add what is new to the data set at OUT, at its rate and hold, without rewriting its files",
+        help="add what is new to the data set at OUT, at its rate and downsampling, without rewriting its files",
     )  # fmt: skip
     mcap.add_argument("--keep-discarded", action="store_true", help="keep episodes that the operator discarded")
     mcap.add_argument("--no-drift", action="store_true", help="leave out the re-simulation (replay_drift_px)")
@@ -57,7 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     upstream = add_command(
         commands, "upstream", _upstream,
         "convert files of the original program (raw pickles, processed npz, or its 10 Hz zarr store)",
-        "copolicy-convert upstream data/table/table_10Hz.zarr --root datasets/demonstrations --repo-id me/table",
+        "copolicy-convert upstream data/table/table_10Hz.zarr --out datasets/demonstrations --repo-id me/table",
         DATASETS,
     )  # fmt: skip
     upstream.add_argument("path", type=Path, metavar="PATH", help="folder of the files, or the store")
@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_output_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the data set's folder; must be new")
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="the data set's folder; must be new")
     parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
     parser.add_argument(
         "--fps",
@@ -84,7 +84,7 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
         help=f"frames a second, a divisor of the recorded rate, 30 of the table (default: {_DEFAULT_FPS})",
     )
     parser.add_argument(
-        "--hold", choices=get_args(Hold), default=None,
+        "--downsampling", choices=get_args(Hold), default=None,
         help="a frame's action: the mean of its steps or the first (default: mean; first for a zarr store)",
     )  # fmt: skip
     parser.add_argument(
@@ -100,12 +100,12 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
 
 def _mcap(arguments: argparse.Namespace) -> dict:
     repo_id, licence = checked_repo_id(arguments.repo_id), checked_licence(arguments.license)
-    fps, hold = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.hold or "mean"
+    fps, hold = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.downsampling or "mean"
     convert = convert_recordings
     if arguments.append:
         from .lerobot.append import append_recordings, stored_clock
 
-        fps, hold = stored_clock(arguments.root, arguments.fps, arguments.hold)
+        fps, hold = stored_clock(arguments.out, arguments.fps, arguments.downsampling)
         convert = append_recordings
     conversion = Conversion(
         fps,
@@ -117,9 +117,9 @@ def _mcap(arguments: argparse.Namespace) -> dict:
     )
     scale = scale_of(arguments)
     if scale is not None:
-        return convert_in_shards(arguments.folders, arguments.root, repo_id, conversion, arguments.skip_damaged, scale)
+        return convert_in_shards(arguments.folders, arguments.out, repo_id, conversion, arguments.skip_damaged, scale)
     return convert(
-        arguments.folders, arguments.root, repo_id, conversion, arguments.skip_damaged, arguments.workers or 1
+        arguments.folders, arguments.out, repo_id, conversion, arguments.skip_damaged, arguments.workers or 1
     )
 
 
@@ -135,16 +135,16 @@ def _video(arguments: argparse.Namespace) -> tuple[int, int] | None:
         return asked or SCENE_SIZE
     from .lerobot.append import stored_video
 
-    return stored_video(arguments.root, arguments.video, asked)
+    return stored_video(arguments.out, arguments.video, asked)
 
 
 def _upstream(arguments: argparse.Namespace) -> dict:
     return convert_upstream(
         arguments.path,
-        arguments.root,
+        arguments.out,
         checked_repo_id(arguments.repo_id),
         _DEFAULT_FPS if arguments.fps is None else arguments.fps,
-        arguments.hold,
+        arguments.downsampling,
         UpstreamOptions(arguments.angular_limit, arguments.obstacle_size),
         checked_licence(arguments.license),
         arguments.skip_damaged,

@@ -33,7 +33,7 @@ def add_study_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> 
 def add_protocol_flags(command: argparse.ArgumentParser, actions_per_plan: int) -> None:
     """How a robot plans, the world's settings, seed and `--overwrite`."""
     meaning = f"executed before replanning (default: {actions_per_plan})"
-    add_whole_number(command, "--actions-per-plan", meaning, actions_per_plan)
+    add_whole_number(command, "--n-action-steps", meaning, actions_per_plan)
     add_whole_number(
         command, "--step-limit", "steps until a time-out (default: the task's; of the table 2000, of 1/30 s)"
     )
@@ -160,7 +160,7 @@ def study_settings(arguments: argparse.Namespace, protocol: Protocol, scenarios:
     stated, unusual = stated_settings(protocol.task, protocol.physics)
     return {
         **task_entry(protocol.task),
-        "actions_per_plan": arguments.actions_per_plan,
+        "actions_per_plan": arguments.n_action_steps,
         "fps": protocol.fps,
         "hold": stride(protocol.fps, protocol.task.spec.record_hz),
         **stated,
@@ -195,9 +195,7 @@ def policy_of(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint":
     from copolicy.train.checkpoint import Checkpoint  # torch
 
     policy = Checkpoint(path, arguments.device, policy_settings(arguments))
-    if arguments.actions_per_plan > policy.chunk_size:
-        raise InvalidValueError(
-            "--actions-per-plan", f"at most the plan's {policy.chunk_size}", arguments.actions_per_plan
-        )
-    policy.n_action_steps = policy.wanted = arguments.actions_per_plan
+    if arguments.n_action_steps > policy.chunk_size:
+        raise InvalidValueError("--n-action-steps", f"at most the plan's {policy.chunk_size}", arguments.n_action_steps)
+    policy.n_action_steps = policy.wanted = arguments.n_action_steps
     return policy

@@ -68,7 +68,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
         record = [
             Step(
                 "Convert episodes of the original program into a LeRobot v3 data set",
-                ("copolicy-convert", "upstream", str(arguments.upstream), "--root", str(dataset), "--repo-id", REPO_ID),
+                ("copolicy-convert", "upstream", str(arguments.upstream), "--out", str(dataset), "--repo-id", REPO_ID),
                 (dataset,),
             )
         ]
@@ -88,7 +88,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
             Step(
                 "Convert the recordings into a LeRobot v3 data set at 10 Hz",
                 (
-                    *("copolicy-convert", "mcap", recordings, "--root", str(dataset), "--repo-id", REPO_ID),
+                    *("copolicy-convert", "mcap", recordings, "--out", str(dataset), "--repo-id", REPO_ID),
                     *("--license", "cc0-1.0"),
                 ),
                 (dataset,),

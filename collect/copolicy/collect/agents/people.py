@@ -39,7 +39,7 @@ class PersonAgent(Agent):
         """
         if not (len(action) in (1, 2) and all(low <= 0 <= high for low, high in zip(*action.bounds, strict=True))):
             expected = "a task whose players act by one or two numbers that can be 0: a stick has no more"
-            raise InvalidValueError(f"--pilots {name}", expected, action.names)
+            raise InvalidValueError(f"--players {name}", expected, action.names)
         self.name = name
         self._bounds = action.bounds
         self._device: Gamepad | KeyboardHalf | None = None

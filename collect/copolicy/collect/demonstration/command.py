@@ -22,10 +22,10 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
         "demo",
         _demo,
         help="film a policy that carries the table with a simulated partner, as a GIF",
-        example="copolicy-collect demo --gif outputs/demo.gif --map 40 52",
+        example="copolicy-collect demo --out outputs/demo.gif --map 40 52",
         needs=(*POLICIES, "PIL"),
     )
-    command.add_argument("--gif", type=Path, required=True, metavar="OUT.gif", help="the film to write")
+    command.add_argument("--out", type=Path, required=True, metavar="OUT.gif", help="the GIF to write")
     command.add_argument(
         "--policy", default=PRETRAINED, help="checkpoint folder (default: pretrained, the model of the package)"
     )
@@ -48,7 +48,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
-    task, path = get_task(arguments.task), arguments.gif
+    task, path = get_task(arguments.task), arguments.out
     chosen = task.scenario_set(set_name(task, arguments.maps, "unseen"))
     maps = chosen.scenarios
     for name, value, least, most in (
@@ -61,7 +61,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
         if not least <= value <= most:
             raise InvalidValueError(f"--{name}", f"{least} to {most}", value)
     if path.suffix.lower() != ".gif":
-        raise InvalidValueError("--gif", "a name that ends with .gif", str(path))
+        raise InvalidValueError("--out", "a name that ends with .gif", str(path))
     if path.exists() and not arguments.overwrite:
         raise OutputExistsError(path)
     # Loading torch and pygame takes a moment that `--help` should not.

@@ -87,7 +87,7 @@ def _assign_devices(game: Game) -> None:
         game.roster.assign(device)
     missing: list[SeatedPlayer] = game.roster.without_device()
     if any(player.spec.kind == "keyboard" for player in game.players):
-        raise RunError("pilots: expected no keyboard with --headless, found one: keys need a window")
+        raise RunError("--players: expected no keyboard with --headless, found one: keys need a window")
     if missing:
         raise RunError(
             f"{missing[0].player_id}: expected a gamepad, found {len(game.roster.gamepads)} for both players"

@@ -29,9 +29,9 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "play",
         _play,
         help="let two players act together in a session of episodes, and record each episode",
-        example="copolicy-collect play --pilots keyboard policy:pretrained\n"
+        example="copolicy-collect play --players keyboard policy:pretrained\n"
         "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
-        needs=lambda arguments: POLICIES if any(text.startswith("policy") for text in arguments.pilots or ()) else (),
+        needs=lambda arguments: POLICIES if any(text.startswith("policy") for text in arguments.players or ()) else (),
     )
     command.add_argument(
         "--pair", default="guest", help="pseudonym of the pair; its players are PAIR-a and PAIR-b (default: guest)"
@@ -43,7 +43,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         help="folder of all sessions; an unfinished session there is continued (default: outputs/sessions)",
     )
     command.add_argument(
-        "--pilots",
+        "--players",
         nargs=2,
         metavar=("A", "B"),
         help="the players: joystick (any gamepad), keyboard, scripted[:PAIR], replay:FILE, policy:CKPT or "
@@ -99,8 +99,8 @@ def settings_from_flags(arguments: argparse.Namespace) -> PlaySettings:
         CopolicyError: a value is invalid.
     """
     task, specs = get_task(arguments.task), None
-    if arguments.pilots:
-        first, second = (PlayerSpec.parse(text, arguments.task) for text in arguments.pilots)
+    if arguments.players:
+        first, second = (PlayerSpec.parse(text, arguments.task) for text in arguments.players)
         specs = (first, second)
     return PlaySettings(
         **{name: getattr(arguments, name) for name in _COPIED_FLAGS},

@@ -129,7 +129,7 @@ def replayed_scenario(players: Iterable[SeatedPlayer]) -> Any | None:
     """
     scenarios = {player.agent.map_config for player in players if isinstance(player.agent, ReplayAgent)}
     if len(scenarios) > 1:
-        raise InvalidValueError("pilots", "replays of one map", sorted(scenario.digest for scenario in scenarios))
+        raise InvalidValueError("--players", "replays of one map", sorted(scenario.digest for scenario in scenarios))
     return scenarios.pop() if scenarios else None
 
 

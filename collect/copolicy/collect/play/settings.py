@@ -39,13 +39,13 @@ class PlayerSpec:
         """
         kind, _, detail = text.partition(":")
         if kind not in PLAYER_KINDS:
-            raise UnknownNameError("pilot", kind, PLAYER_KINDS)
+            raise UnknownNameError("player", kind, PLAYER_KINDS)
         if kind == "scripted":
             detail = pair_name(get_task(task), detail)
         elif kind in ("replay", "policy") and not detail:
-            raise InvalidValueError("pilots", f"{kind}:{'FILE' if kind == 'replay' else 'CKPT'}", text)
+            raise InvalidValueError("player", f"{kind}:{'FILE' if kind == 'replay' else 'CKPT'}", text)
         elif kind in ("joystick", "keyboard") and detail:
-            raise InvalidValueError("pilots", kind, text)
+            raise InvalidValueError("player", kind, text)
         return cls(kind, detail)
 
     @property

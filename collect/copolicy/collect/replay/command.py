@@ -10,7 +10,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 from ..angular_limit import ANGULAR_LIMITS
 
-_VIEWER = Path()  # `--rerun` without a file
+_FORMATS = {".mp4": "video", ".mkv": "video", ".gif": "gif", ".png": "png", ".rrd": "rerun"}  # by suffix
 
 
 def add_replay_command(commands: argparse._SubParsersAction) -> None:
@@ -21,21 +21,22 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         _replay,
         help="show a recording in a window, write it as video, GIF or contact sheet, or verify it",
         example="copolicy-collect replay recordings/P01-01/episode_000.mcap\n"
-        "  copolicy-collect replay episode_000.mcap --video episode.mp4 --speed 2\n"
+        "  copolicy-collect replay episode_000.mcap --out episode.mp4 --speed 2\n"
         "  copolicy-collect replay episode_000.mcap --verify",
-        needs=lambda arguments: ("PIL",) if arguments.gif else (),
+        needs=lambda arguments: ("PIL",) if any(_format(path) == "gif" for path in arguments.out) else (),
     )
     command.add_argument("file", type=Path, help="a recording, NAME.mcap")
-    command.add_argument("--video", type=Path, metavar="OUT.mp4", help="write an H.264 video; needs no display")
-    command.add_argument("--gif", type=Path, metavar="OUT.gif", help="write a looping GIF; needs no display")
-    command.add_argument("--png", type=Path, metavar="OUT.png", help="write a contact sheet; needs no display")
     command.add_argument(
-        "--rerun",
+        "--out",
         type=Path,
-        nargs="?",
-        const=_VIEWER,
-        metavar="OUT.rrd",
-        help="open the recording in Rerun, or write a Rerun file (pip install rerun-sdk)",
+        nargs="+",
+        default=(),
+        metavar="FILE",
+        help="files to write, by suffix: .mp4 H.264 video, .gif looping GIF, .png contact sheet, .rrd Rerun file (pip "
+        "install rerun-sdk); needs no display",
+    )
+    command.add_argument(
+        "--rerun", action="store_true", help="open the recording in Rerun's viewer (pip install rerun-sdk)"
     )
     command.add_argument(
         "--verify",
@@ -62,13 +63,13 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
         help="for --verify: bound on the angular acceleration, instead of the recording's",
     )
     command.add_argument(
-        "--limit-px",
-        type=number("--limit-px", above=True),
+        "--max-drift-px",
+        type=number("--max-drift-px", above=True),
         help="for --verify: largest position drift, px (default 0.01)",
     )
     command.add_argument(
-        "--limit-rad",
-        type=number("--limit-rad", above=True),
+        "--max-drift-rad",
+        type=number("--max-drift-rad", above=True),
         help="for --verify: largest orientation drift, rad (default 0.0001)",
     )
 
@@ -81,9 +82,12 @@ def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
     from .verify import verify
     from .video import video_encoder, write_gif, write_video
 
-    if arguments.video:
+    formats = [_format(path) for path in arguments.out]
+    if len({*formats}) < len(formats):
+        raise InvalidValueError("--out", "one file of each kind", " ".join(map(str, arguments.out)))
+    if "video" in formats:
         video_encoder()
-    if arguments.rerun is not None:
+    if arguments.rerun or "rerun" in formats:
         require_rerun()
     track = read_track(arguments.file)
     if not track.steps:
@@ -91,20 +95,35 @@ def _replay(arguments: argparse.Namespace) -> dict[str, Any]:
     summary: dict[str, Any] = {}
     options = {"speed": arguments.speed, "width": arguments.width, "fps": arguments.fps}
     if arguments.verify:
-        summary["verify"] = verify(track, arguments.angular_limit, arguments.limit_px, arguments.limit_rad)
+        summary["verify"] = verify(track, arguments.angular_limit, arguments.max_drift_px, arguments.max_drift_rad)
         summary["exit_status"] = summary["verify"].pop("exit_status")
-    if arguments.video:
-        summary["video"] = write_video(track, arguments.video, **options)
-    if arguments.gif:
-        summary["gif"] = write_gif(track, arguments.gif, **options)
-    if arguments.png:
-        sheet = {} if arguments.width is None else {"width": arguments.width}
-        summary["png"] = write_sheet(track, arguments.png, arguments.frames, **sheet)
-    if arguments.rerun is not None:
-        summary["rerun"] = log_to_rerun(track, None if arguments.rerun == _VIEWER else arguments.rerun)
+    sheet = {} if arguments.width is None else {"width": arguments.width}
+    for name, path in zip(formats, arguments.out, strict=True):
+        if name == "video":
+            summary[name] = write_video(track, path, **options)
+        elif name == "gif":
+            summary[name] = write_gif(track, path, **options)
+        elif name == "png":
+            summary[name] = write_sheet(track, path, arguments.frames, **sheet)
+        else:
+            summary[name] = log_to_rerun(track, path)
+    if arguments.rerun:
+        summary["viewer"] = log_to_rerun(track)
     if not summary:
         from .viewer import Viewer
 
         Viewer(track).run()
         summary = {"file": str(arguments.file), "steps": track.steps}
     return summary
+
+
+def _format(path: Path) -> str:
+    """Returns the output format of a file, by its suffix.
+
+    Raises:
+        InvalidValueError: the suffix is unknown.
+    """
+    try:
+        return _FORMATS[path.suffix.lower()]
+    except KeyError:
+        raise InvalidValueError("--out", f"names that end with {', '.join(_FORMATS)}", str(path)) from None

@@ -37,7 +37,7 @@ def require_rerun() -> tuple[Any, Any]:
     try:
         return importlib.import_module("rerun"), importlib.import_module("rerun.blueprint")
     except ImportError:
-        raise CopolicyError("--rerun: expected the package rerun-sdk, found none: pip install rerun-sdk") from None
+        raise CopolicyError("Rerun: expected the package rerun-sdk, found none: pip install rerun-sdk") from None
 
 
 def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
@@ -69,7 +69,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
     ):
         # The viewer is a separate process, whose error message would not be shown.
         raise RunError(
-            "expected a display (or a file, --rerun OUT.rrd), found none: neither DISPLAY nor WAYLAND_DISPLAY is set"
+            "expected a display (or a file, --out OUT.rrd), found none: neither DISPLAY nor WAYLAND_DISPLAY is set"
         )
     below = blueprint.TextLogView(origin="events", name="Events")
     if track.interaction is not None:

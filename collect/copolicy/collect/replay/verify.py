@@ -41,7 +41,7 @@ def verify(
         if limit is None:
             continue
         if name not in limits:
-            raise InvalidValueError(f"--limit-{name}", f"none: drift is measured as {', '.join(limits)}", limit)
+            raise InvalidValueError(f"--max-drift-{name}", f"none: drift is measured as {', '.join(limits)}", limit)
         if not 0 < limit < math.inf:
             raise InvalidValueError(f"limit in {name}", "a positive number", limit)
         limits[name] = limit

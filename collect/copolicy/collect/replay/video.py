@@ -146,7 +146,7 @@ def video_encoder():
         pass
     if shutil.which("ffmpeg"):
         return _encode_with_ffmpeg
-    raise CopolicyError("--video: expected PyAV (pip install av) or the program ffmpeg, found neither")
+    raise CopolicyError("video: expected PyAV (pip install av) or the program ffmpeg, found neither")
 
 
 def _encode_with_pyav(

@@ -39,7 +39,7 @@ class Viewer:
         self._dragging = False
         self._was_playing = False
         self._message_until = 0.0
-        self._window = Window(None, False, track.path.name, SIZE, "--video, --gif, --png")
+        self._window = Window(None, False, track.path.name, SIZE, "--out FILE")
         self._window.loaded()
         pygame.key.set_repeat(350, 40)
 

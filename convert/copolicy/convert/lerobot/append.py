@@ -49,7 +49,7 @@ def stored_clock(root: Path, fps: int | None, hold: Hold | None) -> tuple[int, H
         stored = int(info["fps"]), info["features"]["action"]["hold"]
     except (KeyError, TypeError, ValueError):
         raise FileFormatError(root / INFO_FILE, "a data set of copolicy-convert", "another") from None
-    for name, asked, found in (("--fps", fps, stored[0]), ("--hold", hold, stored[1])):
+    for name, asked, found in (("--fps", fps, stored[0]), ("--downsampling", hold, stored[1])):
         if asked is not None and asked != found:
             raise InvalidValueError(name, f"{found!r}, as {root} has it", asked)
     return stored

@@ -13,11 +13,11 @@ def add_merge_command(commands: argparse._SubParsersAction) -> None:
     """Adds `merge`."""
     parser = add_command(
         commands, "merge", _merge, "join LeRobot data sets of this project, such as those of two labs, to one",
-        "copolicy-convert merge lab_a/table lab_b/table --prefix-people kth tudelft --root both --repo-id me/both",
+        "copolicy-convert merge lab_a/table lab_b/table --prefix-people kth tudelft --out both --repo-id me/both",
         DATASETS,
     )  # fmt: skip
     parser.add_argument("roots", nargs="+", type=Path, metavar="PATH", help="folders of data sets, in this order")
-    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="the new folder; must not exist")
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="the new folder; must not exist")
     parser.add_argument("--repo-id", required=True, metavar="USER/NAME", help="the data set's name on the Hub")
     people = parser.add_mutually_exclusive_group()
     people.add_argument(
@@ -37,7 +37,7 @@ def _merge(arguments: argparse.Namespace) -> dict:
         raise InvalidValueError("PATH", "at least two data sets", len(arguments.roots))
     return merge_datasets(
         arguments.roots,
-        arguments.root,
+        arguments.out,
         checked_repo_id(arguments.repo_id),
         arguments.prefix_people,
         arguments.same_people,

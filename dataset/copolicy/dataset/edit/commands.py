@@ -15,7 +15,7 @@ def add_select_command(commands: argparse._SubParsersAction) -> None:
     """Adds `select`."""
     parser = add_command(
         commands, "select", _select, "write some episodes as a data set of their own; the old one stays as it is",
-        "copolicy-dataset select datasets/table --out datasets/short --pairs P03 P07 "
+        "copolicy-dataset select datasets/table --out datasets/short --pair-ids P03 P07 "
         "--where 'duration_s < 20 and source == \"human\"'",
         TABLES,
     )  # fmt: skip
@@ -73,7 +73,7 @@ def add_amend_command(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands, "amend", _amend, "correct stated episode columns in place, or restore lost ones",
         "copolicy-dataset amend datasets/table --set license=cc-by-4.0\n"
-        "  copolicy-dataset amend datasets/table --set consent_id=C-12 --episodes 3-5\n"
+        "  copolicy-dataset amend datasets/table --set consent_id=C-12 --episode-ids 3-5\n"
         "  copolicy-dataset amend datasets/table --restore-from recordings",
         TABLES,
     )  # fmt: skip
@@ -93,17 +93,17 @@ def add_amend_command(commands: argparse._SubParsersAction) -> None:
 
 def _add_selection_flags(parser: argparse.ArgumentParser) -> None:
     """The flags that say which episodes are meant: several values of one are alternatives, several flags all hold."""
-    for flag, metavar, text in (
-        ("--episodes", "N", "numbers, ranges such as 3-5, or episode_uuids"),
-        ("--pairs", "ID", "pair_ids"),
-        ("--players", "ID", "player ids, at either seat"),
-        ("--consents", "ID", "consent ids; an episode of two people may name two"),
-        ("--map-sets", "NAME", "map sets"),
-        ("--map-ids", "ID", "maps"),
-        ("--results", "RESULT", "success, failure, or a termination reason such as goal or timeout"),
-        ("--sources", "SOURCE", "human, simulated or upstream"),
+    for flag, dest, metavar, text in (
+        ("--episode-ids", "episodes", "N", "numbers, ranges such as 3-5, or episode_uuids"),
+        ("--pair-ids", "pairs", "ID", "pseudonyms of pairs"),
+        ("--player-ids", "players", "ID", "player ids, at either seat"),
+        ("--consent-ids", "consents", "ID", "consent ids; an episode of two people may name two"),
+        ("--map-sets", "map_sets", "NAME", "map sets"),
+        ("--map-ids", "map_ids", "ID", "maps"),
+        ("--results", "results", "RESULT", "success, failure, or a termination reason such as goal or timeout"),
+        ("--sources", "sources", "SOURCE", "human, simulated or upstream"),
     ):
-        parser.add_argument(flag, nargs="+", default=(), metavar=metavar, help=text)
+        parser.add_argument(flag, dest=dest, nargs="+", default=(), metavar=metavar, help=text)
     parser.add_argument("--where", default="", metavar="CONDITION", help="a condition on episode columns")
 
 
@@ -120,7 +120,9 @@ def _select(arguments: argparse.Namespace) -> dict:
 
     selection = _selection(arguments)
     if not selection.asked():
-        raise InvalidValueError("select", "at least one of --episodes, --pairs, --where, ... --drop-excluded", "none")
+        raise InvalidValueError(
+            "select", "at least one of --episode-ids, --pair-ids, --where, ... --drop-excluded", "none"
+        )
     return select(arguments.root, arguments.out, selection)
 
 

@@ -69,9 +69,9 @@ class Selection:
         listed = chosen_episodes(self.episodes, (row["episode_index"] for row in rows), names)
         holds = parse_condition(self.where, types) if self.where else lambda _: True
         wanted = {
-            "--pairs": (self.pairs, lambda row: {row.get("pair_id")}),
-            "--players": (self.players, lambda row: {row.get("player_0_id"), row.get("player_1_id")}),
-            "--consents": (self.consents, consents_of),
+            "--pair-ids": (self.pairs, lambda row: {row.get("pair_id")}),
+            "--player-ids": (self.players, lambda row: {row.get("player_0_id"), row.get("player_1_id")}),
+            "--consent-ids": (self.consents, consents_of),
             "--map-sets": (self.map_sets, lambda row: {row.get("map_set")}),
             "--map-ids": (self.map_ids, lambda row: {row.get("map_id")}),
             "--results": (self.results, _results),

@@ -62,7 +62,7 @@ def chosen_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping
         wanted = set(range(first, min(last, first + len(numbers)) + 1))
         if not wanted or not wanted <= numbers:
             span = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or episode_uuids of the data set"
-            raise InvalidValueError("--episodes", span, text)
+            raise InvalidValueError("--episode-ids", span, text)
         chosen |= wanted
     return chosen
 

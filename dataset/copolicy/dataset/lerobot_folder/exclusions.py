@@ -115,11 +115,13 @@ def add_exclude_command(commands: argparse._SubParsersAction) -> None:
     """Adds `exclude`."""
     parser = add_command(
         commands, "exclude", _exclude, "flag episodes that training must leave out; nothing is removed",
-        'copolicy-dataset exclude datasets/table --episodes 12 30-33 --reason "joystick of player 1 unplugged"',
+        'copolicy-dataset exclude datasets/table --episode-ids 12 30-33 --reason "joystick of player 1 unplugged"',
         TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
-    parser.add_argument("--episodes", nargs="+", metavar="N", help="numbers, ranges such as 3-5, or episode_uuids")
+    parser.add_argument(
+        "--episode-ids", dest="episodes", nargs="+", metavar="N", help="numbers, ranges such as 3-5, or episode_uuids"
+    )
     parser.add_argument("--reason", help="why, kept in the data set")
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--undo", action="store_true", help="take the flag away again")
@@ -129,7 +131,7 @@ def add_exclude_command(commands: argparse._SubParsersAction) -> None:
 def _exclude(arguments: argparse.Namespace) -> dict:
     if arguments.list:
         if arguments.episodes or arguments.reason:
-            raise InvalidValueError("--list", "no --episodes and no --reason beside it", "one")
+            raise InvalidValueError("--list", "no --episode-ids and no --reason beside it", "one")
         listed = [entry._asdict() for entry in excluded_episodes(arguments.root)]
         left_out = {entry["episode"] for entry in listed}
         rest = sorted(row.episode for table in episode_tables(arguments.root, _NEEDED).values() for row in _rows(table))
@@ -140,7 +142,7 @@ def _exclude(arguments: argparse.Namespace) -> dict:
             "for_lerobot": f"--dataset.episodes=[{kept}]",
         }
     if not arguments.episodes:
-        raise InvalidValueError("--episodes", "numbers, ranges such as 3-5, or episode_uuids", None)
+        raise InvalidValueError("--episode-ids", "numbers, ranges such as 3-5, or episode_uuids", None)
     if arguments.undo:
         if arguments.reason:
             raise InvalidValueError("--reason", "none with --undo", arguments.reason)

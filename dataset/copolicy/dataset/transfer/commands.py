@@ -35,12 +35,12 @@ def add_pull_command(commands: argparse._SubParsersAction) -> None:
         "pull",
         _pull,
         "download a data version and verify every file and the content hash",
-        "copolicy-dataset pull my-lab/table@data-1.0.0 --root outputs/table",
+        "copolicy-dataset pull my-lab/table@data-1.0.0 --out outputs/table",
         (*TABLES, *HUB),
     )
     parser.add_argument("name", metavar="U/N[@REVISION]", help="data set on the Hub (default: its newest data version)")
-    parser.add_argument("--root", type=Path, required=True, metavar="OUT", help="folder to make")
-    parser.add_argument("--raw", action="store_true", help="with the recordings, where they were published")
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder to make")
+    parser.add_argument("--with-raw", action="store_true", help="also the recordings, where they were published")
 
 
 def _publish(arguments: argparse.Namespace) -> dict:
@@ -54,4 +54,4 @@ def _pull(arguments: argparse.Namespace) -> dict:
     from .pull import pull
 
     name, _, revision = arguments.name.partition("@")
-    return asdict(pull(name, revision or None, arguments.root, arguments.raw))
+    return asdict(pull(name, revision or None, arguments.out, arguments.with_raw))

@@ -144,7 +144,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
         arguments.participants,
         min(12, len(starts)) if asked is None else asked,
         arguments.seed,
-        actions_per_plan=arguments.actions_per_plan,
+        actions_per_plan=arguments.n_action_steps,
         world={**stated, **unusual},
         settings=policy_settings(arguments),
         task_name=protocol.task.spec.name,
