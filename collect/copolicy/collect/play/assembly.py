@@ -15,7 +15,7 @@ from .application import Application
 from .game import Game
 from .loading import Loading
 from .phase import NextPhase
-from .player import SeatedPlayer, default_players, make_players, warn_other_settings
+from .player import default_players, make_players, warn_other_settings
 from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
@@ -40,15 +40,17 @@ def assemble(
     # The first world of a process is slow to make; made later, a button press could be missed meanwhile.
     task = get_task(settings.task)
     task.make_world(settings.scenarios[0], settings.world_settings)
-    lock = _lock(settings)
-    stack.callback(lock.close)
+    try:
+        stack.callback(CollectionLock(settings.out).close)
+    except OSError as error:
+        raise RunError(f"{settings.out}: expected a folder to write to, found: {error.strerror}") from None
     recoveries = loading.run("interrupted recordings", lambda: recover(settings.out))
     recovered = [recovery for recovery in recoveries if recovery.status == "recovered"]
     for recovery in recovered:
         logging.info("recovered %s: %d steps", (recovery.output or recovery.source).name, recovery.steps)
-    config = settings.config_folder or user_config_folder()
-    store = CalibrationStore(config)
-    gamepads = Gamepads(MappingStore(config))
+    config_folder = settings.config_folder or user_config_folder()
+    store = CalibrationStore(config_folder)
+    gamepads = Gamepads(MappingStore(config_folder))
     specs = settings.players or default_players(sum(bool(gamepad.steering_options) for gamepad in gamepads))
     policies = [spec.detail for spec in specs if spec.kind == "policy"]
     name = f"the policy {policies[0]}, with torch and LeRobot" if policies else "the players"
@@ -56,7 +58,8 @@ def assemble(
     for player in players:
         stack.callback(player.agent.close)
     warn_other_settings(players, settings.world_settings, task)
-    folder = loading.run("earlier episodes", lambda: _folder(settings))
+    keys = (settings.out, settings.pair, settings.session_settings(), settings.episodes, settings.new_session)
+    folder = loading.run("earlier episodes", lambda: SessionFolder(*keys, settings.task))
     sounds = Sounds(settings.mute or settings.headless)
     stack.callback(sounds.close)
     game = Game(settings, Roster(players, gamepads, store, folder.journal, clock), folder, sounds, clock)
@@ -68,27 +71,11 @@ def assemble(
     return Application(game, window, first if not game.finished else NextPhase.FINISHED)
 
 
-def _lock(settings: PlaySettings) -> CollectionLock:
-    try:
-        return CollectionLock(settings.out)
-    except OSError as error:
-        raise RunError(f"{settings.out}: expected a folder to write to, found: {error.strerror}") from None
-
-
-def _folder(settings: PlaySettings) -> SessionFolder:
-    return SessionFolder(
-        settings.out, settings.pair, settings.session_settings(), settings.episodes, settings.new_session, settings.task
-    )
-
-
 def _assign_devices(game: Game) -> None:
     """Assigns the devices in order, for a session without a lobby."""
     for device in (*game.roster.gamepads, *HALVES.values()):
         game.roster.assign(device)
-    missing: list[SeatedPlayer] = game.roster.without_device()
     if any(player.spec.kind == "keyboard" for player in game.players):
         raise RunError("--players: expected no keyboard with --headless, found one: keys need a window")
-    if missing:
-        raise RunError(
-            f"{missing[0].player_id}: expected a gamepad, found {len(game.roster.gamepads)} for both players"
-        )
+    if missing := [player.player_id for player in game.roster.without_device()]:
+        raise RunError(f"{missing[0]}: expected a gamepad, found {len(game.roster.gamepads)} for both players")

@@ -31,8 +31,7 @@ class Game:
     Attributes:
         task: that is played.
         roster: the players and their devices.
-        scenarios: to choose from.
-        schedule: chooses scenario and seats of the next episode.
+        schedule: of scenarios and seats.
         practice_left: practice episodes still to play.
         swapped: the players exchanged the seats that the schedule gave them.
         trial: the current or next episode.
@@ -239,23 +238,20 @@ class Game:
             self._view = scenario, scene_view(self.task, scenario)
         return self._view[1]
 
-    def title(self, trial: Trial) -> str:
-        """Returns the pair and the progress of the session, for the screen."""
-        if trial.practice:
-            return f"{self.settings.pair}   practice, {self.practice_left} left"
-        number = min(self.folder.counts.kept_in_session.total() + 1, self.settings.episodes)
-        return f"{self.settings.pair}   episode {number} of {self.settings.episodes}"
-
     def hud(self, trial: Trial, running: bool = True) -> Hud:
         """Returns the content of the bars around the world, for a running or a coming episode."""
+        kept, episodes = self.folder.counts.kept_in_session.total(), self.settings.episodes
+        position = f"episode {min(kept + 1, episodes)} of {episodes}"
+        if trial.practice:
+            position = f"practice, {self.practice_left} left"
         forces = (trial.forces[:2], trial.forces[2:])
         statuses = [
             SeatStatus(player.label if running else f"{player.player_id}: {player.label}", force, player.lacks_device)
             for player, force in zip(self.seats(trial), forces, strict=True)
         ]
         return Hud(
-            title=self.title(trial),
-            progress=self.folder.counts.kept_in_session.total() / self.settings.episodes,
+            title=f"{self.settings.pair}   {position}",
+            progress=kept / episodes,
             seconds=trial.seconds,
             limit_s=trial.step_limit / self.task.spec.record_hz,
             score=trial.score,

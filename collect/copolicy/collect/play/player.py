@@ -12,7 +12,7 @@ from copolicy.dataset.physics_text import physics_summary
 from copolicy.dataset.task import PairTask, get_task
 
 from ..agents import PersonAgent, PolicyAgent, ReplayAgent, ScriptedAgent, load_policy
-from ..inputs import HALVES, Gamepad, KeyboardHalf
+from ..inputs import Gamepad, KeyboardHalf
 from ..rollout import Agent
 from .settings import PlayerSpec
 
@@ -141,11 +141,6 @@ def warn_other_settings(players: Iterable[SeatedPlayer], settings: Any, task: Pa
             if recorded != settings:
                 summaries = (physics_summary(recorded, task), physics_summary(settings, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", player.agent.name, *summaries)
-
-
-def keyboard_half(name: int | str) -> KeyboardHalf | None:
-    """Returns the half of the keyboard that a press came from, or None."""
-    return HALVES.get(name) if isinstance(name, str) else None
 
 
 def _agent(spec: PlayerSpec, task: PairTask, clock: Callable[[], int]) -> Agent:

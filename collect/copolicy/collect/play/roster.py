@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 from ..inputs import (
+    HALVES,
     CalibrationStore,
     DuplicateDetector,
     Gamepad,
@@ -14,7 +15,7 @@ from ..inputs import (
     StickCalibration,
 )
 from ..inputs.mapping import Labels
-from .player import SeatedPlayer, keyboard_half
+from .player import SeatedPlayer
 
 
 class Roster:
@@ -72,7 +73,7 @@ class Roster:
         """
         if press.moved or self.player_of(press):
             return None
-        device = self.gamepads.get(press.device) if isinstance(press.device, int) else keyboard_half(press.device)
+        device = self.gamepads.get(press.device) if isinstance(press.device, int) else HALVES.get(press.device)
         if device is None or not any(player.can_use(device) for player in self.players):
             return None
         if isinstance(device, Gamepad):

@@ -64,7 +64,8 @@ def prepared(
         else:
             window = Window(settings.window, settings.fullscreen, task.words.invitation or task.spec.title)
             pygame.mouse.set_visible(False)
-        stack.callback(_close_pygame)
+        stack.callback(pygame.display.quit)
+        stack.callback(pygame.joystick.quit)
         loading = Loading(window)
         # Imported after the window is open, since the modules of world, recorder and routes take seconds to load.
         assembly = loading.run(f"the {settings.task} and its recorder", lambda: import_module(".assembly", __package__))
@@ -101,8 +102,3 @@ def stopped_by_signals(game: Game) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _close_pygame() -> None:
-    pygame.joystick.quit()
-    pygame.display.quit()

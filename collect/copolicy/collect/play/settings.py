@@ -67,7 +67,7 @@ class PlaySettings:
         episodes: number of episodes to keep.
         practice: number of practice episodes before them.
         seed: of the schedule and of scripted players.
-        swap_seats: change seats in the middle; None for only if both players are people.
+        swap_seats: change seats in the middle; None: only if both players are people.
         consents: id of each player's consent record; empty if there is none.
         license: of the recordings, as an identifier of the Hub; empty if none.
         angular_limit: bound on the angular acceleration, rad/s^2; the task's own if None.
