@@ -98,7 +98,7 @@ def test_a_session_is_loaded_under_its_window_and_named_once_it_is_there(tmp_pat
         assert pygame.display.get_caption()[0].startswith("copolicy")
     steps = list(dict.fromkeys(what for what, _ in seen))
     assert steps == [
-        "the table and its recorder",
+        "the task table and the recorder",
         "the robots",
         "interrupted recordings",
         "the players",

@@ -16,7 +16,7 @@ _READY_TICKS = 15  # between the last player's confirmation and the next phase
 
 
 class Lobby(Phase):
-    """Waits until both players are ready; each has an own menu."""
+    """Waits until both players are ready; each has a menu of their own."""
 
     def __init__(self, game: Game):
         super().__init__(game)

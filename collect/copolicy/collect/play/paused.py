@@ -14,7 +14,7 @@ from .player import SeatedPlayer
 
 _TITLES = {
     "player": "Paused",
-    "device_lost": "Paused: a gamepad was unplugged",
+    "device_lost": "Paused: a gamepad is missing",
     "focus_lost": "Paused: another window is in front",
 }
 

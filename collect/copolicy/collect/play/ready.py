@@ -64,7 +64,7 @@ class Ready(MenuPhase):
 
     def device_lost(self, player: SeatedPlayer) -> None:
         """Shows a message; the player has to join again."""
-        self.game.show_message(f"{player.player_id}: the gamepad was unplugged")
+        self.game.show_message(f"{player.player_id}: device lost, press any button to join")
 
     def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the world, and below it the seats and the menu, so that nothing hides the world."""

@@ -49,7 +49,7 @@ def verify(
     drift, outcome, ended = _simulate(track, settings)
     violations = np.flatnonzero((drift > list(limits.values())).any(axis=1))
     recorded = episode.meta.termination_reason
-    # A time-out or an interruption is no end of the world, which must not end the episode then.
+    # After a time-out or an interruption, the simulated world must not have ended the episode either.
     physical = recorded in task.spec.reasons and recorded != TIMEOUT
     same_end = (outcome.reason == recorded and ended == track.steps) if physical else not outcome.done
     reproduced = not len(violations) and same_end
