@@ -68,7 +68,9 @@ def prepared(
         stack.callback(pygame.joystick.quit)
         loading = Loading(window)
         # Imported after the window is open, since the modules of world, recorder and routes take seconds to load.
-        assembly = loading.run(f"the task {settings.task} and the recorder", lambda: import_module(".assembly", __package__))
+        assembly = loading.run(
+            f"the task {settings.task} and the recorder", lambda: import_module(".assembly", __package__)
+        )
         if load is not None:
             loading.run(*load)
         application = assembly.assemble(settings, window, loading, stack, clock)
