@@ -19,7 +19,7 @@ SHORT_MAP = MapConfig(start=(760.0, 300.0, 3.14), goal=(960.0, 300.0))
 """Straight ahead, two and a half seconds away."""
 
 A, B, X, Y, START = 0, 1, 2, 3, 7
-"""Buttons of a game pad."""
+"""Buttons of a gamepad."""
 
 
 def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
@@ -139,15 +139,15 @@ class Players(threading.Thread):
         """Waits for a phase."""
         self.until(lambda: type(self.application.phase).__name__ == name, name)
 
-    def press(self, pad: VirtualJoystick, button: int) -> None:
+    def press(self, gamepad: VirtualJoystick, button: int) -> None:
         """Presses a button as a person does, and lets the program see it."""
-        self.until(lambda: pad.is_open, "an open joystick")
-        pad.button(button, True)
+        self.until(lambda: gamepad.is_open, "an open joystick")
+        gamepad.button(button, True)
         self.sleep(0.08)
-        pad.button(button, False)
+        gamepad.button(button, False)
         self.sleep(0.08)
 
-    def carry(self, *pads: VirtualJoystick, steps: int | None = None) -> None:
+    def carry(self, *gamepads: VirtualJoystick, steps: int | None = None) -> None:
         """Pushes with both sticks towards the goal, for a number of steps or until the episode ends."""
         game = self.application.game
         trial = game.trial
@@ -157,11 +157,11 @@ class Players(threading.Thread):
         while trial.steps < last and not trial.outcome.done and self.clock() < limit:
             x, y, _ = trial.world.pose
             dx, dy = trial.scenario.goal[0] - x, trial.scenario.goal[1] - y
-            for pad in pads:
-                pad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
+            for gamepad in gamepads:
+                gamepad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
             self.sleep(0.01)
-        for pad in pads:
-            pad.move(0.0, 0.0)
+        for gamepad in gamepads:
+            gamepad.move(0.0, 0.0)
 
     def result(self) -> None:
         """Waits for the result, and until it listens."""

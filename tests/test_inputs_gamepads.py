@@ -9,7 +9,7 @@ from copolicy.collect.sdl import pygame
 
 
 @pytest.fixture
-def pads():
+def gamepads():
     pygame.display.init()
     pygame.display.set_mode((64, 64))
     yield Gamepads()
@@ -17,11 +17,11 @@ def pads():
     pygame.display.quit()
 
 
-def _pump(pads, reader=None):
+def _pump(gamepads, reader=None):
     """Hands on all events; returns what came, what went, and the presses."""
     came, went, presses = [], [], []
     for event in pygame.event.get():
-        added, removed = pads.handle(event)
+        added, removed = gamepads.handle(event)
         came += [added] if added else []
         went += [removed] if removed else []
         press = reader.read(event) if reader else None
@@ -29,64 +29,64 @@ def _pump(pads, reader=None):
     return came, went, presses
 
 
-def test_two_of_a_kind_are_told_apart(pads):
+def test_two_of_a_kind_are_told_apart(gamepads):
     first, second = VirtualJoystick("Twin"), VirtualJoystick("Twin")
-    came, _, _ = _pump(pads)
-    assert [pad.instance_id for pad in came] == [first.instance_id, second.instance_id]
+    came, _, _ = _pump(gamepads)
+    assert [gamepad.instance_id for gamepad in came] == [first.instance_id, second.instance_id]
     assert came[0].guid == came[1].guid
     first.move(0.5, -1.0)
     second.move(-0.25, 0.0)
-    _pump(pads)
-    assert pads.get(first.instance_id).sample(7).axes[:2] == pytest.approx((0.5, -1.0), abs=1e-4)
-    assert pads.get(second.instance_id).sample(7).axes[:2] == pytest.approx((-0.25, 0.0), abs=1e-4)
-    assert pads.get(first.instance_id).sample(7).time_ns == 7
+    _pump(gamepads)
+    assert gamepads.get(first.instance_id).sample(7).axes[:2] == pytest.approx((0.5, -1.0), abs=1e-4)
+    assert gamepads.get(second.instance_id).sample(7).axes[:2] == pytest.approx((-0.25, 0.0), abs=1e-4)
+    assert gamepads.get(first.instance_id).sample(7).time_ns == 7
 
 
-def test_a_pad_that_comes_back_is_another(pads):
-    pad = VirtualJoystick()
-    _pump(pads)
-    number = pad.instance_id
-    pad.unplug()
-    _, went, _ = _pump(pads)
+def test_a_gamepad_that_comes_back_is_another(gamepads):
+    gamepad = VirtualJoystick()
+    _pump(gamepads)
+    number = gamepad.instance_id
+    gamepad.unplug()
+    _, went, _ = _pump(gamepads)
     assert [one.instance_id for one in went] == [number]
-    assert pads.get(number) is None
-    assert len(pads) == 0
+    assert gamepads.get(number) is None
+    assert len(gamepads) == 0
     again = VirtualJoystick()
-    came, _, _ = _pump(pads)
+    came, _, _ = _pump(gamepads)
     assert came[0].instance_id == again.instance_id != number
 
 
-def test_an_event_that_is_told_twice_opens_one_pad(pads):
+def test_an_event_that_is_told_twice_opens_one_gamepad(gamepads):
     VirtualJoystick()
     (event,) = pygame.event.get(pygame.JOYDEVICEADDED)
-    assert pads.handle(event)[0] is not None
-    assert pads.handle(event) == (None, None)
-    assert len(pads) == 1
+    assert gamepads.handle(event)[0] is not None
+    assert gamepads.handle(event) == (None, None)
+    assert len(gamepads) == 1
 
 
-def test_buttons_hat_and_stick_become_commands(pads):
-    pad, reader = VirtualJoystick(), CommandReader(pads)
-    _pump(pads)
-    number = pad.instance_id
+def test_buttons_hat_and_stick_become_commands(gamepads):
+    gamepad, reader = VirtualJoystick(), CommandReader(gamepads)
+    _pump(gamepads)
+    number = gamepad.instance_id
     for button, command in ((0, Command.ACCEPT), (1, Command.BACK), (7, Command.PAUSE)):
-        pad.button(button, True)
-        assert _pump(pads, reader)[2] == [Press(command, number)]
-        pad.button(button, False)
-        assert _pump(pads, reader)[2] == []
-    pad.hat(0, 1)
-    assert _pump(pads, reader)[2] == [Press(Command.UP, number)]
-    pad.hat(0, 0)
-    assert _pump(pads, reader)[2] == []
+        gamepad.button(button, True)
+        assert _pump(gamepads, reader)[2] == [Press(command, number)]
+        gamepad.button(button, False)
+        assert _pump(gamepads, reader)[2] == []
+    gamepad.hat(0, 1)
+    assert _pump(gamepads, reader)[2] == [Press(Command.UP, number)]
+    gamepad.hat(0, 0)
+    assert _pump(gamepads, reader)[2] == []
 
 
-def test_a_stick_commands_once_each_time_it_is_tipped(pads):
-    pad, reader = VirtualJoystick(), CommandReader(pads)
-    _pump(pads)
+def test_a_stick_commands_once_each_time_it_is_tipped(gamepads):
+    gamepad, reader = VirtualJoystick(), CommandReader(gamepads)
+    _pump(gamepads)
     commands = []
     for y in (0.5, 0.9, 0.7, 0.5, 0.9, 0.1, -0.9):
-        pad.axis(1, y)
-        commands.append([press.command for press in _pump(pads, reader)[2]])
-        assert all(press.moved for press in _pump(pads, reader)[2])
+        gamepad.axis(1, y)
+        commands.append([press.command for press in _pump(gamepads, reader)[2]])
+        assert all(press.moved for press in _pump(gamepads, reader)[2])
     assert commands == [[], [Command.DOWN], [], [], [], [], [Command.UP]]
 
 

@@ -49,35 +49,35 @@ def test_sdls_mapping_decides_what_a_button_asks_for(events):
     xbox = VirtualJoystick("Xbox pad", 0x045E, 0x028E, buttons=11)
     sony = VirtualJoystick("Wireless Controller", 0x054C, 0x09CC, axes=6, buttons=13, mapping=PLAYSTATION)
     strange = VirtualJoystick("Strange", product=3, buttons=13, mapping=None)
-    pads = Gamepads()
-    reader = CommandReader(pads)
+    gamepads = Gamepads()
+    reader = CommandReader(gamepads)
     events.get()
 
-    def pressed(pad):
+    def pressed(gamepad):
         found = []
         for button in range(11):
-            pad.button(button, True)
+            gamepad.button(button, True)
             found += [press for event in events.get() if (press := reader.read(event)) is not None]
-            pad.button(button, False)
+            gamepad.button(button, False)
             events.get()
-        assert all(press.device == pad.instance_id for press in found)
+        assert all(press.device == gamepad.instance_id for press in found)
         return [press.command.name for press in found]
 
     assert pressed(xbox)[:9] == "ACCEPT BACK REDO DISCARD NOTE UNDO PAUSE PAUSE OTHER".split()
     assert pressed(sony)[:10] == "REDO ACCEPT BACK DISCARD NOTE UNDO OTHER OTHER PAUSE PAUSE".split()
-    # A trigger may have any number on a pad that nobody knows.
+    # A trigger may have any number on an unknown gamepad.
     assert pressed(strange) == "ACCEPT BACK REDO DISCARD".split() + ["OTHER"] * 7
 
 
 def test_a_stick_that_is_mapped_upside_down_moves_the_cursor_the_right_way(events):
-    pad = VirtualJoystick("Odd", product=4, mapping="a:b0,leftx:a2,lefty:a3~")
-    pads = Gamepads()
-    reader = CommandReader(pads)
+    gamepad = VirtualJoystick("Odd", product=4, mapping="a:b0,leftx:a2,lefty:a3~")
+    gamepads = Gamepads()
+    reader = CommandReader(gamepads)
     events.get()
-    pad.axis(3, -0.9)
+    gamepad.axis(3, -0.9)
     presses = [press for event in events.get() if (press := reader.read(event)) is not None]
-    assert presses == [Press(Command.DOWN, pad.instance_id, moved=True)]
-    (held,) = pads
+    assert presses == [Press(Command.DOWN, gamepad.instance_id, moved=True)]
+    (held,) = gamepads
     assert held.default_calibration() == StickCalibration(axes=(2, 3), invert=(False, True))
     assert held.force(held.sample(0), held.default_calibration())[1] == pytest.approx(0.886, abs=1e-3)
 
@@ -101,7 +101,7 @@ def test_labels_are_those_of_the_maker(guid, name, source, labels):
     assert printed["misc1"] == ""
 
 
-def test_buttons_of_an_unknown_pad_go_by_their_numbers():
+def test_buttons_of_an_unknown_gamepad_go_by_their_numbers():
     printed = Labels(UNKNOWN, "Wireless Controller", SONY)
     assert (printed["a"], printed["b"], printed["start"]) == ("button 0", "button 1", "")
 
@@ -123,31 +123,31 @@ def test_everything_that_can_steer_is_on_offer(text, axes, hats, labels):
     assert [one.label for one in steering_options(mapping(text), axes, hats)] == labels
 
 
-def test_a_d_pad_of_buttons_steers(events):
-    pad = VirtualJoystick("Retro", product=5, axes=0, hats=0, mapping="a:b0,dpleft:b4,dpright:b5,dpup:b6,dpdown:b7")
+def test_a_d_gamepad_of_buttons_steers(events):
+    gamepad = VirtualJoystick("Retro", product=5, axes=0, hats=0, mapping="a:b0,dpleft:b4,dpright:b5,dpup:b6,dpdown:b7")
     (held,) = Gamepads()
     calibration = held.default_calibration()
     assert held.steering(calibration).digital
-    pad.button(5, True)
-    pad.button(6, True)
+    gamepad.button(5, True)
+    gamepad.button(6, True)
     events.get()
     assert held.force(held.sample(0), calibration) == pytest.approx((0.5**0.5, -(0.5**0.5)))
 
 
-def test_a_calibration_of_axes_that_a_pad_lacks_is_not_its_own(events, tmp_path):
-    pad = VirtualJoystick("Plain", product=6, axes=0, mapping=None)
+def test_a_calibration_of_axes_that_a_gamepad_lacks_is_not_its_own(events, tmp_path):
+    gamepad = VirtualJoystick("Plain", product=6, axes=0, mapping=None)
     store = CalibrationStore(tmp_path)
-    store.put(pad.guid, StickCalibration(axes=(2, 3), dead_zone=0.3))
+    store.put(gamepad.guid, StickCalibration(axes=(2, 3), dead_zone=0.3))
     (held,) = Gamepads()
     assert store.for_gamepad(held).axes == (0, 1)
-    store.put(pad.guid, StickCalibration(dead_zone=0.3))
+    store.put(gamepad.guid, StickCalibration(dead_zone=0.3))
     assert store.for_gamepad(held).dead_zone == 0.3
 
 
 # The user's file
 
 
-def test_a_line_of_the_communitys_list_is_for_every_pad_of_its_numbers(tmp_path):
+def test_a_line_of_the_communitys_list_is_for_every_gamepad_of_its_numbers(tmp_path):
     path = tmp_path / "gamecontrollerdb.txt"
     lines = [
         "# remarks stay",
@@ -189,11 +189,11 @@ def test_a_damaged_line_is_named(tmp_path, line, found):
 
 
 def test_the_users_mapping_goes_before_sdls(events, tmp_path):
-    pad = VirtualJoystick("Alpha pad", product=1)
+    gamepad = VirtualJoystick("Alpha pad", product=1)
     store = MappingStore(tmp_path)
     (held,) = Gamepads(store)
     assert (held.mapping.source, held.mapping.control_of_button(7)) == ("sdl", "start")
-    store.put(pad.guid, mapping("a:b3,b:b4,leftx:a0,lefty:a1"))
+    store.put(gamepad.guid, mapping("a:b3,b:b4,leftx:a0,lefty:a1"))
     (held,) = Gamepads(MappingStore(tmp_path))
     assert (held.mapping.source, held.mapping.control_of_button(7), held.mapping.control_of_button(3)) == (
         "user",
@@ -202,7 +202,7 @@ def test_the_users_mapping_goes_before_sdls(events, tmp_path):
     )
 
 
-# Setting a pad up
+# Setting up a gamepad
 
 
 def _button(index):

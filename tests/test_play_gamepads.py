@@ -40,7 +40,7 @@ def test_buttons_go_by_their_meaning_and_by_what_is_printed_on_them(tmp_path):
         ]
 
 
-def test_a_pad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
+def test_a_gamepad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
     strange = VirtualJoystick("Strange pad", product=3, axes=4, buttons=12, hats=0, mapping=None)
     config = tmp_path / "config"
     with lobby(tmp_path) as hands:
@@ -105,7 +105,7 @@ def test_a_mapping_that_cannot_be_kept_holds_and_is_said(tmp_path):
         assert hands.panel().prompt == "button 4: choose   button 5: next"
 
 
-def test_a_pad_with_nothing_but_a_hat_steers_by_it(tmp_path):
+def test_a_gamepad_with_nothing_but_a_hat_steers_by_it(tmp_path):
     plain = VirtualJoystick("Plain", product=4, axes=0, hats=1, mapping=None)
     other = VirtualJoystick("Beta pad", product=2)
     with lobby(tmp_path) as hands:
@@ -141,45 +141,45 @@ def test_without_pilots_named_only_what_can_steer_counts(tmp_path):
 
 
 def test_the_axes_that_steer_can_be_chosen_and_are_kept(tmp_path):
-    pad = VirtualJoystick("Alpha pad", product=1)
+    gamepad = VirtualJoystick("Alpha pad", product=1)
     config = tmp_path / "config"
     with lobby(tmp_path) as hands:
-        hands.press(0, pad)
+        hands.press(0, gamepad)
         assert hands.panel().steering == "left stick"
         for _ in range(4):
-            hands.press(1, pad)
-        hands.press(0, pad)
+            hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[0] == "steer with: left stick"
-        pad.hat(1, 0)
+        gamepad.hat(1, 0)
         hands.ticks(1)
-        pad.hat(0, 0)
+        gamepad.hat(0, 0)
         hands.ticks(1)
         seen = [hands.panel().steering]
         for _ in range(2):
-            hands.press(0, pad)
+            hands.press(0, gamepad)
             seen.append(hands.panel().steering)
         assert seen == ["d-pad", "left stick", "d-pad"]
-        hands.press(1, pad)
-        hands.press(0, pad)
+        hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[1] == "left-right inverted: yes"
-        pad.hat(1, 0)
+        gamepad.hat(1, 0)
         hands.ticks(1)
         assert hands.panel().force == (-1.0, 0.0)
-        pad.hat(0, 0)
+        gamepad.hat(0, 0)
         for _ in range(2):
-            hands.press(1, pad)
-        hands.press(0, pad)
+            hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[4] == "steering: d-pad"
-    assert CalibrationStore(config).get(pad.guid).axes == (4, 5)
+    assert CalibrationStore(config).get(gamepad.guid).axes == (4, 5)
 
 
 def test_the_box_before_the_start_hides_nothing_of_the_world(tmp_path):
-    pads = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    gamepads = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
     with lobby(tmp_path, countdown_s=30.0) as hands:
-        for pad in pads:
-            hands.press(0, pad)
-        for pad in pads:
-            hands.press(0, pad)
+        for gamepad in gamepads:
+            hands.press(0, gamepad)
+        for gamepad in gamepads:
+            hands.press(0, gamepad)
         hands.ticks(20)
         world = (0, 60, 1200, 600)
         bare = Canvas(pygame.Surface((1200, 760), depth=32))
@@ -191,4 +191,4 @@ def test_the_box_before_the_start_hides_nothing_of_the_world(tmp_path):
             shown = hands.screen()
             draw_toast(Canvas(shown), "a message")
             assert pygame.image.tobytes(shown.subsurface(world), "RGB") == expected
-            hands.press(0, pads[0])
+            hands.press(0, gamepads[0])
