@@ -34,7 +34,7 @@ class Hands:
 
     def panel(self, player=0):
         players = self.game.seats()
-        seat = [one.index for one in players].index(player)
+        seat = [seated.index for seated in players].index(player)
         return self.application.phase._panel(seat, players[seat])
 
     def screen(self):

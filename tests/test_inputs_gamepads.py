@@ -48,12 +48,12 @@ def test_a_gamepad_that_comes_back_is_another(gamepads):
     number = gamepad.instance_id
     gamepad.unplug()
     _, went, _ = _pump(gamepads)
-    assert [one.instance_id for one in went] == [number]
+    assert [gamepad.instance_id for gamepad in went] == [number]
     assert gamepads.get(number) is None
     assert len(gamepads) == 0
-    again = VirtualJoystick()
+    replugged = VirtualJoystick()
     came, _, _ = _pump(gamepads)
-    assert came[0].instance_id == again.instance_id != number
+    assert came[0].instance_id == replugged.instance_id != number
 
 
 def test_an_event_that_is_told_twice_opens_one_gamepad(gamepads):

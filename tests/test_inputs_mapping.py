@@ -77,9 +77,9 @@ def test_a_stick_that_is_mapped_upside_down_moves_the_cursor_the_right_way(event
     gamepad.axis(3, -0.9)
     presses = [press for event in events.get() if (press := reader.read(event)) is not None]
     assert presses == [Press(Command.DOWN, gamepad.instance_id, moved=True)]
-    (held,) = gamepads
-    assert held.default_calibration() == StickCalibration(axes=(2, 3), invert=(False, True))
-    assert held.force(held.sample(0), held.default_calibration())[1] == pytest.approx(0.886, abs=1e-3)
+    (opened,) = gamepads
+    assert opened.default_calibration() == StickCalibration(axes=(2, 3), invert=(False, True))
+    assert opened.force(opened.sample(0), opened.default_calibration())[1] == pytest.approx(0.886, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -120,28 +120,28 @@ def test_buttons_of_an_unknown_gamepad_go_by_their_numbers():
     ],
 )
 def test_everything_that_can_steer_is_on_offer(text, axes, hats, labels):
-    assert [one.label for one in steering_options(mapping(text), axes, hats)] == labels
+    assert [option.label for option in steering_options(mapping(text), axes, hats)] == labels
 
 
-def test_a_d_gamepad_of_buttons_steers(events):
+def test_a_d_pad_of_buttons_steers(events):
     gamepad = VirtualJoystick("Retro", product=5, axes=0, hats=0, mapping="a:b0,dpleft:b4,dpright:b5,dpup:b6,dpdown:b7")
-    (held,) = Gamepads()
-    calibration = held.default_calibration()
-    assert held.steering(calibration).digital
+    (opened,) = Gamepads()
+    calibration = opened.default_calibration()
+    assert opened.steering(calibration).digital
     gamepad.button(5, True)
     gamepad.button(6, True)
     events.get()
-    assert held.force(held.sample(0), calibration) == pytest.approx((0.5**0.5, -(0.5**0.5)))
+    assert opened.force(opened.sample(0), calibration) == pytest.approx((0.5**0.5, -(0.5**0.5)))
 
 
 def test_a_calibration_of_axes_that_a_gamepad_lacks_is_not_its_own(events, tmp_path):
     gamepad = VirtualJoystick("Plain", product=6, axes=0, mapping=None)
     store = CalibrationStore(tmp_path)
     store.put(gamepad.guid, StickCalibration(axes=(2, 3), dead_zone=0.3))
-    (held,) = Gamepads()
-    assert store.for_gamepad(held).axes == (0, 1)
+    (opened,) = Gamepads()
+    assert store.for_gamepad(opened).axes == (0, 1)
     store.put(gamepad.guid, StickCalibration(dead_zone=0.3))
-    assert store.for_gamepad(held).dead_zone == 0.3
+    assert store.for_gamepad(opened).dead_zone == 0.3
 
 
 # The user's file
@@ -157,15 +157,15 @@ def test_a_line_of_the_communitys_list_is_for_every_gamepad_of_its_numbers(tmp_p
     path.write_text("\r\n".join(lines), encoding="utf-8-sig")
     store = MappingStore(tmp_path)
     with_name = f"{SONY[:4]}ab12{SONY[8:]}"
-    found = store.get(with_name)
-    assert found is not None
-    assert found.control_of_button(9) == "start"
+    stored = store.get(with_name)
+    assert stored is not None
+    assert stored.control_of_button(9) == "start"
     assert store.get(NINTENDO) is None  # of another system
     store.put(OTHER, mapping("a:b4"))
     store.put(OTHER, mapping("a:b5,leftx:a1~", name="A, B"))
-    again = MappingStore(tmp_path).get(OTHER)
-    assert again is not None
-    assert (again.name, again.control_of_button(5), again.source) == ("A  B", "a", "user")
+    reread = MappingStore(tmp_path).get(OTHER)
+    assert reread is not None
+    assert (reread.name, reread.control_of_button(5), reread.source) == ("A  B", "a", "user")
     assert path.read_text(encoding="utf-8").splitlines() == [*lines, f"{OTHER},A  B,a:b5,leftx:a1~,"]
 
 
@@ -191,11 +191,11 @@ def test_a_damaged_line_is_named(tmp_path, line, found):
 def test_the_users_mapping_goes_before_sdls(events, tmp_path):
     gamepad = VirtualJoystick("Alpha pad", product=1)
     store = MappingStore(tmp_path)
-    (held,) = Gamepads(store)
-    assert (held.mapping.source, held.mapping.control_of_button(7)) == ("sdl", "start")
+    (opened,) = Gamepads(store)
+    assert (opened.mapping.source, opened.mapping.control_of_button(7)) == ("sdl", "start")
     store.put(gamepad.guid, mapping("a:b3,b:b4,leftx:a0,lefty:a1"))
-    (held,) = Gamepads(MappingStore(tmp_path))
-    assert (held.mapping.source, held.mapping.control_of_button(7), held.mapping.control_of_button(3)) == (
+    (opened,) = Gamepads(MappingStore(tmp_path))
+    assert (opened.mapping.source, opened.mapping.control_of_button(7), opened.mapping.control_of_button(3)) == (
         "user",
         None,
         "a",

@@ -93,5 +93,9 @@ def test_an_episode_of_one_device_is_flagged_and_found_by_check(tmp_path, capsys
     (path,) = tmp_path.rglob("*.mcap")
     assert "identical_actions" in flags(path)
     assert check(["check", str(path.parent), "--json"]) == 1
-    found = [one for one in json.loads(capsys.readouterr().out)["findings"] if one["rule"] == "identical"]
-    assert [(one["severity"], one["episode"], one["figure"]) for one in found] == [("error", path.name, 1.0)]
+    findings = [
+        finding for finding in json.loads(capsys.readouterr().out)["findings"] if finding["rule"] == "identical"
+    ]
+    assert [(finding["severity"], finding["episode"], finding["figure"]) for finding in findings] == [
+        ("error", path.name, 1.0)
+    ]

@@ -43,24 +43,24 @@ def test_a_session_continues_until_it_is_complete(tmp_path):
     first = SessionFolder(tmp_path, "P01", FIXED, 2)
     assert (first.path.name, first.continued) == ("P01-01", False)
     _record(first)
-    again = SessionFolder(tmp_path, "P01", FIXED, 2)
-    assert (again.path, again.session_id, again.continued) == (first.path, first.session_id, True)
-    assert again.next_path().name == "episode_001.mcap"
-    _record(again)
+    continued = SessionFolder(tmp_path, "P01", FIXED, 2)
+    assert (continued.path, continued.session_id, continued.continued) == (first.path, first.session_id, True)
+    assert continued.next_path().name == "episode_001.mcap"
+    _record(continued)
     assert SessionFolder(tmp_path, "P01", FIXED, 2).path.name == "P01-02"
 
 
 def test_another_pair_has_sessions_of_its_own_but_shares_the_counts(tmp_path):
     first = SessionFolder(tmp_path, "P01", FIXED, 2)
     _record(first, seating=1)
-    other = SessionFolder(tmp_path, "P02", FIXED, 2)
-    assert other.path.name == "P02-01"
-    assert other.counts.kept == Counter({("training-00", 1): 1})
-    assert other.counts.kept_in_session.total() == 0
+    partner_session = SessionFolder(tmp_path, "P02", FIXED, 2)
+    assert partner_session.path.name == "P02-01"
+    assert partner_session.counts.kept == Counter({("training-00", 1): 1})
+    assert partner_session.counts.kept_in_session.total() == 0
 
 
 @pytest.mark.parametrize(
-    ("changes", "kept", "tried"),
+    ("changes", "kept", "attempted"),
     [
         ({}, 1, 1),
         ({"discarded": True}, 0, 1),
@@ -69,11 +69,11 @@ def test_another_pair_has_sessions_of_its_own_but_shares_the_counts(tmp_path):
         ({"reason": "crash_recovered"}, 0, 1),
     ],
 )
-def test_what_counts_is_what_was_played_to_its_end_and_kept(tmp_path, changes, kept, tried):
+def test_what_counts_is_what_was_played_to_its_end_and_kept(tmp_path, changes, kept, attempted):
     folder = SessionFolder(tmp_path, "P01", FIXED, 2)
     _record(folder, **changes)
     counts = SessionFolder(tmp_path, "P01", FIXED, 2).counts
-    assert (counts.kept_in_session.total(), counts.attempted.total()) == (kept, tried)
+    assert (counts.kept_in_session.total(), counts.attempted.total()) == (kept, attempted)
 
 
 def test_an_undone_keep_is_no_recording_any_more(tmp_path):

@@ -59,11 +59,13 @@ def test_a_step_is_a_thirtieth_of_a_second(tmp_path):
     timings = messages["/loop/timing"]
     assert episode.meta.success
     assert len(timings) == len(episode.actions)
-    scheduled = np.array([one.scheduled_ns for one in timings])
-    assert scheduled[-1] - scheduled[0] == (len(timings) - 1 + sum(one.skipped_ticks for one in timings)) * DT_NS
-    assert [one.axes[0] for one in messages["/player/0/input"]] == list(range(1, len(timings) + 1))
+    scheduled = np.array([message.scheduled_ns for message in timings])
+    assert (
+        scheduled[-1] - scheduled[0] == (len(timings) - 1 + sum(message.skipped_ticks for message in timings)) * DT_NS
+    )
+    assert [message.axes[0] for message in messages["/player/0/input"]] == list(range(1, len(timings) + 1))
     assert episode.meta.achieved_hz == pytest.approx(30, abs=1.0)
-    assert all(one.work_ns > 0 for one in timings)
+    assert all(message.work_ns > 0 for message in timings)
     assert frames == 0
 
 
@@ -73,15 +75,15 @@ def test_a_loop_that_falls_behind_skips_ticks_and_says_so(tmp_path):
     episode, messages, _ = _play(tmp_path, slow, Puller(), clock, headless=True)
     timings = messages["/loop/timing"]
     # 150 ms are four ticks and a half: three are let go after each hold-up, none is caught up.
-    skipped = {one.step: one.skipped_ticks for one in timings if one.skipped_ticks}
+    skipped = {message.step: message.skipped_ticks for message in timings if message.skipped_ticks}
     assert skipped == {21: 3, 41: 3}
-    assert np.diff([one.start_ns for one in timings]).min() > 0.2 * DT_NS
+    assert np.diff([message.start_ns for message in timings]).min() > 0.2 * DT_NS
     assert "slow_loop" in episode.meta.quality_flags.split(",")
     assert episode.meta.achieved_hz < 29
     (loop,) = [event.detail for event in messages["/episode/event"] if event.kind == "loop"]
     assert f"skipped {sum(skipped.values())}" in loop
     # Each step has a reading of its own.
-    assert [one.axes[0] for one in messages["/player/0/input"]] == list(range(1, len(timings) + 1))
+    assert [message.axes[0] for message in messages["/player/0/input"]] == list(range(1, len(timings) + 1))
 
 
 def test_an_error_in_a_player_leaves_a_marked_recording(tmp_path):

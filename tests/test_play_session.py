@@ -22,9 +22,9 @@ from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopT
 @pytest.fixture
 def gamepads():
     pygame.display.init()
-    made = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
-    yield made
-    for gamepad in made:
+    virtual = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    yield virtual
+    for gamepad in virtual:
         gamepad.unplug()
     pygame.joystick.quit()
 
@@ -101,11 +101,11 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, gamepads):
         # In the middle of it somebody pulls the cable.
         b.unplug()
         players.phase("Paused")
-        held = game.trial.steps
+        steps = game.trial.steps
         players.press(a, A)  # nobody can go on without a device
         players.sleep(0.3)
         assert type(players.application.phase).__name__ == "Paused"
-        assert game.trial.steps == held
+        assert game.trial.steps == steps
         spare.append(VirtualJoystick("Beta pad", product=2))
         assert spare[0].instance_id != b.instance_id
         players.press(spare[0], A)  # joins again
@@ -164,15 +164,15 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, gamepads):
     path = folder / "episode_001.mcap"
     inputs = _messages(path, "/player/1/input", PlayerInput)
     timings = _messages(path, "/loop/timing", LoopTiming)
-    assert [one.step for one in inputs] == [one.step for one in timings] == list(range(len(kept.actions)))
-    raw = np.array([one.axes[:2] for one in inputs])
+    assert [record.step for record in inputs] == [record.step for record in timings] == list(range(len(kept.actions)))
+    raw = np.array([record.axes[:2] for record in inputs])
     size = np.hypot(*raw.T)
     deflected = size > 0.13
     assert deflected.sum() > 20
     expected = raw * np.where(deflected, (size - 0.12) / 0.88 / np.maximum(size, 1e-9), 0.0)[:, None]
     np.testing.assert_allclose(kept.actions[:, 2:][deflected], np.clip(expected, -1, 1)[deflected], atol=1e-9)
-    assert max(one.age_ns for one in inputs) < DT_NS
-    starts = np.array([one.start_ns for one in timings])
+    assert max(record.age_ns for record in inputs) < DT_NS
+    starts = np.array([record.start_ns for record in timings])
     assert np.diff(starts).min() > 0
 
     def second_day(players):

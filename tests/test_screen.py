@@ -54,8 +54,8 @@ def test_everything_stands_where_it_is_at_any_size(size):
         ((960.0 - 40.0, 180.0 - 40.0), palette.mix(palette.GREEN, palette.FLOOR, 0.62)),
         ((1100.0, 525.0), palette.FLOOR),
     ):
-        found = _colour(surface, view.to_screen(point))
-        assert _close(found, colour), (point, found, colour)
+        drawn = _colour(surface, view.to_screen(point))
+        assert _close(drawn, colour), (point, drawn, colour)
     assert sum(_colour(surface, view.to_screen((600.0, 450.0)))) < 320, "an obstacle is dark"
 
 
