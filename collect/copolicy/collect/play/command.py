@@ -9,11 +9,11 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
+from ..angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
 from .settings import PlayerSpec, PlaySettings
 
 _COPIED_FLAGS = (
@@ -51,7 +51,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "(default: the connected gamepads, else the keyboard)",
     )
     add_task_flag(command)
-    add_maps_flag(command, "training", given=False)
+    add_maps_flag(command, "training", use_default=False)
     command.add_argument("--orientations", action="store_true", help="use each map with four start orientations")
     command.add_argument(
         "--episodes",
@@ -105,7 +105,7 @@ def settings_from_flags(arguments: argparse.Namespace) -> PlaySettings:
     return PlaySettings(
         **{name: getattr(arguments, name) for name in _COPIED_FLAGS},
         players=specs,
-        maps=set_name(task, arguments.maps, "training"),
+        maps=map_set_name(task, arguments.maps, "training"),
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
         angular_limit=_angular_limit(specs or (), arguments.angular_limit, task),
@@ -124,7 +124,7 @@ def _angular_limit(specs: Iterable[PlayerSpec], flag: str | None, task: PairTask
     task = task or get_task()
     defaults = task.settings_type()
     default_limit = angular_limit_of(defaults)
-    flag_limit = None if flag is None else angular_limit_of(limited(task, defaults, flag))
+    flag_limit = None if flag is None else angular_limit_of(with_angular_limit(task, defaults, flag))
     trained: dict[str, float] = {}
     for spec in specs:
         if spec.kind == "policy":
@@ -134,10 +134,10 @@ def _angular_limit(specs: Iterable[PlayerSpec], flag: str | None, task: PairTask
                 raise InvalidValueError(f"policy:{spec.detail}", expected, conditions.task)
             for note in conditions.notes:
                 logging.info("%s: %s", spec.detail, note)
-            settings = conditions.physics
+            settings = conditions.settings
             if default_limit is not None:
-                trained[spec.detail] = getattr(settings, LIMIT)
-                settings = limited(task, settings, default_limit)
+                trained[spec.detail] = getattr(settings, LIMIT_SETTING)
+                settings = with_angular_limit(task, settings, default_limit)
             if settings != defaults:
                 logging.warning("%s: trained with other physics than those of play: %s", spec.detail, settings)
     if flag_limit is None:

@@ -127,7 +127,7 @@ def replayed_scenario(players: Iterable[SeatedPlayer]) -> Any | None:
     Raises:
         InvalidValueError: two recordings have different scenarios.
     """
-    scenarios = {player.agent.map_config for player in players if isinstance(player.agent, ReplayAgent)}
+    scenarios = {player.agent.scenario for player in players if isinstance(player.agent, ReplayAgent)}
     if len(scenarios) > 1:
         raise InvalidValueError("--players", "replays of one map", sorted(scenario.digest for scenario in scenarios))
     return scenarios.pop() if scenarios else None
@@ -137,7 +137,7 @@ def warn_other_settings(players: Iterable[SeatedPlayer], settings: Any, task: Pa
     """Warns if a replayed recording has other world settings, under which its actions lead to other states."""
     for player in players:
         if isinstance(player.agent, ReplayAgent):
-            recorded = replace(player.agent.physics, step_limit=settings.step_limit)
+            recorded = replace(player.agent.settings, step_limit=settings.step_limit)
             if recorded != settings:
                 summaries = (physics_summary(recorded, task), physics_summary(settings, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", player.agent.name, *summaries)
@@ -146,7 +146,7 @@ def warn_other_settings(players: Iterable[SeatedPlayer], settings: Any, task: Pa
 def _agent(spec: PlayerSpec, task: PairTask, clock: Callable[[], int]) -> Agent:
     match spec.kind:
         case "scripted":
-            return ScriptedAgent.of_pair(spec.detail, task)
+            return ScriptedAgent.from_pair(spec.detail, task)
         case "replay":
             return ReplayAgent(Path(spec.detail), task)
         case "policy":

@@ -11,8 +11,8 @@ from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import TABLE, get_task
 
-from ..agents.simulated import pair_name
-from ..angular_limit import angular_limit_of, limited
+from ..agents.simulated_players import pair_name
+from ..angular_limit import angular_limit_of, with_angular_limit
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 PLAYER_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
@@ -124,7 +124,7 @@ class PlaySettings:
         """Settings of the world."""
         task = get_task(self.task)
         defaults = task.settings_type()
-        return defaults if self.angular_limit is None else limited(task, defaults, self.angular_limit)
+        return defaults if self.angular_limit is None else with_angular_limit(task, defaults, self.angular_limit)
 
     @functools.cached_property
     def scenario_set(self) -> ScenarioSet:

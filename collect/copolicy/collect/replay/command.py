@@ -64,12 +64,12 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument(
         "--max-drift-px",
-        type=number("--max-drift-px", above=True),
+        type=number("--max-drift-px", exclusive=True),
         help="for --verify: largest position drift, px (default 0.01)",
     )
     command.add_argument(
         "--max-drift-rad",
-        type=number("--max-drift-rad", above=True),
+        type=number("--max-drift-rad", exclusive=True),
         help="for --verify: largest orientation drift, rad (default 0.0001)",
     )
 
