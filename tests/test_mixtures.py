@@ -16,8 +16,8 @@ from checked_data import EPISODES, FRAMES, make_data_set, set_columns, set_frame
 from loaded_sets import load
 
 from copolicy.cards.cli import main as cards
-from copolicy.collect.play.player import make_players, say_other_physics
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.player import make_players, warn_other_settings
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main
@@ -242,11 +242,11 @@ def test_the_card_states_the_physics(copied):
 
 def test_a_replay_of_another_physics_is_reported(folders, caplog):
     path = sorted((folders / "raw" / "eighth").glob("*.mcap"))[0]
-    specs = (PilotSpec.parse(f"replay:{path}"), PilotSpec.parse("scripted"))
+    specs = (PlayerSpec.parse(f"replay:{path}"), PlayerSpec.parse("scripted"))
     players = make_players("P01", specs, ("", ""))
-    say_other_physics(players, EIGHTH)
+    warn_other_settings(players, EIGHTH)
     assert caplog.messages == []
-    say_other_physics(players, HALF)
+    warn_other_settings(players, HALF)
     assert caplog.messages == [
         f"warning: replay:{path.stem} was recorded with {EIGHTH_WORDS}, this session has {HALF_WORDS}"
     ]
