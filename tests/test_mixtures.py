@@ -22,7 +22,7 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.physics_text import physics_text

@@ -17,7 +17,7 @@ from .artefacts import newest_release
 from .datasheet import datasheet
 from .facts import DatasetFacts
 from .findings import findings
-from .markdown import count_text, missing_part_note, table
+from .formatting import count_text, missing_part_note, table
 from .multimodality import multimodality
 
 _UPSTREAM = (
