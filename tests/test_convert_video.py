@@ -245,7 +245,7 @@ def test_training_opens_no_video(folders, tmp_path, monkeypatch, capsys):
     flags = [f"--dataset.root={folders / 'a'}", f"--output_dir={out}", "--steps=2", "--batch_size=8", *small]
     assert train(flags) == 0
     error = capsys.readouterr().err
-    assert f"The policy does not look at {SCENE}: no video is decoded" in error
+    assert f"The policy does not observe {SCENE}: no video is decoded" in error
     assert "LeRobot's own loader" not in error
     assert (out / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
     with pytest.raises(AssertionError, match="a video was decoded"):  # what the check would have seen

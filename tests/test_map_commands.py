@@ -205,7 +205,7 @@ def test_the_environment_starts_on_the_maps_of_a_split(tmp_path):
 
     path = write_lab(tmp_path)
     assert TableCarryingEnvConfig(map_set=f"{path}#train").map_set == f"{path}#train"
-    assert len(TableCarryingEnv(map_set=f"{path}#train").maps) == 3
-    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).maps) == 8
+    assert len(TableCarryingEnv(map_set=f"{path}#train").scenarios) == 3
+    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).scenarios) == 8
     with pytest.raises(CopolicyError, match="unknown split"):
         TableCarryingEnvConfig(map_set=f"{path}#valid")
