@@ -9,11 +9,11 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
+from ..angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
 from .settings import PilotSpec, PlaySettings
 
 _AS_GIVEN = (
@@ -52,7 +52,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "(default: the joysticks that are plugged in, the keyboard beside them)",
     )
     add_task_flag(command)
-    add_maps_flag(command, "training", given=False)
+    add_maps_flag(command, "training", use_default=False)
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument(
         "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"
@@ -103,7 +103,7 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
     return PlaySettings(
         **{name: getattr(arguments, name) for name in _AS_GIVEN},
         pilots=pilots,
-        maps=set_name(task, arguments.maps, "training"),
+        maps=map_set_name(task, arguments.maps, "training"),
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
         angular_limit=_angular_limit(pilots or (), arguments.angular_limit, task),
@@ -122,7 +122,7 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
     task = task or get_task()
     usual = task.settings_type()
     bound = angular_limit_of(usual)
-    given = None if flag is None else angular_limit_of(limited(task, usual, flag))
+    given = None if flag is None else angular_limit_of(with_angular_limit(task, usual, flag))
     learned: dict[str, float] = {}
     for pilot in pilots:
         if pilot.kind == "policy":
@@ -132,10 +132,10 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
                 raise InvalidValueError(f"policy:{pilot.detail}", expected, conditions.task)
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
-            rest = conditions.physics
+            rest = conditions.settings
             if bound is not None:
-                learned[pilot.detail] = getattr(conditions.physics, LIMIT)
-                rest = limited(task, rest, bound)
+                learned[pilot.detail] = getattr(conditions.settings, LIMIT_SETTING)
+                rest = with_angular_limit(task, rest, bound)
             if rest != usual:
                 logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)
     if given is None:
