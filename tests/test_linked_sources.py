@@ -56,9 +56,9 @@ def test_a_conversion_enters_links(folders, linked, tmp_path):
 
 
 def test_a_recording_counts_once_however_it_is_named(folders, linked, tmp_path):
-    folders = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
+    sources = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
     arguments = ["--out", str(tmp_path / "set"), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
-    assert convert(["mcap", *folders, *arguments]) == 0
+    assert convert(["mcap", *sources, *arguments]) == 0
     assert contents(tmp_path / "set") == contents(folders / "whole")
 
 

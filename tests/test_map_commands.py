@@ -142,8 +142,8 @@ def test_recordings_say_which_file_their_map_is_of(walked):
 
 
 def test_a_data_set_of_a_file_is_checked_and_described(walked, capsys):
+    from copolicy.cards.episode_frames import read_frames
     from copolicy.cards.facts import DatasetFacts
-    from copolicy.cards.frames import read_frames
     from copolicy.dataset.checks.checking import check_dataset
 
     findings = check_dataset(walked / "set").findings

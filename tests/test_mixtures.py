@@ -22,7 +22,7 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.physics_text import physics_text
@@ -190,7 +190,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(folders, tmp_path):
         recorded[episode.meta.episode_uuid] = episode
     differ = 0
     for episode, physics in zip(source.episodes(), [EIGHTH] * 2 + [HALF] * 3, strict=True):
-        assert episode.physics == physics == recorded[episode.meta["episode_uuid"]].physics
+        assert episode.settings == physics == recorded[episode.meta["episode_uuid"]].physics
         steps = round(episode.meta["duration_s"] * 30) - 3 * (len(episode) - 1)
         last, action = episode.states[-1].astype(float), episode.actions[-1].astype(float)
         expected = turned(physics, last, action, steps)
@@ -211,7 +211,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(folders, tmp_path):
     start = 0
     for episode, end in zip(source.episodes(), ends, strict=True):
         state, action = episode.states[0].astype(float), episode.actions[0].astype(float)
-        np.testing.assert_allclose(obs[start, :7], turned(episode.physics, state, action, 1), rtol=1e-6, atol=1e-5)
+        np.testing.assert_allclose(obs[start, :7], turned(episode.settings, state, action, 1), rtol=1e-6, atol=1e-5)
         start = end
     with h5py.File(tmp_path / "a.hdf5", "r") as file:
         assert json.loads(str(file["data"].attrs["copolicy"]))["physics"] == counts
