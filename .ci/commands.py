@@ -2,12 +2,12 @@
 
 Every line of a ```bash block is a command. What a document says about its own blocks stands in a comment before them:
 
-* `<!-- not run: REASON -->`: the next block needs people, a network or hours; it is left out, and that is said.
+* `<!-- not run: REASON -->`: the next block needs people, a network or hours; it is skipped with a line of output.
 * `<!-- file: NAME -->`: the next block is the content of a file that the commands after it read.
-* `<!-- findings -->`: exit status 1, by which a command says that it found something, is no failure.
+* `<!-- findings -->`: exit status 1 (the command has findings) is no failure in the next block.
 * `<!-- hub -->`: the next block talks to the Hub; here, to a small Hub on this machine (`tests/local_hub.py`).
 
-Further flags of `play` are kept, but people are not to be had: simulated ones play one episode, without a window.
+`play` runs one episode with scripted agents in the place of people, without a window; its other flags stay.
 """
 
 import os
@@ -15,6 +15,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,10 +68,10 @@ def run(document: Path, folder: Path, hub: dict[str, str]) -> int:
         if block.kind == "file":
             (folder / block.detail).write_text(block.text, encoding="utf-8")
         elif block.language == "bash" and block.kind == "not run":
-            print(f"left out, {block.detail}: {' ; '.join(block.text.splitlines())}", flush=True)
+            print(f"{document}: not run ({block.detail}): {' ; '.join(block.text.splitlines())}", flush=True)
         elif block.language == "bash":
             for command in commands(block):
-                print(f"$ {command}", flush=True)
+                print(f"{document}$ {command}", flush=True)
                 environment = {**os.environ, **hub} if block.kind == "hub" else offline
                 done = subprocess.run(
                     ["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
@@ -83,16 +84,25 @@ def run(document: Path, folder: Path, hub: dict[str, str]) -> int:
 
 
 def main(folder: Path, documents: list[Path]) -> None:
-    """Runs documents one after the other."""
+    """Runs documents, as many at once as there are cores; the first failure ends the run."""
     sys.path.append(str(ROOT / "tests"))
     from local_hub import LocalHub
 
-    for number, document in enumerate(documents):
-        workplace = folder / str(number)
+    def run_alone(document: Path) -> None:
+        workplace = folder / document.as_posix().replace("/", "-")
         workplace.mkdir(parents=True)
         with LocalHub() as hub:
             count = run(document, workplace, hub.environment(workplace / "home"))
         print(f"{document}: {count} commands ran", flush=True)
+
+    with ThreadPoolExecutor(os.cpu_count()) as workers:
+        started = [workers.submit(run_alone, document) for document in documents]
+        try:
+            for future in as_completed(started):
+                future.result()
+        except BaseException:
+            workers.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 if __name__ == "__main__":
