@@ -79,8 +79,8 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
     assert max(rows["replay_drift_px"]) < 1e-6
     episode = read_episode(recordings / "a" / "episode_1.mcap")
     for name, column in frame_columns(episode, 10).items():
-        found = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
-        assert np.array_equal(found, column), name
+        stored = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
+        assert np.array_equal(stored, column), name
     for name in EPISODE_COLUMNS:
         if name not in ("license", "replay_drift_px", "achieved_hz"):
             assert rows[1][name] == getattr(episode.meta, name)
@@ -112,7 +112,7 @@ def test_a_damaged_file_stops_all(recordings, tmp_path, capsys):
     assert convert(recordings, tmp_path / "set") == 1
     captured = capsys.readouterr()
     assert captured.err.startswith(f"copolicy-convert: {path}: expected an intact and complete MCAP file, found ")
-    assert captured.err.endswith("; nothing was written (--skip-damaged leaves such files out)\n")
+    assert captured.err.endswith("; nothing was written (--skip-damaged skips such files)\n")
     assert captured.err.count("\n") == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["recordings"]
 

@@ -38,14 +38,14 @@ def write_zarr(folder: Path, array: np.ndarray, chunks, compressor=None, order="
         "dimension_separator": separator,
     }
     (folder / ".zarray").write_text(json.dumps({**metadata, **changes}), encoding="utf-8")
-    for place in itertools.product(*(range(math.ceil(s / c)) for s, c in zip(array.shape, chunks, strict=True))):
-        if place in skip:
+    for index in itertools.product(*(range(math.ceil(s / c)) for s, c in zip(array.shape, chunks, strict=True))):
+        if index in skip:
             continue
         chunk = np.zeros(chunks, array.dtype)
-        part = array[tuple(slice(i * c, (i + 1) * c) for i, c in zip(place, chunks, strict=True))]
-        chunk[tuple(map(slice, part.shape))] = part
+        block = array[tuple(slice(i * c, (i + 1) * c) for i, c in zip(index, chunks, strict=True))]
+        chunk[tuple(map(slice, block.shape))] = block
         data = chunk.tobytes(order=order)
-        file = folder / separator.join(map(str, place))
+        file = folder / separator.join(map(str, index))
         file.parent.mkdir(exist_ok=True)
         file.write_bytes(bytes(get_codec(dict(compressor)).encode(data)) if compressor else data)  # pyright: ignore
 

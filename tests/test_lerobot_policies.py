@@ -67,7 +67,7 @@ def test_a_chunk_is_that_of_lerobots_own_batch(runs, name, frames, longest):
     expected = policy._postprocess(policy.policy.predict_action_chunk(policy._preprocess(batch)))
     np.testing.assert_array_equal(chunk, expected.detach().numpy())
     policy.reset(5)
-    policy.wanted = 3
+    policy.n_predicted_actions = 3
     np.testing.assert_array_equal(policy.predict_action_chunk(seen), chunk[:, :3])
 
 

@@ -150,7 +150,7 @@ def test_a_data_set_of_a_file_is_checked_and_described(walked, capsys):
     assert {finding.rule for finding in findings if finding.severity == "error"} <= {"license"}
     assert not [finding for finding in findings if finding.rule.startswith(("map_", "obstacle_size"))]
     facts = DatasetFacts.read(walked / "set")
-    sizes = {row["map_id"]: frames.map_config.sizes for row, frames in zip(facts.episodes, read_frames(facts))}  # noqa: B905
+    sizes = {row["map_id"]: frames.scenario.sizes for row, frames in zip(facts.episodes, read_frames(facts))}  # noqa: B905
     assert sizes["lab-doors-wide"] == (120, 60)
 
 
@@ -205,7 +205,7 @@ def test_the_environment_starts_on_the_maps_of_a_split(tmp_path):
 
     path = write_lab(tmp_path)
     assert TableCarryingEnvConfig(map_set=f"{path}#train").map_set == f"{path}#train"
-    assert len(TableCarryingEnv(map_set=f"{path}#train").maps) == 3
-    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).maps) == 8
+    assert len(TableCarryingEnv(map_set=f"{path}#train").scenarios) == 3
+    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).scenarios) == 8
     with pytest.raises(CopolicyError, match="unknown split"):
         TableCarryingEnvConfig(map_set=f"{path}#valid")

@@ -159,7 +159,7 @@ def test_another_projects_file_is_named_as_such(source, tmp_path, options, caplo
     assert status == 1
     assert [(one["rule"], one["message"]) for one in document["findings"]] == [("foreign", expected)]
     status, _, lines = run(convert, "mcap", folder, "--out", tmp_path / "set", "--repo-id", "lab/x")
-    skip = "nothing was written (--skip-damaged leaves such files out)"
+    skip = "nothing was written (--skip-damaged skips such files)"
     assert (status, lines) == (1, [f"copolicy-convert: {line}; {skip}"])
     assert list(recordings(folder)) == []
     assert "not counted: " in caplog.text

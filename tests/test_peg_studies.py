@@ -112,7 +112,7 @@ def test_a_human_study_is_planned_run_and_summarised(runs, tmp_path, capsys):
     content = json.loads(path.read_text(encoding="utf-8"))
     assert (content["task"], content["step_limit"], "angular_acceleration_limit" in content) == ("peg", 60, False)
     plan = StudyPlan.read(path)
-    assert plan.physics == get_task("peg").settings_type(step_limit=60)
+    assert plan.world_settings == get_task("peg").settings_type(step_limit=60)
     assert plan.configurations == tuple(get_task("peg").scenario_sets["right"])
     session = ["--participant", "P01", "--human", "scripted:lazy", "--headless", "--practice", "0", "--countdown", "0"]
     assert main(["human", "run", str(path), "--out", str(out), *session]) == 0

@@ -23,7 +23,7 @@ from copolicy.collect.rollout import Start
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.evaluate.human_study.plan import StudyPlan
-from copolicy.evaluate.study_flags import protocol_of
+from copolicy.evaluate.study_flags import study_protocol
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
@@ -172,13 +172,13 @@ def _arguments(**values) -> Namespace:
 def test_policies_that_learned_under_different_physics_need_a_decision():
     usual, slow = TrainingConditions(10, Physics()), TrainingConditions(30, SLOW)
     with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected a choice"):
-        protocol_of(_arguments(), [("one", usual), ("other", slow)])
-    protocol = protocol_of(_arguments(angular_limit="pi/8"), [("one", usual), ("other", slow)])
-    assert protocol.physics == Physics(math.pi / 8, 2000)
+        study_protocol(_arguments(), [("one", usual), ("other", slow)])
+    protocol = study_protocol(_arguments(angular_limit="pi/8"), [("one", usual), ("other", slow)])
+    assert protocol.settings == Physics(math.pi / 8, 2000)
     assert protocol.fps == 10
-    assert protocol.told_otherwise == ("--angular-limit pi/8: one learned with 1.571 rad/s^2",)
+    assert protocol.contradictions == ("--angular-limit pi/8: one learned with 1.571 rad/s^2",)
     with pytest.raises(InvalidValueError, match=r"^fps: expected a divisor of 30"):
-        protocol_of(_arguments(), [("one", TrainingConditions(25, Physics()))])
+        study_protocol(_arguments(), [("one", TrainingConditions(25, Physics()))])
 
 
 def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from copolicy.cards.checkpoint import Checkpoint as CardCheckpoint
+from copolicy.cards.checkpoint_facts import CheckpointFacts
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.policies.training_run import find_policy_folder
@@ -50,7 +50,7 @@ def test_a_run_copied_without_links_is_found_by_its_highest_number(run, make_las
     expected = run / "checkpoints" / "1000000" / "pretrained_model"
     for path in (run, run / "checkpoints", last, last / "pretrained_model"):
         assert checkpoint_folder(path) == expected
-        assert CardCheckpoint.read(path).folder == expected
+        assert CheckpointFacts.read(path).folder == expected
 
 
 def test_a_link_is_followed_and_a_checkpoint_that_is_named_is_taken(run):

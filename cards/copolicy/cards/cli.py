@@ -1,4 +1,4 @@
-"""`copolicy-cards`: what a data set or a model tells its readers."""
+"""`copolicy-cards`: writes cards, figures and a report page from the files of a data set or a model."""
 
 import argparse
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
     dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
     dataset.add_argument("--pretty-name", help="title of the card (default: the data set's name)")
-    dataset.add_argument("--no-figures", action="store_true", help="draw no pictures")
+    dataset.add_argument("--no-figures", action="store_true", help="write no figures")
     dataset.add_argument(
         "--croissant",
         action="store_true",
@@ -56,18 +56,18 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
         "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
         (*TABLES, *HUB, *FIGURES),
     )
-    model.add_argument("checkpoint", type=Path, help="checkpoint folder, or that of a run (its last checkpoint)")
+    model.add_argument("checkpoint", type=Path, help="folder of a checkpoint or training run (last checkpoint)")
     model.add_argument(
         "--eval",
         action="append",
         type=Path,
         default=[],
         metavar="FILE",
-        help="result of copolicy-eval (default: those that an exported policy keeps)",
+        help="result of copolicy-eval (default: the results stored with an exported policy)",
     )
-    model.add_argument("--dataset", type=Path, help="folder of its training data (default: where training found it)")
+    model.add_argument("--dataset", type=Path, help="folder of the training data (default: as used in training)")
     model.add_argument("--repo-id", default="local/copolicy", help="user/name on the Hub (default: local/copolicy)")
-    model.add_argument("--license", help="Hub identifier of the licence of the weights (default: none is stated)")
+    model.add_argument("--license", help="Hub identifier of the licence of the weights (default: not stated)")
     model.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
 
 
@@ -84,9 +84,9 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     path = arguments.root / "README.md"
     require_new(path, overwrite=arguments.overwrite or is_minimal_card(path))
     if arguments.croissant and not arguments.repo_id:
-        raise InvalidValueError("--repo-id", "user/name with --croissant, which says where the data are", None)
+        raise InvalidValueError("--repo-id", "user/name with --croissant, which states the data's location", None)
     repo_id = arguments.repo_id or local_repo_id(arguments.root)
-    render(facts, repo_id, arguments.pretty_name)  # what is wrong with the call shows before pictures are drawn
+    render(facts, repo_id, arguments.pretty_name)  # raises errors in the arguments before figures are drawn
     figures = []
     if not arguments.no_figures:
         from .figures import save_figures
@@ -103,13 +103,13 @@ def _dataset(arguments: argparse.Namespace) -> dict:
 def _model(arguments: argparse.Namespace) -> dict:
     checked_repo_id(arguments.repo_id)
     checked_licence(arguments.license or "")
-    from .checkpoint import Checkpoint
+    from .checkpoint_facts import CheckpointFacts
     from .model_card import render_model_card
 
-    checkpoint = Checkpoint.read(arguments.checkpoint, arguments.dataset)
+    checkpoint = CheckpointFacts.read(arguments.checkpoint, arguments.dataset)
     path = checkpoint.folder / "README.md"
     require_new(path, overwrite=arguments.overwrite)
     evaluations = checkpoint.evaluations(arguments.eval)
     replace_text(path, render_model_card(checkpoint, evaluations, arguments.repo_id, arguments.license))
-    sources = checkpoint.data.sources or "not stated: the data set is not at hand"
+    sources = checkpoint.data.sources or "not stated: the data set was not found"
     return {"card": str(path), "evaluations": len(evaluations), "trained_on": sources}

@@ -1,4 +1,4 @@
-"""The frames of a data set, episode by episode: what figures and the report are drawn from."""
+"""Reads the frames of a data set episode by episode, for figures and the report."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,31 +21,29 @@ class EpisodeFrames:
         index: `episode_index`.
         states: `(T, n)`, as the task's spec names them.
         actions: `(T, m)`, robot first.
-        map_config: the scenario.
+        scenario: scenario of the episode.
     """
 
     index: int
     states: np.ndarray
     actions: np.ndarray
-    map_config: Any
+    scenario: Any
     task: PairTask
 
     @property
     def interaction(self) -> np.ndarray | None:
-        """`(T,)` the task's interaction measure, None where it has none.
+        """The task's interaction measure `(T,)`, None if it has none.
 
-        It is defined with the state after the step, which is that of the next frame; the last frame has none and uses
-        its own.
+        The measure uses the state after the step, here the state of the next frame; the last frame uses its own state.
         """
         return self.task.interaction(np.vstack((self.states[1:], self.states[-1:])), self.actions)
 
 
 def read_frames(facts: DatasetFacts) -> Iterator[EpisodeFrames]:
-    """The episodes' frames in order, one data file in memory at a time.
+    """Yields the episodes' frames in order, one data file in memory at a time.
 
     Raises:
-        FileFormatError: a data file is missing, damaged, without the columns of this task, or holds other episodes
-            than meta/episodes says.
+        FileFormatError: a data file is missing or damaged, lacks columns of the task, or contradicts meta/episodes.
     """
     features = features_of(facts.task.spec)
     shapes = {name: features[name]["shape"] for name in (STATE, ENVIRONMENT_STATE, ACTION)}

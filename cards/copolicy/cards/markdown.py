@@ -1,4 +1,4 @@
-"""Pieces of Markdown that the cards are made of."""
+"""Formats Markdown and numbers for the cards."""
 
 from collections.abc import Iterable
 
@@ -6,30 +6,30 @@ from copolicy.dataset.task import PairTask
 
 
 def table(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
-    """A table; what a cell holds cannot end it."""
+    """A table; pipes in cells are escaped."""
     head = list(header)
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
 
 
-def share(count: int, total: int) -> str:
+def count_text(count: int, total: int) -> str:
     """`5 of 6 (83.3 %)`."""
     return f"{count} of {total} ({100 * count / max(1, total):.1f} %)"
 
 
-def listing(counts: dict[str, int], most: int = 12) -> str:
-    """Values with how often each occurs; `not stated` for the empty one."""
+def counts_text(counts: dict[str, int], most: int = 12) -> str:
+    """Values with the number of occurrences; `not stated` for the empty value."""
     text = ", ".join(f"{value or 'not stated'} ({count})" for value, count in list(counts.items())[:most])
     return text + (f", and {len(counts) - most} more" if len(counts) > most else "")
 
 
-def left_out(task: PairTask, part: str) -> str:
-    """The sentence of a card or page that lacks what needs a part of the task."""
+def missing_part_note(task: PairTask, part: str) -> str:
+    """Sentence for a card or page on the contents left out because the task lacks a part."""
     return f"L{task.missing(part)[1:]}."
 
 
-def number(value: object) -> str:
-    """Four significant digits; a dash where there is none."""
+def format_number(value: object) -> str:
+    """A number with four significant digits; a dash for None."""
     if value is None:
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,7 +1,4 @@
-"""The routes in stored statistics: how mixed they are in each configuration, and how far from those of people.
-
-Cards and the report show the same numbers; this is where both get them from.
-"""
+"""Reads the route statistics that cards and the report show: entropy by configuration, and distance from people."""
 
 import re
 from collections.abc import Iterable
@@ -12,7 +9,7 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
 
 _MIRROR = str.maketrans("LR", "RL")
-_PLAYED = {"human": "people", "simulated": "simulated pairs", "upstream": "pairs of the original's files"}
+_PLAYERS = {"human": "people", "simulated": "simulated pairs", "upstream": "pairs of the original's files"}
 
 
 @dataclass(frozen=True)
@@ -20,12 +17,12 @@ class HumanDistance:
     """Jensen-Shannon divergence from the human routes, for one number of obstacles.
 
     Attributes:
-        bits: 0 the same, 1 nothing in common; None where `note` says why not.
-        interval: 95 percent.
-        chance: low, mean and high of what two draws from one distribution would give.
-        routes: `word`, `ours` and `human` of each, how many episodes and human demonstrations took it, in the reading
-            of the human labels that is nearer.
-        reading: `as labelled`, or `mirrored` where the human L and R were exchanged.
+        bits: from 0 (equal) to 1 (disjoint); None with the reason in `note`.
+        interval: 95 % interval.
+        chance: low, mean and high of the null distribution (two samples of one distribution).
+        routes: for each route `word`, `ours` (episodes) and `human` (demonstrations), with the human labels read as in
+            `reading`.
+        reading: `as labelled`, or `mirrored` (human L and R exchanged), whichever gives the smaller divergence.
     """
 
     obstacles: int
@@ -43,14 +40,14 @@ class HumanDistance:
 
 @dataclass(frozen=True)
 class RouteStatistics:
-    """Everything about routes that a card or the report shows.
+    """The route statistics of a card or the report.
 
     Attributes:
-        entropy: the estimate over configurations, with `value`, `interval`, `definition` and `effective_modes`; None
-            where not stored.
-        configurations: name, episodes, counts, entropy and effective modes of each, most mixed first.
+        entropy: estimate over configurations, with `value`, `interval`, `definition` and `effective_modes`; None if not
+            stored.
+        configurations: name, episodes, counts, entropy and effective modes of each, highest entropy first.
         played_by: who played the episodes, in words.
-        human_source: where the human routes come from.
+        human_source: source of the human routes.
     """
 
     entropy: dict[str, Any] | None
@@ -60,12 +57,12 @@ class RouteStatistics:
     human_source: str
 
     def to_json(self) -> dict[str, Any]:
-        """For the page."""
+        """The statistics as data of the report page."""
         return asdict(self)
 
 
 def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
-    """The routes in `meta/copolicy_stats.json`, None where it holds nothing about them.
+    """Reads the route statistics of `meta/copolicy_stats.json`, None if it holds none.
 
     Raises:
         FileFormatError: a configuration without its routes.
@@ -73,15 +70,17 @@ def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
     family = stored.get("statistics", {}).get("routes")
     if not isinstance(family, dict):
         return None
-    stated = family.get("route_entropy")
-    details = (stated or {}).get("details", {})
+    entropy_entry = family.get("route_entropy")
+    details = (entropy_entry or {}).get("details", {})
     configurations = details.get("configurations", {})
-    without = [name for name, entry in configurations.items() if "counts" not in entry]
-    if without:
-        raise FileFormatError(STATISTICS_FILE, "routes of each configuration (run copolicy-dataset stats)", without[0])
+    incomplete = [name for name, entry in configurations.items() if "counts" not in entry]
+    if incomplete:
+        raise FileFormatError(
+            STATISTICS_FILE, "routes of each configuration (run copolicy-dataset stats)", incomplete[0]
+        )
     entropy = None
-    if stated is not None:
-        entropy = {name: entry for name, entry in stated.items() if name != "details"}
+    if entropy_entry is not None:
+        entropy = {name: entry for name, entry in entropy_entry.items() if name != "details"}
         entropy["effective_modes"] = details.get("effective_modes")
     distances = [
         _distance(int(name.split("_")[2]), entry)
@@ -90,7 +89,7 @@ def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
     ]
     return RouteStatistics(
         entropy,
-        tuple(_most_mixed_first({"name": name, **entry} for name, entry in configurations.items())),
+        tuple(_highest_entropy_first({"name": name, **entry} for name, entry in configurations.items())),
         tuple(sorted(distances, key=lambda distance: distance.obstacles)),
         played_by(stored.get("dataset", {}).get("sources", {})),
         stored.get("human_reference", {}).get("source", ""),
@@ -98,29 +97,29 @@ def route_statistics(stored: dict[str, Any]) -> RouteStatistics | None:
 
 
 def played_by(sources: dict[str, int]) -> str:
-    """`simulated pairs`, or several with their episodes."""
-    names = [(_PLAYED.get(source, source or "source not stated"), count) for source, count in sources.items()]
+    """Who played, in words; several sources with their numbers of episodes."""
+    names = [(_PLAYERS.get(source, source or "source not stated"), count) for source, count in sources.items()]
     if len(names) == 1:
         return names[0][0]
     return ", ".join(f"{name} ({count})" for name, count in names)
 
 
-def _most_mixed_first(entries: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    def mixed(entry: dict[str, Any]) -> tuple:
+def _highest_entropy_first(entries: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    def key(entry: dict[str, Any]) -> tuple:
         bits = entry.get("entropy_bits")
         return (bits is None, -(bits or 0.0), entry["name"])
 
-    return sorted(entries, key=mixed)
+    return sorted(entries, key=key)
 
 
 def _distance(obstacles: int, entry: dict[str, Any]) -> HumanDistance:
     details = entry["details"]
     reading = details.get("reading", "as labelled")
     human = {
-        word.translate(_MIRROR) if reading == "mirrored" else word: count
-        for word, count in details.get("human", {}).get("counts", {}).items()
+        label.translate(_MIRROR) if reading == "mirrored" else label: count
+        for label, count in details.get("human", {}).get("counts", {}).items()
     }
-    ours = details.get("counts", {})
+    counts = details.get("counts", {})
     null = entry.get("null")
     interval = entry.get("interval")
     return HumanDistance(
@@ -129,10 +128,11 @@ def _distance(obstacles: int, entry: dict[str, Any]) -> HumanDistance:
         (interval[0], interval[1]) if interval else None,
         (null["low"], null["mean"], null["high"]) if null else None,
         null["p"] if null else None,
-        entry.get("episodes", sum(ours.values())),
+        entry.get("episodes", sum(counts.values())),
         sum(human.values()),
         tuple(
-            {"word": word, "ours": ours.get(word, 0), "human": human.get(word, 0)} for word in sorted({*ours, *human})
+            {"word": label, "ours": counts.get(label, 0), "human": human.get(label, 0)}
+            for label in sorted({*counts, *human})
         ),
         reading,
         entry.get("definition", ""),

@@ -1,4 +1,4 @@
-"""What a policy was trained on, from the data set's own metadata or from the recipe of an exported policy."""
+"""Facts about a policy's training data, from the data set's metadata or the recipe of an exported policy."""
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -9,17 +9,17 @@ from copolicy.dataset.scenarios import set_label
 from .facts import DatasetFacts
 
 _COUNTS = {"sources": "source", "map_sets": "map_set", "licences": "license", "pairs": "pair_id"}
-"""Episodes by a column, and where a recipe has them."""
+"""Fields with numbers of episodes, by the column and recipe key that they come from."""
 
 
 @dataclass(frozen=True)
 class TrainingData:
-    """The data behind a policy; None or empty where it is not stated.
+    """Facts about a policy's training data; None or empty where not stated.
 
     Attributes:
-        used: episodes that it was trained on.
-        episodes: of the data set.
-        sources: episodes by source (`human`, `simulated`, `upstream`); so for map sets, licences and pairs.
+        used: number of episodes used in training.
+        episodes: number of episodes in the data set.
+        sources: number of episodes by source (`human`, `simulated`, `upstream`); likewise map sets, licences and pairs.
     """
 
     repo_id: str
@@ -36,13 +36,13 @@ class TrainingData:
     pairs: dict[str, int] = field(default_factory=dict)
 
     @property
-    def at_hand(self) -> bool:
-        """More than its name is known."""
+    def described(self) -> bool:
+        """Whether more than the name of the data set is known."""
         return bool(self.sources)
 
     @classmethod
     def from_data_set(cls, facts: DatasetFacts, settings: dict[str, Any]) -> "TrainingData":
-        """From the data set's folder, and what the training says about it."""
+        """Reads the facts from the data set's folder and the dataset settings of the training."""
         sets = Counter(set_label(episode) for episode in facts.episodes)
         stated = cls.from_settings(settings)
         return replace(
@@ -59,14 +59,14 @@ class TrainingData:
 
     @classmethod
     def from_settings(cls, settings: dict[str, Any], fps: float | None = None) -> "TrainingData":
-        """From what the training says alone; its data set is not at hand."""
+        """Reads the facts from the dataset settings of the training, if the data set is not available."""
         chosen = settings.get("episodes")
         used = None if chosen is None else len(chosen)
         return cls(str(settings.get("repo_id") or ""), settings.get("revision"), used, fps=fps)
 
     @classmethod
     def from_recipe(cls, recipe: dict[str, Any]) -> "TrainingData":
-        """From the `dataset` of `recipe.json`."""
+        """Reads the facts from the entry `dataset` of `recipe.json`."""
         stated: dict[str, Any] = {name: recipe.get(key) or {} for name, key in _COUNTS.items()}
         stated |= {name: recipe.get(name) for name in ("episodes", "frames", "fps", "version", "content_hash")}
         name, revision = str(recipe.get("repo_id") or ""), recipe.get("revision")

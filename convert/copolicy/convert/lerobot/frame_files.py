@@ -1,4 +1,4 @@
-"""The data files of a LeRobot v3 data set: a row group an episode."""
+"""Writes the data files of a LeRobot v3 data set, one row group per episode."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ class FrameFiles(NumberedFiles):
         self._schema = get_hf_features_from_features(features).arrow_schema
 
     def append(self, columns: dict[str, np.ndarray]) -> dict[str, int]:
-        """Adds an episode's columns, `(T,)` or `(T, n)`; returns the columns of meta/episodes that say where."""
+        """Appends an episode's columns, `(T,)` or `(T, n)`; returns its data file columns of meta/episodes."""
         if self._writer is not None and self._path.stat().st_size >= self._limit:
             self._next()
         if self._writer is None:

@@ -1,4 +1,4 @@
-"""An episode as the columns of a LeRobot data set."""
+"""Converts an episode to the columns of a LeRobot data set."""
 
 import numpy as np
 
@@ -9,19 +9,19 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.task import get_task
 
 
-def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, np.ndarray]:
-    """The columns of one episode (`features_of` its task), `(T', n)` float32 or `(T',)`, by the rules of the one clock.
+def frame_columns(episode: Episode, fps: int, downsampling: Hold = "mean") -> dict[str, np.ndarray]:
+    """Returns the columns of an episode (`features_of` its task) at `fps`, `(T', n)` float32 or `(T',)`.
 
-    `next.reward` is the reward of the state that the frame's held steps led to; `next.done` marks the last frame,
-    `next.success` the last frame of a success.
+    `next.reward` is the reward of the state after the frame's recorded steps; `next.done` marks the last frame,
+    `next.success` the last frame of a successful episode.
 
     Raises:
         InvalidValueError: no steps, a value that is not finite, an `fps` that does not divide the recording rate, or
-            an episode that was stored at a lower rate and is asked for at another.
+            an `fps` other than that of an episode stored at a lower rate.
     """
     task = get_task(episode.task)
-    states, actions = _at_rate(episode, task.spec.record_hz, fps, hold)
-    after = np.vstack((states[1:], episode.final_state))
+    states, actions = _at_rate(episode, task.spec.record_hz, fps, downsampling)
+    next_states = np.vstack((states[1:], episode.final_state))
     frames = len(states)
     last = np.arange(frames) == frames - 1
     columns = {
@@ -29,7 +29,7 @@ def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, 
         ENVIRONMENT_STATE: np.tile(task.scenario_vector(episode.scenario).astype(np.float32), (frames, 1)),
         HUMAN_ACTION: np.split(previous_actions(actions), 2, axis=1)[1].astype(np.float32),
         ACTION: actions.astype(np.float32),
-        "next.reward": task.rewards(episode.scenario, after).astype(np.float32),
+        "next.reward": task.rewards(episode.scenario, next_states).astype(np.float32),
         "next.done": last,
         "next.success": last & episode.meta.success,
     }
@@ -39,11 +39,12 @@ def frame_columns(episode: Episode, fps: int, hold: Hold = "mean") -> dict[str, 
     return columns
 
 
-def _at_rate(episode: Episode, record_hz: int, fps: int, hold: Hold) -> tuple[np.ndarray, np.ndarray]:
+def _at_rate(episode: Episode, record_hz: int, fps: int, downsampling: Hold) -> tuple[np.ndarray, np.ndarray]:
     if not len(episode.actions):
         raise InvalidValueError(f"steps of episode {episode.meta.episode_uuid}", "at least one", 0)
     if episode.fps == record_hz:
-        return frame_states(episode.states, fps, record_hz), frame_actions(episode.actions, fps, hold, record_hz)
+        actions = frame_actions(episode.actions, fps, downsampling, record_hz)
+        return frame_states(episode.states, fps, record_hz), actions
     stride(fps, record_hz)
     if fps != episode.fps:
         rate = f"{episode.fps}, the only rate at which episode {episode.meta.episode_uuid} was stored"

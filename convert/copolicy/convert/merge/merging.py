@@ -1,8 +1,8 @@
-"""Merges data sets with LeRobot's aggregation, and puts right what that does to the tables.
+"""Merges data sets with LeRobot's aggregation, and restores the column values and types that it changes.
 
-LeRobot reads tables with pandas, which writes NaN ("not measured") as null and vectors of a fixed length as lists of
-any. Numbers, files and times are taken from what it wrote; every other column from the data sets as they were, with
-its type. The content of every episode is then compared with what it was.
+LeRobot reads tables with pandas, which turns NaN ("not measured") into null and fixed-size lists into lists of any
+length. Indices, file numbers and times are taken from its output, every other column from the sources, with its type.
+The content of every episode is then compared with its source.
 """
 
 from collections.abc import Sequence
@@ -28,46 +28,46 @@ from copolicy.dataset.versions.digests import Content
 
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
-from ..lerobot.shifted_tables import replaced
-from ..lerobot.stored_rewards import foreign_rewards
-from .source import LOCAL_NAMES, read_source, renamed, require_alike, require_prefixes, require_strangers
+from ..lerobot.shifted_tables import replace_column
+from ..lerobot.stored_rewards import reward_differences
+from .source import LOCAL_NAMES, read_source, require_distinct_names, require_prefixes, require_same_format, with_prefix
 
-_MOVED = ("data/", "videos/", "meta/episodes/", "stats/index/", "stats/episode_index/", "stats/task_index/")
+_RENUMBERED = ("data/", "videos/", "meta/episodes/", "stats/index/", "stats/episode_index/", "stats/task_index/")
 _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
 
 
 def merge_datasets(
     roots: Sequence[Path], root: Path, repo_id: str, prefixes: Sequence[str] | None = None, same_people: bool = False
 ) -> dict[str, Any]:
-    """Writes the episodes of several data sets, one after the other, as one at `root`.
+    """Writes the episodes of several data sets, one after the other, as one data set at `root`.
 
-    Exclusions are episode columns and stay. Statistics, releases, cards and recordings are about one data set and
-    stay behind; the result's record `meta/copolicy.json` names the content hash of each.
+    Exclusions are episode columns and are kept. Statistics, releases, cards and recordings of the sources are not
+    copied; `meta/copolicy.json` of the result states the content hash of each source.
 
     Args:
-        prefixes: one for each data set, put before the names that its lab gave (see `people`).
-        same_people: a name in several data sets is the same person.
+        prefixes: one for each data set, put before the names in its `LOCAL_NAMES` columns.
+        same_people: a name that occurs in several data sets is the same person.
 
     Returns:
         Summary.
 
     Raises:
-        OutputExistsError: there is something at `root`.
+        OutputExistsError: `root` exists.
         FileFormatError: not all are data sets of this project with the same rate and features, or two share an episode.
-        InvalidValueError: two use the same name for a person, and nobody says whether it is the same one.
+        InvalidValueError: a name occurs in two data sets, and neither `prefixes` nor `same_people` is given.
     """
     require_new(root)
     if prefixes is not None:
         require_prefixes(prefixes, len(roots))
     sources = [read_source(path) for path in roots]
-    require_alike(sources)
+    require_same_format(sources)
     if prefixes is None and not same_people:
-        require_strangers(sources)
+        require_distinct_names(sources)
     tables = [
-        source.episodes if prefixes is None else renamed(source.episodes, prefixes[place])
-        for place, source in enumerate(sources)
+        source.episodes if prefixes is None else with_prefix(source.episodes, prefixes[index])
+        for index, source in enumerate(sources)
     ]
-    expected = _joined(sources, tables)
+    expected = _concatenated(sources, tables)
     mixtures = _mixtures(expected, sources)
     with new_folder(root) as partial:
         join_data_sets(roots, repo_id, partial, partial.with_name(f"{partial.name}.cache"))
@@ -84,7 +84,7 @@ def merge_datasets(
         "repo_id": repo_id,
         "episodes": len(content.episodes),
         "frames": sum(episode.frames for episode in content.episodes),
-        "excluded": sum(bool(mark) for mark in expected.column("discarded").to_pylist()),
+        "excluded": sum(bool(discarded) for discarded in expected.column("discarded").to_pylist()),
         **mixtures.summary(),
         "content_hash": content.hash,
         "left_behind": left_behind,
@@ -92,31 +92,32 @@ def merge_datasets(
 
 
 def _mixtures(episodes: pa.Table, sources: Sequence[StoredSet]) -> Mixtures:
-    named = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
+    columns = [name for name in EPISODE_COLUMNS if name in episodes.column_names]
     roots, records = [source.root for source in sources], [source.record for source in sources]
-    where, rewards = ", ".join(map(str, roots)), foreign_rewards(roots)
-    return Mixtures.of(episodes.select(named).to_pylist(), task_of(sources[0].info), where, records, rewards)
+    data_sets, rewards = ", ".join(map(str, roots)), reward_differences(roots)
+    rows = episodes.select(columns).to_pylist()
+    return Mixtures.from_rows(rows, task_of(sources[0].info), data_sets, records, rewards)
 
 
-def _joined(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Table:
-    """All rows of meta/episodes as they were; where a data set lacks a column, null or what a later column is then."""
+def _concatenated(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Table:
+    """Concatenates the rows of meta/episodes; where a data set lacks a column, null or its unknown value."""
     types = {field.name: field.type for field in tables[0].schema}
     for source, table in zip(sources, tables, strict=True):
         for field in table.schema:
-            known = types.setdefault(field.name, field.type)
-            if pa.types.is_null(known):
+            column_type = types.setdefault(field.name, field.type)
+            if pa.types.is_null(column_type):
                 types[field.name] = field.type
-            elif field.type != known and not pa.types.is_null(field.type):
-                where = source.root / EPISODES_FOLDER
-                raise FileFormatError(where, f"column {field.name} of type {known}", str(field.type))
+            elif field.type != column_type and not pa.types.is_null(field.type):
+                folder = source.root / EPISODES_FOLDER
+                raise FileFormatError(folder, f"column {field.name} of type {column_type}", str(field.type))
     return pa.concat_tables(
         [
             pa.table(
                 {
-                    name: _without_nan(name, table.column(name).cast(kind))
+                    name: _without_nan(name, table.column(name).cast(arrow_type))
                     if name in table.column_names
-                    else pa.array([UNKNOWN_VALUES[name] if name in LATER_COLUMNS else None] * table.num_rows, kind)
-                    for name, kind in types.items()
+                    else pa.array([UNKNOWN_VALUES[name] if name in LATER_COLUMNS else None] * len(table), arrow_type)
+                    for name, arrow_type in types.items()
                 }
             )
             for table in tables
@@ -125,7 +126,7 @@ def _joined(sources: Sequence[StoredSet], tables: Sequence[pa.Table]) -> pa.Tabl
 
 
 def _without_nan(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """A number that is not known, as data sets of earlier versions have it, is null."""
+    """Turns NaN, which data sets of earlier versions store for unknown numbers, into null."""
     if EPISODE_COLUMNS.get(name) != "float":
         return column
     return pa.chunked_array([pa.array(column.to_pylist(), column.type, from_pandas=True)])
@@ -137,14 +138,14 @@ def _restore_episodes(root: Path, expected: pa.Table) -> None:
         merged = read_parquet(path)
         rows = expected.slice(start, merged.num_rows)
         for name in rows.column_names:
-            if name in _NUMBERS or name.startswith(_MOVED):
-                rows = replaced(rows, name, merged.column(name).cast(rows.schema.field(name).type))
+            if name in _NUMBERS or name.startswith(_RENUMBERED):
+                rows = replace_column(rows, name, merged.column(name).cast(rows.schema.field(name).type))
         pq.write_table(rows, path, compression="snappy", use_dictionary=True)
         start += merged.num_rows
 
 
 def _restore_frames(root: Path) -> None:
-    """The data files with the types of the feature table, a row group an episode; one file is in memory at a time."""
+    """Rewrites the data files with the types of the features, one row group per episode, one file at a time."""
     features = read_info(root)["features"]
     features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
     schema = get_hf_features_from_features(features).arrow_schema
@@ -160,37 +161,37 @@ def _restore_frames(root: Path) -> None:
 
 
 def _verify(content: Content, sources: Sequence[StoredSet], renamed_columns: set[str]) -> None:
-    before = [episode for source in sources for episode in source.content.episodes]
-    if len(content.episodes) != len(before):
-        raise RunError(f"merge: expected {len(before)} episodes, found {len(content.episodes)}; nothing was written")
-    for was, now in zip(before, content.episodes, strict=True):
-        kept = {name: digest for name, digest in was.columns.items() if name not in renamed_columns}
+    originals = [episode for dataset in sources for episode in dataset.content.episodes]
+    if len(content.episodes) != len(originals):
+        raise RunError(f"merge: expected {len(originals)} episodes, found {len(content.episodes)}; nothing was written")
+    for source, merged in zip(originals, content.episodes, strict=True):
+        expected = {name: digest for name, digest in source.columns.items() if name not in renamed_columns}
         parts = {
-            "episode_uuid": was.episode_uuid == now.episode_uuid,
-            "frames": was.frames == now.frames,
-            **{name: now.features.get(name) == digest for name, digest in was.features.items()},
-            **{name: now.columns.get(name) == digest for name, digest in kept.items()},
+            "episode_uuid": source.episode_uuid == merged.episode_uuid,
+            "frames": source.frames == merged.frames,
+            **{name: merged.features.get(name) == digest for name, digest in source.features.items()},
+            **{name: merged.columns.get(name) == digest for name, digest in expected.items()},
         }
         if not all(parts.values()):
-            changed = next(name for name, same in parts.items() if not same)
+            changed = next(name for name, unchanged in parts.items() if not unchanged)
             raise RunError(
-                f"episode {was.episode_uuid}: expected {changed} unchanged by the merge, found otherwise; "
+                f"episode {source.episode_uuid}: expected {changed} unchanged by the merge, found otherwise; "
                 "nothing was written"
             )
 
 
 def _record(sources: Sequence[StoredSet], prefixes: Sequence[str] | None) -> dict[str, Any]:
     notes: dict[str, Any] = {}
-    merged = []
-    for place, source in enumerate(sources):
+    parts = []
+    for index, source in enumerate(sources):
         record = dict(source.record)
         notes |= record.pop("notes", {})
-        merged.append(
+        parts.append(
             {
                 "name": source.root.resolve().name,
                 "content_hash": source.content.hash,
                 "episodes": len(source.content.episodes),
-                "prefix": prefixes[place] if prefixes else "",
+                "prefix": prefixes[index] if prefixes else "",
                 "record": record,
             }
         )
@@ -198,7 +199,7 @@ def _record(sources: Sequence[StoredSet], prefixes: Sequence[str] | None) -> dic
     return {
         "converter": "copolicy-convert merge",
         "version": version("lerobot_policy_copolicy"),
-        "merged": merged,
+        "merged": parts,
         "task": task_of(info).spec.to_dict(),
         "fps": info["fps"],
         "hold": info["features"]["action"].get("hold", ""),

@@ -1,4 +1,4 @@
-"""All shards to the one data set, with what can only be said of all episodes together."""
+"""Merges all shards to one data set, and computes what depends on all episodes: findings and statistics."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -27,8 +27,8 @@ from copolicy.dataset.publication.minimal_card import write_minimal_card
 
 from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
-from ..lerobot.prepare import LeftOut, RepeatedEpisodeError
-from ..lerobot.shifted_tables import episode_rows, write_like
+from ..lerobot.prepare import RepeatedEpisodeError, SkipReport
+from ..lerobot.shifted_tables import read_episode_columns, write_with_schema
 from ..lerobot.writer import WrittenDataset
 from .plan import DATA_SET, ShardPlan, ShardRecord
 
@@ -36,47 +36,47 @@ FINDINGS_FILE = "findings.json"
 
 
 def merge_shards(plan: ShardPlan) -> dict[str, Any]:
-    """Writes the data set at `plan.root`; it appears complete, in one renaming.
+    """Writes the merged data set at `plan.root`, which appears complete in one rename.
 
     Returns:
-        Summary of what was written, left out and found.
+        Summary of the written and skipped episodes and the findings.
 
     Raises:
-        RunError: a shard is not finished, no episode is left, or one is there twice.
-        OutputExistsError: there is something at `plan.root`.
+        RunError: a shard is not finished, no episode remains, or one occurs twice.
+        OutputExistsError: `plan.root` exists.
     """
     require_new(plan.root)
     records = [record for rank in range(len(plan)) if (record := plan.record(rank)) is not None]
     if len(records) != len(plan):
         raise RunError(f"{plan.folder}: expected {len(plan)} finished shards, found {len(records)}")
-    _require_once(records)
+    _require_unique(records)
     roots = [plan.shard(rank) / DATA_SET for rank, record in enumerate(records) if record["episodes"]]
     if not roots:
         raise RunError(f"{plan.root}: expected at least one episode to write, found none")
-    left_out = LeftOut()
+    skipped = SkipReport()
     for record in records:
-        left_out.damaged += record["left_out"]["damaged"]
-        left_out.discarded += record["left_out"]["discarded"]
-        left_out.messages += record["left_out"]["messages"]
+        skipped.damaged += record["left_out"]["damaged"]
+        skipped.discarded += record["left_out"]["discarded"]
+        skipped.messages += record["left_out"]["messages"]
     with new_folder(plan.root, "merging") as partial:
         info = aggregate(roots, plan.repo_id, partial, plan.folder / "cache")
-        notes = _write_record(plan, partial, roots, left_out)
+        notes = _write_record(plan, partial, roots, skipped)
         findings = all_findings(partial, records)
         if plan.statistics:
             _write_statistics(partial)
-        rows = episode_rows(partial)
+        rows = read_episode_columns(partial)
         write_minimal_card(partial / CARD_FILE, {row["license"] for row in rows}, task_name(read_info(partial)))
     replace_json(plan.folder / FINDINGS_FILE, [finding.to_dict() for finding in findings], indent=1)
     conversion = plan.conversion
     written = WrittenDataset(
-        plan.root, plan.repo_id, conversion.fps, conversion.hold, info["total_episodes"], info["total_frames"],
-        sum(row["success"] for row in rows), Mixtures.of(rows, task_of(info)),
+        plan.root, plan.repo_id, conversion.fps, conversion.downsampling, info["total_episodes"], info["total_frames"],
+        sum(row["success"] for row in rows), Mixtures.from_rows(rows, task_of(info)),
     )  # fmt: skip
     counts = Counter(finding.severity for finding in findings)
     return {
         **written.summary(),
-        "damaged_left_out": left_out.messages,
-        "discarded_left_out": left_out.discarded,
+        "damaged_left_out": skipped.messages,
+        "discarded_left_out": skipped.discarded,
         "unfinished_recordings": list(plan.unfinished),
         "not_verified": [f"episode {uuid}: {note}" for uuid, texts in notes.items() for note in texts],
         "shards": len(plan),
@@ -85,7 +85,7 @@ def merge_shards(plan: ShardPlan) -> dict[str, Any]:
     }
 
 
-def _require_once(records: list[ShardRecord]) -> None:
+def _require_unique(records: list[ShardRecord]) -> None:
     origins: dict[str, str] = {}
     for rank, record in enumerate(records):
         # A shard of an earlier version does not name its files.
@@ -96,8 +96,8 @@ def _require_once(records: list[ShardRecord]) -> None:
             origins[uuid] = origin
 
 
-def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: LeftOut) -> dict[str, list[str]]:
-    """Writes what is known of the conversion; returns the notes by episode."""
+def _write_record(plan: ShardPlan, root: Path, roots: list[Path], skipped: SkipReport) -> dict[str, list[str]]:
+    """Writes the conversion record of the data set; returns the notes by episode."""
     notes: dict[str, list[str]] = {}
     for part in roots:
         notes |= stored_record(part).get("notes", {})
@@ -105,10 +105,10 @@ def _write_record(plan: ShardPlan, root: Path, roots: list[Path], left_out: Left
         "converter": "copolicy-convert mcap",
         "version": version("lerobot_policy_copolicy"),
         "files": len(plan.files),
-        "left_out": left_out.record(),
+        "left_out": skipped.record(),
         "task": task_of(read_info(root)).spec.to_dict(),
         "fps": plan.conversion.fps,
-        "hold": plan.conversion.hold,
+        "hold": plan.conversion.downsampling,
         "notes": notes,
     }
     write_record(root, document)
@@ -124,21 +124,20 @@ def _write_statistics(root: Path) -> None:
 
 
 def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) -> dict[str, Any]:
-    """One data set out of several with the same features, in their order.
+    """Joins data sets with the same features, in their order, with one data (and video) file per part.
 
-    LeRobot joins them, one file of frames (and of video) a part: to pack thousands of parts into one file it would read
-    and write that file thousands of times. What else it does to them is undone: columns change
-    their type, video features lose what names their encoder.
+    Packing thousands of parts into one file would make LeRobot rewrite it thousands of times. The column types and the
+    encoder facts of video features, which LeRobot loses, are restored.
 
     Args:
         target: a new folder.
-        cache: a folder for its own use; it goes away at the end.
+        cache: a temporary folder, removed at the end.
 
     Returns:
         `meta/info.json` of the result.
 
     Raises:
-        FileFormatError: a part is not complete. LeRobot would look for it on the Hub.
+        FileFormatError: a part is incomplete. LeRobot would search for it on the Hub.
     """
     for root in roots:
         for name in (INFO_FILE, STATS_FILE, TASKS_FILE, EPISODES_FOLDER, "data"):
@@ -150,30 +149,30 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     write_as_lerobot(target / INFO_FILE, info)
     example = next(iter(numbered_files(roots[0] / EPISODES_FOLDER).values()))
     for path in numbered_files(target / EPISODES_FOLDER).values():
-        write_like(read_parquet(path), example, path)
+        write_with_schema(read_parquet(path), example, path)
     return info
 
 
 def all_findings(root: Path, records: Sequence[ShardRecord]) -> list[Finding]:
-    """What the shards found in their recordings, then what the other rules find in the data set; worst first.
+    """Collects the shards' findings in their recordings and the findings of the data set rules, worst first.
 
     Args:
-        root: the merged data set; episodes are named by their index in it.
-        records: of all shards, in order.
+        root: the merged data set; findings name episodes by their index in it.
+        records: records of all shards, in order.
     """
     findings: list[Finding] = []
     totals: Counter[Finding] = Counter()
-    before = 0
+    start = 0
     for record in records:
         for fields in record["findings"]:
             finding = Finding(**fields)
             if finding.episode:
-                findings.append(Finding(**{**fields, "episode": str(before + int(finding.episode))}))
+                findings.append(Finding(**{**fields, "episode": str(start + int(finding.episode))}))
             elif isinstance(finding.figure, int):  # a number of episodes
                 totals[Finding(**{**fields, "figure": None})] += finding.figure
             else:
                 findings.append(finding)
-        before += len(record["episodes"])
+        start += len(record["episodes"])
     for finding, total in totals.items():
         findings.append(Finding("", finding.rule, total, finding.limit, finding.severity, finding.message))
     findings += check_table(read_lerobot(root), of_data_sets).findings

@@ -1,4 +1,4 @@
-"""Which recordings go into which shard, and which shards are finished."""
+"""Assigns recordings to shards, and tracks which shards are finished."""
 
 import hashlib
 import json
@@ -21,11 +21,11 @@ LOCK_FILE = "lock"
 OPTIONS_FILE = "options.json"
 RECORD_FILE = "shard.json"
 DATA_SET = "set"
-"""Folder of a shard's own LeRobot data set; missing where every recording of the shard was left out."""
+"""Folder of a shard's LeRobot data set; missing if every recording of the shard was skipped."""
 
 
-class LeftOutRecord(TypedDict):
-    """The recordings that a shard left out, see `LeftOut`."""
+class SkipRecord(TypedDict):
+    """The recordings that a shard skipped, see `SkipReport`."""
 
     damaged: list[str]
     discarded: list[str]
@@ -33,33 +33,33 @@ class LeftOutRecord(TypedDict):
 
 
 class ShardRecord(TypedDict):
-    """`shard.json`: what a finished shard holds.
+    """`shard.json`: the contents of a finished shard.
 
     Attributes:
-        digest: of all that the shard depends on.
+        digest: see `ShardPlan.digest`.
         episodes: `episode_uuid`s in the order of the shard.
-        origins: the file of each; a shard of an earlier version does not say.
-        findings: of the recordings, see `Finding`.
+        origins: file of each episode; missing in shards of an earlier version.
+        findings: findings in the recordings, see `Finding`.
     """
 
     digest: str
     episodes: list[str]
     origins: NotRequired[list[str]]
-    left_out: LeftOutRecord
+    left_out: SkipRecord
     findings: list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
 class ShardPlan:
-    """One conversion, cut into runs of recordings of equal number.
+    """One conversion, divided into shards of consecutive recordings.
 
     Attributes:
         folder: where shards are kept until they are merged.
-        root: where the merged data set goes.
-        files: the recordings in the order of the data set, absolute paths.
+        root: path of the merged data set.
+        files: absolute paths of the recordings, in the order of the data set.
         shard_episodes: recordings in a shard.
-        statistics: compute `meta/copolicy_stats.json` of the merged set, too.
-        unfinished: names of recordings that broke off.
+        statistics: also compute `meta/copolicy_stats.json` of the merged data set.
+        unfinished: names of unfinished recordings (`.part`).
     """
 
     folder: Path
@@ -85,46 +85,49 @@ class ShardPlan:
         return self.folder / "shards" / f"{rank:05d}"
 
     def damage_list(self, rank: int) -> Path:
-        """A file with a line for each damaged recording that keeps a shard from being finished."""
+        """The file with a line for each damaged recording of a shard that could not be finished."""
         return self.folder / "damaged" / f"{rank:05d}.txt"
 
     @property
     def logs(self) -> Path:
-        """datatrove's folder for the shards: what is completed, its logs, its job scripts."""
+        """datatrove's folder for the shards: completion marks, logs, job scripts."""
         return self.folder / "datatrove" / "shards"
 
     @property
     def merge_logs(self) -> Path:
-        """The same for the job that merges."""
+        """datatrove's folder for the merge job."""
         return self.folder / "datatrove" / "merge"
 
     @cached_property
     def options(self) -> dict[str, Any]:
-        """What shards must share to belong together."""
+        """Options that all shards of a conversion share."""
+        conversion = asdict(self.conversion)
         return {
-            **asdict(self.conversion),
+            "fps": conversion.pop("fps"),
+            "hold": conversion.pop("downsampling"),
+            **conversion,
             "repo_id": self.repo_id,
             "shard_episodes": self.shard_episodes,
             "version": version("lerobot_policy_copolicy"),
         }
 
     def digest(self, rank: int) -> str:
-        """Of all that a shard depends on; a recording is known by its path, size and time of change."""
-        files = [(str(path), *_state(path)) for path in self.files_of(rank)]
+        """Hash of the options and of path, size and modification time of each recording of a shard."""
+        files = [(str(path), *_size_and_mtime(path)) for path in self.files_of(rank)]
         return hashlib.sha256(json.dumps([self.options, files], sort_keys=True).encode()).hexdigest()
 
     def record(self, rank: int) -> "ShardRecord | None":
-        """What a finished shard says of itself, None where it is not finished or says something else."""
+        """The record of a finished shard, None if the shard is not finished or its record is invalid."""
         try:
             return read_json(self.shard(rank) / RECORD_FILE, ShardRecord, "the record of a shard")
         except FileFormatError:
             return None
 
     def require_own(self) -> None:
-        """Checks that the folder is new or holds the shards of a call like this one.
+        """Checks that the folder is new or holds shards of a call with the same options.
 
         Raises:
-            InvalidValueError: it holds those of a call with other options.
+            InvalidValueError: it holds shards of a call with other options.
             FileFormatError: it holds something else.
         """
         stored = self.folder / OPTIONS_FILE
@@ -136,10 +139,10 @@ class ShardPlan:
             raise FileFormatError(self.folder, "a new folder, or one with the shards of this call", "another")
 
     def prepare(self) -> int:
-        """Makes the folder, and takes out shards whose recordings changed since.
+        """Creates the folder, and removes shards whose recordings changed since.
 
         Returns:
-            Number of shards that are finished already.
+            Number of finished shards.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         replace_json(self.folder / OPTIONS_FILE, self.options)
@@ -158,19 +161,19 @@ class ShardPlan:
         return finished
 
     def _compare(self, stored: Path, options: dict[str, Any]) -> None:
-        found = read_json(stored, dict[str, Any], "the options of a conversion")
-        differ = [name for name in {**found, **options} if found.get(name) != options.get(name)]
+        stored_options = read_json(stored, dict[str, Any], "the options of a conversion")
+        differ = [name for name in {**stored_options, **options} if stored_options.get(name) != options.get(name)]
         if differ:
             name = differ[0]
             raise InvalidValueError(
                 f"{name} of the shards in {self.folder}",
                 f"{options.get(name)!r} (finish that call first, or give another --shards)",
-                found.get(name),
+                stored_options.get(name),
             )
 
 
-def _state(path: Path) -> tuple[int, int]:
-    """Size and time of change; of a link that leads nowhere neither, which whoever reads the recording says."""
+def _size_and_mtime(path: Path) -> tuple[int, int]:
+    """Size and modification time of a file; zeros for a broken link, which reading the recording reports."""
     try:
         status = path.stat()
     except OSError:
@@ -179,5 +182,5 @@ def _state(path: Path) -> tuple[int, int]:
 
 
 def absolute(files: Sequence[Path]) -> tuple[Path, ...]:
-    """Paths that mean the same on every machine that sees this file system."""
+    """Absolute paths, valid on every machine that mounts this file system."""
     return tuple(path.absolute() for path in files)

@@ -1,7 +1,7 @@
 """Reads arrays of numbers from a Zarr store of version 2 or 3, a folder or one zip file.
 
-The `zarr` library decodes the chunks. What its metadata ask for is looked at first: a codec may unpickle, and a
-shape or an archive may claim more memory than any demonstrations take.
+The `zarr` library decodes the chunks. The metadata are checked first: a codec may unpickle, and a shape or an archive
+may require more memory than any demonstrations need.
 """
 
 import json
@@ -17,7 +17,7 @@ from copolicy.dataset.files.file_kinds import kind_of
 
 from .restricted_pickle import first_line
 
-_LARGEST = 1 << 30  # of an array, of a chunk of it and of an unpacked archive, bytes
+_LARGEST = 1 << 30  # bytes of an array, of a chunk and of an unpacked archive
 _LARGEST_METADATA = 1 << 20
 _MOST_CHUNKS = 1 << 20
 _COMPRESSORS = ("blosc", "bz2", "gzip", "lz4", "lzma", "zlib", "zstd")  # of version 2; numcodecs also has pickle
@@ -25,12 +25,12 @@ _CODECS = ("blosc", "bytes", "crc32c", "gzip", "sharding_indexed", "transpose", 
 
 
 def array_metadata_files(array: str) -> tuple[str, str]:
-    """Where the metadata of an array are, in a store of version 2 and of version 3."""
+    """Metadata files of an array in a store of version 2 and of version 3."""
     return f"{array}/.zarray", f"{array}/zarr.json"
 
 
 def is_zipped(path: Path) -> bool:
-    """Whether there is a zip file, whatever it holds."""
+    """Whether the path is a zip file."""
     return path.is_file() and zipfile.is_zipfile(path)
 
 
@@ -38,13 +38,13 @@ class ZarrArrays:
     """The arrays of a store.
 
     Attributes:
-        path: of the folder or the zip file.
+        path: the folder or the zip file.
     """
 
     def __init__(self, path: Path, array: str):
         """
         Args:
-            array: one that must be there, such as `data/obs`; in an archive it may lie below a folder.
+            array: an array that must exist, such as `data/obs`; in an archive it may be in a sub-folder.
 
         Raises:
             FileFormatError: no such store, or an archive that is damaged, too large or has names outside of it.
@@ -63,33 +63,31 @@ class ZarrArrays:
             self._prefix = prefixes.pop()
 
     def read(self, array: str) -> np.ndarray:
-        """An array by its path in the store.
+        """Reads an array by its path in the store.
 
         Raises:
-            FileFormatError: there is none, its metadata ask for what is not read here (filters, data types other than
-                numbers, codecs beyond the numeric ones, a size beyond reason), or a chunk is damaged.
+            FileFormatError: no such array, unsupported metadata (filters, data types other than numbers, codecs other
+                than the numeric ones, too large a size), or a damaged chunk.
             MissingExtraError: zarr is not installed.
         """
-        place = self.path / array
-        version = self._screened(array)
+        version = self._checked_version(array)
         try:
             import zarr
             from zarr.storage import LocalStore, ZipStore
         except ImportError:
             raise MissingExtraError("zarr") from None
         try:
-            kind = LocalStore if self._members is None else ZipStore
-            store = kind(self.path, read_only=True)
+            store = (LocalStore if self._members is None else ZipStore)(self.path, read_only=True)
             try:
                 opened = zarr.open_array(store, path=f"{self._prefix}{array}", zarr_format=version, mode="r")  # type: ignore[arg-type]
                 return np.asarray(opened[...])
             finally:
                 store.close()
-        except (Exception, MemoryError) as error:  # as many kinds as there are codecs
-            raise FileFormatError(place, "an array with intact chunks", first_line(error)) from None
+        except (Exception, MemoryError) as error:  # codecs raise many types of errors
+            raise FileFormatError(self.path / array, "an array with intact chunks", first_line(error)) from None
 
-    def _screened(self, array: str) -> int:
-        """The version of an array whose metadata ask for nothing but numbers of a reasonable amount."""
+    def _checked_version(self, array: str) -> int:
+        """Checks the metadata of an array: numbers only, size within limits; returns its Zarr version."""
         for name, version, require in zip(array_metadata_files(array), (2, 3), (_require_2, _require_3), strict=True):
             text = self._text(name)
             if text is None:
@@ -127,9 +125,9 @@ def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
     except OSError as error:
         raise FileFormatError(path, "a readable zip file", error.strerror or str(error)) from None
     except Exception as error:
-        found = kind_of(path)
-        found = f"a damaged one ({first_line(error)})" if "zip" in found else found
-        raise FileFormatError(path, "a zipped Zarr store", found) from None
+        description = kind_of(path)
+        description = f"a damaged one ({first_line(error)})" if "zip" in description else description
+        raise FileFormatError(path, "a zipped Zarr store", description) from None
     for member in members:
         name = PurePosixPath(member.filename.replace("\\", "/"))
         if name.is_absolute() or ".." in name.parts or any(":" in part for part in name.parts[:1]):

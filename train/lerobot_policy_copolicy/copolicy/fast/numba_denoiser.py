@@ -1,4 +1,4 @@
-"""The denoisers for planning in machine code that numba compiles: one plan at a time, on one thread."""
+"""The fast denoisers in kernels compiled by numba, for small batches on one thread."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ from .transformer import FastTransformer
 
 
 class NumbaDenoiser:
-    """A denoiser whose steps run in compiled kernels; takes and gives what `denoise` of the fast networks does.
+    """A denoiser whose steps run in compiled kernels, with the interface of `FastTransformer.denoise`.
 
-    Twice as fast as ONNX Runtime for one table, slower for many; see `numba_kernels`. It compiles at the first plan,
-    in some ten seconds, and keeps the result in numba's cache for the next process.
+    Twice as fast as ONNX Runtime for one sequence, slower for many; see `numba_kernels`. The first evaluation compiles
+    the kernels in about ten seconds; numba caches them for later processes.
     """
 
     def __init__(self, denoiser: FastTransformer | FastMlp):
@@ -24,8 +24,8 @@ class NumbaDenoiser:
         self._evaluate = _transformer(denoiser) if isinstance(denoiser, FastTransformer) else _perceptron(denoiser)
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
-        """One evaluation, see `FastTransformer.denoise` and `FastMlp.denoise`."""
-        # Of another layout in memory an array would be another type, and the kernels compiled anew.
+        """Evaluates the network, see `FastTransformer.denoise` and `FastMlp.denoise`."""
+        # For an array of another memory layout, the kernels would be compiled again.
         actions = noisy_actions.contiguous().numpy()
         return torch.from_numpy(self._evaluate(actions, *(tensor.numpy() for tensor in inputs)))
 

@@ -1,13 +1,13 @@
-"""Weights in the order in which the kernels of `numba_kernels` read them."""
+"""Packs weights in the memory order of `numba_kernels`."""
 
 from typing import NamedTuple
 
 import numpy as np
 from llvmlite import binding
 
-# Values of a vector register: sixteen in AVX-512; elsewhere eight, which fit in two of NEON's.
+# float32 values per vector register: 16 for AVX-512, else 8 (AVX2, or two registers of NEON).
 LANES = 16 if binding.get_host_cpu_features().get("avx512f") else 8
-OUTPUTS = 4  # side by side in packed weights
+OUTPUTS = 4  # outputs side by side in packed weights
 
 
 class PackedLinear(NamedTuple):
@@ -30,7 +30,7 @@ class Norm(NamedTuple):
 
 
 class PackedLayers(NamedTuple):
-    """The decoder layers of a `FastTransformer`, stacked: the parts in the order in which they act."""
+    """The stacked decoder layers of a `FastTransformer`, in the order of evaluation."""
 
     norm1: Norm
     self_in: PackedLinear
@@ -43,7 +43,7 @@ class PackedLayers(NamedTuple):
 
 
 class PackedBlocks(NamedTuple):
-    """The residual blocks of a `FastMlp`, stacked; the bias of `inner` depends on the step and is an input."""
+    """The stacked residual blocks of a `FastMlp`; the bias of `inner` depends on the step and is an input."""
 
     norm: Norm
     inner: np.ndarray
@@ -51,7 +51,7 @@ class PackedBlocks(NamedTuple):
 
 
 def pack(weight: np.ndarray) -> np.ndarray:
-    """A weight matrix `(outputs, inputs)` in the order in which the kernels read it, padded with zeros.
+    """Packs a weight matrix `(outputs, inputs)`, padded with zeros.
 
     Returns:
         `(blocks, chunks, OUTPUTS, LANES)` float32: element `[b, c, o, l]` is `weight[b * OUTPUTS + o, c * LANES + l]`.

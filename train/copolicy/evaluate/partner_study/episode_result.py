@@ -1,4 +1,4 @@
-"""What is measured of one episode with a partner."""
+"""Measures of one episode with a simulated partner."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,21 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from ..coplan.rollouts import Outcome
+from ..coplan.rollouts import EpisodeResult
 
 DEADLOCK_S = 1.0
-"""What stands for so long on end, while the episode runs, is in a deadlock."""
+"""A stand-still of at least this long counts as a deadlock, s."""
 
 
 @dataclass(frozen=True)
-class PartnerOutcome(Outcome):
-    """One episode of a robot with a simulated partner.
+class PartnerEpisodeResult(EpisodeResult):
+    """Result of one episode of a robot with a simulated partner.
 
     Attributes:
         partner: kind of the partner.
-        actions: `(steps, 2 m)` joint actions, robot first, as executed.
-        still: `(steps,)` whether what is moved stood after each step; None: the task does not tell.
-        partner_changes: how often the partner changed its mind.
+        actions: `(steps, 2 m)` executed joint actions, robot first.
+        still: `(steps,)` whether the moved object was at rest after each step; None if the task does not define it.
+        partner_changes: how often the partner changed its route choice.
     """
 
     partner: str
@@ -30,27 +30,27 @@ class PartnerOutcome(Outcome):
 
     @cached_property
     def forces(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """`(steps, 2)` of robot and partner, full forces; None where the task has no outline, which tells them."""
+        """`(steps, 2)` forces of robot and of partner, in full forces; None if the task has no outline."""
         if self.task.outline is None:
             return None
-        both = self.task.outline.forces(self.actions)
-        return both[:, :2], both[:, 2:]
+        forces = self.task.outline.forces(self.actions)
+        return forces[:, :2], forces[:, 2:]
 
     @property
     def work(self) -> tuple[float, float] | None:
-        """Positive work of robot and partner on the point that is followed, full forces x its unit; else None.
+        """Positive work of robot and partner on the tracked point, full forces x unit of the path; None if unknown.
 
-        What turns the table is left out: it takes under 1 %.
+        Work of rotation is left out: for the table it is below 1 %.
         """
         if self.forces is None or self.path is None:
             return None
-        way = np.diff(self.path, axis=0)
-        robot, partner = (float(np.einsum("ti,ti->t", force, way).clip(0).sum()) for force in self.forces)
+        displacements = np.diff(self.path, axis=0)
+        robot, partner = (float(np.einsum("ti,ti->t", force, displacements).clip(0).sum()) for force in self.forces)
         return robot, partner
 
     @property
     def robot_share(self) -> float | None:
-        """Robot's share of the positive work of both: 0.5 where they share it, 0 where the robot does nothing."""
+        """Proportion of both players' positive work that the robot does: 0.5 is even, 0 a robot that does nothing."""
         if self.work is None:
             return None
         robot, partner = self.work
@@ -58,7 +58,7 @@ class PartnerOutcome(Outcome):
 
     @property
     def deadlock_s(self) -> float | None:
-        """Time in stand-stills of at least `DEADLOCK_S`, s."""
+        """Total time in stand-stills of at least `DEADLOCK_S`, s; None if the task does not define them."""
         if self.still is None:
             return None
         edges = np.flatnonzero(np.diff(np.concatenate(([0], self.still.astype(int), [0]))))
@@ -66,8 +66,8 @@ class PartnerOutcome(Outcome):
         return float(lengths[lengths >= DEADLOCK_S].sum())
 
     def to_json(self) -> dict[str, Any]:
-        """The row of `eval.json`; null where the task does not tell."""
-        forces = [None, None] if self.forces is None else [float(np.hypot(*one.T).mean()) for one in self.forces]
+        """The row of `eval.json`; measures that the task lacks are null."""
+        forces = [None, None] if self.forces is None else [float(np.hypot(*force.T).mean()) for force in self.forces]
         return {
             **super().to_json(),
             "partner": self.partner,

@@ -1,4 +1,4 @@
-"""A sampler as a table of numbers: what a scheduler works out anew at every step of every plan, worked out once."""
+"""Samplers as precomputed coefficients of their steps, which diffusers' schedulers compute at every step."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -11,13 +11,13 @@ from copolicy.dataset.exceptions import UnknownNameError
 
 
 class SamplerStep(NamedTuple):
-    """One step of a sampler, from noisy actions x and the network's prediction f to less noisy ones.
+    """One step of a sampler, from noisy actions x and the network's prediction f to less noisy actions.
 
-        x0   = clip((x_in x - f_in f) / divisor), or clip(f) where the network predicts the plan itself (x_in = 0)
-        next = x0_out x0 + x_out x + f_out f + last_out x0 of the step before + noise_out noise
+        x0   = clip((x_in x - f_in f) / divisor), or clip(f) if the network predicts x0 itself (x_in = 0)
+        next = x0_out x0 + x_out x + f_out f + last_out x0 of the previous step + noise_out noise
 
-    DDPM, DDIM and DPM-Solver++ are all of this form. `draws` tells whether noise is drawn, which a DDPM step also
-    does where its share is nil, and which later plans from the same generator depend on.
+    DDPM, DDIM and DPM-Solver++ are all of this form. `draws` states whether noise is drawn; a DDPM step also draws
+    noise of weight zero, which advances the generator.
     """
 
     timestep: int
@@ -32,21 +32,21 @@ class SamplerStep(NamedTuple):
     draws: bool = False
 
 
-class SamplerTable:
+class SamplerCoefficients:
     """The steps of a sampler, equal to those of diffusers' schedulers with clipped samples.
 
-    The coefficients are computed in single precision in the schedulers' order of operations: near the clean end they
-    are differences of numbers close to one, and a more exact result would be another one.
+    The coefficients are computed in single precision in the schedulers' order of operations: at low noise they are
+    differences of numbers close to one, so that a more exact computation would differ from the schedulers.
 
     Attributes:
-        steps: from noise to plan.
+        steps: the steps, from noise to actions.
     """
 
     def __init__(
         self,
         sampler: str,
         prediction_type: str,
-        kept: Tensor,
+        alphas_cumprod: Tensor,
         timesteps: Sequence[int],
         clip_range: float,
         initial_noise_scale: float = 1.0,
@@ -56,18 +56,18 @@ class SamplerTable:
             sampler: "ddpm" (Ho et al., 2020, with the posterior's variance), "ddim" (Song et al., 2021, without
                 noise) or "dpmsolver++" (Lu et al., 2022, second order in two steps, the last one of first order).
             prediction_type: "epsilon", "sample" or "v_prediction".
-            kept: `(num_train_timesteps,)` share of the variance that is signal (alpha bar).
-            timesteps: falling.
+            alphas_cumprod: `(num_train_timesteps,)` proportion of the variance that is signal (alpha bar).
+            timesteps: training steps at which the network is evaluated, decreasing.
             clip_range: x0 is clipped to plus and minus this.
-            initial_noise_scale: standard deviation of the noise that sampling begins with.
+            initial_noise_scale: standard deviation of the initial noise.
 
         Raises:
-            UnknownNameError: no such sampler or prediction type.
+            UnknownNameError: the sampler or the prediction type does not exist.
         """
         make = {"ddpm": _ddpm, "ddim": _ddim, "dpmsolver++": _dpm_solver}
         if sampler not in make:
             raise UnknownNameError("sampler", sampler, make)
-        self.steps = make[sampler](prediction_type, kept.float().cpu(), list(timesteps))
+        self.steps = make[sampler](prediction_type, alphas_cumprod.float().cpu(), list(timesteps))
         self._clip_range, self._initial_noise_scale = clip_range, initial_noise_scale
 
     def sample(
@@ -77,13 +77,12 @@ class SamplerTable:
         tokens: int,
         generator: torch.Generator | None = None,
     ) -> Tensor:
-        """The first tokens of a plan, from noise.
+        """Samples the first `tokens` actions of each sequence.
 
         Args:
-            denoise: the network for a given history, from the index of a step and `(B, tokens, n)`.
+            denoise: the network for given histories, from the index of a step and noisy actions `(B, tokens, n)`.
             noise: `(B, T, n)`, standard normal; scaled here.
-            tokens: how many of the T are sampled. Noise is drawn for all of them, so that a seed means the same
-                plan however much of it is wanted.
+            tokens: number of sampled actions. Noise is drawn for all T, so that results for a seed do not depend on it.
             generator: source of the noise that DDPM adds at each step.
 
         Returns:
@@ -110,14 +109,14 @@ class SamplerTable:
 
 
 def trailing_timesteps(num_train_timesteps: int, num_inference_steps: int) -> list[int]:
-    """Evenly spaced steps, the last training step first ("trailing" in diffusers).
+    """Evenly spaced steps from the last training step down ("trailing" in diffusers).
 
-    With fewer steps than in training, "leading" spacing (diffusers' default) would feed pure noise to the network as
-    if it were half denoised. diffusers' own trailing list ends with a step -1 for some numbers of steps (29, 31, 58,
-    62 and 97 of 100), by the rounding of its range; here it does not.
+    With fewer steps than in training, "leading" spacing (diffusers' default) would give the network pure noise at a
+    step of partly denoised input. diffusers' trailing list ends with a step -1 for some numbers of steps (29, 31, 58,
+    62 and 97 of 100), by a rounding error of its range; this one does not.
     """
-    falling = np.arange(num_train_timesteps, 0, -num_train_timesteps / num_inference_steps)[:num_inference_steps]
-    return (np.round(falling).astype(int) - 1).tolist()
+    steps = np.arange(num_train_timesteps, 0, -num_train_timesteps / num_inference_steps)[:num_inference_steps]
+    return (np.round(steps).astype(int) - 1).tolist()
 
 
 def _draw(like: Tensor, generator: torch.Generator | None) -> Tensor:
@@ -127,7 +126,7 @@ def _draw(like: Tensor, generator: torch.Generator | None) -> Tensor:
 
 
 def _clean(prediction_type: str, signal: Tensor, noise: Tensor) -> tuple[float, float, float]:
-    """`x_in, f_in, divisor` for a noisy sample that is `signal` times the plan and `noise` times noise."""
+    """`x_in, f_in, divisor` for a noisy sample that is `signal` times the clean sample plus `noise` times noise."""
     choices = {
         "epsilon": (1.0, noise.item(), signal.item()),
         "sample": (0.0, -1.0, 1.0),
@@ -138,59 +137,59 @@ def _clean(prediction_type: str, signal: Tensor, noise: Tensor) -> tuple[float, 
     return choices[prediction_type]
 
 
-def _ddpm(prediction_type: str, kept: Tensor, timesteps: list[int]) -> list[SamplerStep]:
+def _ddpm(prediction_type: str, alphas_cumprod: Tensor, timesteps: list[int]) -> list[SamplerStep]:
     steps = []
-    for now, then in zip(timesteps, [*timesteps[1:], None], strict=True):
-        before = kept[now]
-        after = torch.tensor(1.0) if then is None else kept[then]
+    for timestep, next_timestep in zip(timesteps, [*timesteps[1:], None], strict=True):
+        before = alphas_cumprod[timestep]
+        after = torch.tensor(1.0) if next_timestep is None else alphas_cumprod[next_timestep]
         ratio = before / after
         variance = ((1 - after) / (1 - before) * (1 - ratio)).clamp(min=1e-20)
         steps.append(
             SamplerStep(
-                now,
+                timestep,
                 *_clean(prediction_type, before**0.5, (1 - before) ** 0.5),
                 x0_out=(after**0.5 * (1 - ratio) / (1 - before)).item(),
                 x_out=(ratio**0.5 * (1 - after) / (1 - before)).item(),
                 noise_out=(variance**0.5).item(),
-                draws=now > 0,
+                draws=timestep > 0,
             )
         )
     return steps
 
 
-def _ddim(prediction_type: str, kept: Tensor, timesteps: list[int]) -> list[SamplerStep]:
-    # As in diffusers, a step leads down by a whole number of training steps, also where the next step of the list is
-    # one further: take a number of steps that divides the number of training steps where that matters.
-    stride = len(kept) // len(timesteps)
+def _ddim(prediction_type: str, alphas_cumprod: Tensor, timesteps: list[int]) -> list[SamplerStep]:
+    # As in diffusers, each step goes down by the same whole number of training steps, also if the next step of the list
+    # is one further; they agree if the number of sampling steps divides the number of training steps.
+    stride = len(alphas_cumprod) // len(timesteps)
     steps = []
-    for now in timesteps:
-        before = kept[now]
-        after = kept[now - stride] if now >= stride else kept[0] * 0 + 1
-        signal, noise, left = before**0.5, (1 - before) ** 0.5, (1 - after) ** 0.5
-        # The direction of the noise is that of the prediction before it is clipped.
+    for timestep in timesteps:
+        before = alphas_cumprod[timestep]
+        after = alphas_cumprod[timestep - stride] if timestep >= stride else alphas_cumprod[0] * 0 + 1
+        signal, noise, next_noise = before**0.5, (1 - before) ** 0.5, (1 - after) ** 0.5
+        # The direction of the noise is that of the prediction before clipping.
         x_out, f_out = {
-            "epsilon": (torch.tensor(0.0), left),
-            "sample": (left / noise, -left * signal / noise),
-            "v_prediction": (left * noise, left * signal),
-        }.get(prediction_type, (left, left))
+            "epsilon": (torch.tensor(0.0), next_noise),
+            "sample": (next_noise / noise, -next_noise * signal / noise),
+            "v_prediction": (next_noise * noise, next_noise * signal),
+        }.get(prediction_type, (next_noise, next_noise))
         clean = _clean(prediction_type, signal, noise)
-        steps.append(SamplerStep(now, *clean, x0_out=(after**0.5).item(), x_out=x_out.item(), f_out=f_out.item()))
+        steps.append(SamplerStep(timestep, *clean, x0_out=(after**0.5).item(), x_out=x_out.item(), f_out=f_out.item()))
     return steps
 
 
-def _dpm_solver(prediction_type: str, kept: Tensor, timesteps: list[int]) -> list[SamplerStep]:
-    ratios = torch.cat(((((1 - kept) / kept) ** 0.5)[timesteps], torch.zeros(1)))  # noise to signal
+def _dpm_solver(prediction_type: str, alphas_cumprod: Tensor, timesteps: list[int]) -> list[SamplerStep]:
+    ratios = torch.cat(((((1 - alphas_cumprod) / alphas_cumprod) ** 0.5)[timesteps], torch.zeros(1)))  # noise to signal
     signal = 1 / (ratios**2 + 1) ** 0.5
     noise = ratios * signal
-    distance = (signal.log() - noise.log()).diff()  # of each step, in log signal to noise; infinite for the last
+    distance = (signal.log() - noise.log()).diff()  # step sizes in log signal-to-noise ratio; the last is infinite
     steps = []
-    for index, now in enumerate(timesteps):
-        reach = -signal[index + 1] * (torch.exp(-distance[index]) - 1)  # of x0
+    for index, timestep in enumerate(timesteps):
+        reach = -signal[index + 1] * (torch.exp(-distance[index]) - 1)  # weight of x0
         first_order = index in (0, len(timesteps) - 1)
         slope = 0.0 if first_order else (0.5 * reach * distance[index] / distance[index - 1]).item()
         steps.append(
             SamplerStep(
-                now,
+                timestep,
                 *_clean(prediction_type, signal[index], noise[index]),
                 x0_out=reach.item() + slope,
                 x_out=(noise[index + 1] / noise[index]).item(),

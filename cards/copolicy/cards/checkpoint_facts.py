@@ -1,4 +1,4 @@
-"""What a checkpoint and its evaluations say of themselves: everything a model card may state."""
+"""Reads the facts that a model card states, from a checkpoint and its evaluations."""
 
 import hashlib
 from collections.abc import Sequence
@@ -29,16 +29,16 @@ _RESULT = "a result of copolicy-eval"
 
 
 @dataclass(frozen=True)
-class Checkpoint:
-    """A folder with a policy, as LeRobot saves it or as `copolicy-train export` does.
+class CheckpointFacts:
+    """A policy folder as saved by LeRobot or by `copolicy-train export`.
 
     Attributes:
         config: `config.json`.
-        training: steps, batch size, seed, optimizer; empty where not stated.
-        data: what it was trained on.
+        training: steps, batch size, seed, optimizer; empty if not stated.
+        data: the training data.
         weights_sha256: hash of the weights.
         recipe: `recipe.json` of an exported policy, else empty.
-        task: that its configuration names, else that of its data, else the table.
+        task: the task named in the configuration, else that of the data, else the table.
     """
 
     folder: Path
@@ -50,12 +50,12 @@ class Checkpoint:
     task: PairTask
 
     @classmethod
-    def read(cls, path: Path, dataset_root: Path | None = None) -> "Checkpoint":
-        """Reads a checkpoint: its folder, one that holds `pretrained_model`, or a whole run (its newest checkpoint).
+    def read(cls, path: Path, dataset_root: Path | None = None) -> "CheckpointFacts":
+        """Reads a checkpoint from its folder, the parent of `pretrained_model`, or a run folder (newest checkpoint).
 
         Args:
-            dataset_root: folder of the data set it was trained on (default: where the training found it, if it is
-                still there, else what the recipe says).
+            dataset_root: folder of the training data (default: the folder used in training if it exists, else the facts
+                in the recipe).
 
         Raises:
             FileFormatError: no checkpoint, or a damaged one, or no data set at `dataset_root`.
@@ -71,7 +71,9 @@ class Checkpoint:
         training = read_optional_json(folder / "train_config.json", TrainingDocument, "settings of a training") or {}
         recipe = read_optional_json(folder / RECIPE, RecipeDocument, "the recipe of a policy") or {}
         settings = training.get("dataset") or {}
-        root = dataset_root or _training_root(settings)
+        root, training_root = dataset_root, settings.get("root")
+        if root is None and training_root and (Path(training_root) / INFO_FILE).is_file():
+            root = Path(training_root)
         task = config.get("task")
         if root is not None:
             facts = DatasetFacts.read(root)
@@ -88,24 +90,24 @@ class Checkpoint:
 
     @property
     def commands(self) -> list[str]:
-        """How to make data and policy again, as far as it is stated."""
+        """Commands that reproduce data and policy, as far as stated."""
         return [str(command) for command in self.recipe.get("commands") or ()]
 
     def evaluations(self, paths: Sequence[Path]) -> list[dict[str, Any]]:
-        """Reads results of `copolicy-eval` on this very policy.
+        """Reads results of `copolicy-eval` and checks that they are of this policy.
 
         Args:
-            paths: one result each; without any, those that an exported policy keeps in `eval.json`.
+            paths: files with one result each; if empty, `eval.json` of an exported policy is read.
 
         Raises:
-            FileFormatError: not there, no evaluation, or one of other weights.
+            FileFormatError: a missing file, no evaluation, or one of other weights.
             InvalidValueError: the same file twice.
         """
         if not paths:
-            kept = self.folder / EVALUATIONS
-            stored = read_optional_json(kept, KeptEvaluationsDocument, "results of copolicy-eval") or {}
+            path = self.folder / EVALUATIONS
+            stored = read_optional_json(path, KeptEvaluationsDocument, "results of copolicy-eval") or {}
             results = stored.get("evaluations") or []
-            return [self._checked(kept, result) for result in results]
+            return [self._checked(path, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InvalidValueError("--eval", "each file once", [str(path) for path in paths])
         return [self._checked(path, read_optional_json(path, dict, _RESULT)) for path in paths]
@@ -115,13 +117,8 @@ class Checkpoint:
             raise FileFormatError(path, _RESULT, "no such file")
         require_type(result, EvaluationDocument, _RESULT, path)
         weights = result["policy"].get("weights_sha256")
-        # An exported policy makes the same plans as the checkpoint that it came from, and so has the same results.
+        # An exported policy predicts the same actions as its checkpoint, so the results of both are the same.
         if weights not in (self.weights_sha256, (self.recipe.get("weights") or {}).get("exported_from")):
             expected = f"an evaluation of {self.folder.name} (weights {self.weights_sha256[:12]})"
             raise FileFormatError(path, expected, f"one of weights {str(weights)[:12]}")
         return result
-
-
-def _training_root(settings: dict[str, Any]) -> Path | None:
-    root = settings.get("root")
-    return Path(root) if root and (Path(root) / INFO_FILE).is_file() else None

@@ -1,4 +1,4 @@
-"""All frames of a data set as tensors, on any device, and the windows around some of them."""
+"""All frames of a data set as tensors, and batches of windows gathered from them on any device."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,10 +11,10 @@ from torch import Tensor
 from copolicy.dataset.exceptions import RunError
 
 
-class FrameTable:
-    """The columns of N frames, and which frames belong to one episode.
+class FrameTensors:
+    """The columns of N frames and the bounds of their episodes, as tensors on one device.
 
-    Gathering a batch is a few index operations on the table's device; nothing goes through the host.
+    A batch is gathered by a few index operations on that device, without copies from the host.
     """
 
     def __init__(
@@ -25,33 +25,33 @@ class FrameTable:
     ):
         """
         Args:
-            columns: `(N, n)` or `(N,)` each, or N texts.
-            bounds: `(N,)` each, positions of the first and the last frame of each frame's episode.
-            delta_indices: frames of the windows of a column, relative to the current one.
+            columns: `(N, n)` or `(N,)` tensors, or lists of N strings.
+            bounds: two `(N,)` tensors, positions of the first and the last frame of each frame's episode.
+            delta_indices: frames of a column's window, relative to the current frame.
         """
         self._columns = dict(columns)
         self._first, self._last = bounds
-        # Columns with the same windows share them.
-        self._windows_of = {key: tuple(deltas) for key, deltas in delta_indices.items()}
+        # Columns with equal windows share the index tensors.
+        self._deltas_of = {key: tuple(deltas) for key, deltas in delta_indices.items()}
         device = self._first.device
-        self._offsets = {deltas: torch.tensor(deltas, device=device) for deltas in set(self._windows_of.values())}
+        self._offsets = {deltas: torch.tensor(deltas, device=device) for deltas in set(self._deltas_of.values())}
 
-    def to(self, device: torch.device | str) -> "FrameTable":
-        """A copy on a device; texts stay where they are."""
+    def to(self, device: torch.device | str) -> "FrameTensors":
+        """A copy on a device; strings stay on the host."""
         columns = {
             name: values.to(device) if isinstance(values, Tensor) else values for name, values in self._columns.items()
         }
-        return FrameTable(columns, (self._first.to(device), self._last.to(device)), self._windows_of)
+        return FrameTensors(columns, (self._first.to(device), self._last.to(device)), self._deltas_of)
 
     def batch(self, rows: Tensor, indices: Sequence[int]) -> dict[str, Any]:
-        """The columns of some frames, in LeRobot's order.
+        """Gathers a batch of frames, with the keys in LeRobot's order.
 
         Args:
-            rows: `(B,)` positions, on the table's device.
-            indices: the same on the host, for texts.
+            rows: `(B,)` positions, on this object's device.
+            indices: the same positions on the host, for strings.
 
         Returns:
-            A column with windows is `(B, window, n)` and has a mask `KEY_is_pad` `(B, window)`, true where the window
+            A column with a window is `(B, window, n)` and has a mask `KEY_is_pad` `(B, window)`, true where the window
             leaves the episode and repeats its first or last frame; any other column is `(B, n)`, or `(B,)` for n = 1.
         """
         windows = {deltas: self._window(rows, offsets) for deltas, offsets in self._offsets.items()}
@@ -60,16 +60,16 @@ class FrameTable:
             if not isinstance(values, Tensor):
                 batch[key] = [values[index] for index in indices]
             else:
-                batch[key] = values[windows[self._windows_of[key]][0] if key in self._windows_of else rows]
-        for key, deltas in self._windows_of.items():
-            # A copy for each key, since what LeRobot collates shares nothing either.
+                batch[key] = values[windows[self._deltas_of[key]][0] if key in self._deltas_of else rows]
+        for key, deltas in self._deltas_of.items():
+            # A copy for each key, since tensors that LeRobot collates do not share memory either.
             batch[f"{key}_is_pad"] = windows[deltas][1].clone()
         return batch
 
     def _window(self, rows: Tensor, offsets: Tensor) -> tuple[Tensor, Tensor]:
-        wanted = rows[:, None] + offsets  # (B, window)
+        positions = rows[:, None] + offsets  # (B, window)
         first, last = self._first[rows, None], self._last[rows, None]
-        return wanted.clamp(first, last), (wanted < first) | (wanted > last)
+        return positions.clamp(first, last), (positions < first) | (positions > last)
 
 
 def episode_bounds(
@@ -78,14 +78,14 @@ def episode_bounds(
     """Positions of the first and the last frame of each frame's episode, `(N,)` each.
 
     Args:
-        index: `(N,)` of each frame in the whole data set.
-        episode: `(N,)` of each frame.
-        starts: first frame of each episode of the whole data set.
-        stops: frame after its last one.
-        root: of the data set, for the error.
+        index: `(N,)` index of each frame in the whole data set.
+        episode: `(N,)` episode of each frame.
+        starts: index of the first frame of each episode of the whole data set.
+        stops: index after the last frame of each episode.
+        root: folder of the data set, for the error message.
 
     Raises:
-        RunError: the rows of an episode are not there or not in order.
+        RunError: rows of an episode are missing or not in order.
     """
     broken = np.flatnonzero(episode >= len(starts))
     if not len(broken):
@@ -105,10 +105,10 @@ def episode_bounds(
 
 
 def column_values(name: str, column: pa.ChunkedArray, shape: Sequence[int]) -> Tensor | list[str]:
-    """A column with the dtypes that LeRobot's own reader gives: float32, int64, bool, or texts.
+    """Converts a column to the types of LeRobot's reader: float32, int64 or bool tensors, or a list of strings.
 
     Raises:
-        RunError: it has empty values.
+        RunError: the column has empty values.
     """
     array = column.combine_chunks()
     if isinstance(array, pa.ExtensionArray):

@@ -1,4 +1,4 @@
-"""Planning with the same weights and the same noise as the plain sampler, and without what it computes in vain."""
+"""Samples action sequences faster than the plain sampler, from the same weights and noise with the same result."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -14,7 +14,7 @@ from ..denoiser_transformer import TransformerDenoiser
 from .backend import AUTO
 from .fastest_backend import fastest_backend
 from .mlp import FastMlp
-from .sampler_table import SamplerTable
+from .sampler_coefficients import SamplerCoefficients
 from .transformer import FastTransformer
 
 
@@ -23,34 +23,34 @@ class _Denoiser(Protocol):
 
 
 class _Prepared(NamedTuple):
-    """A network made ready for a number of tokens, and the weights that it was made from."""
+    """A network prepared for a number of tokens, and the state of the weights it was made from."""
 
     weights: tuple
     network: FastTransformer | FastMlp
     denoiser: _Denoiser
 
 
-class FastPlanner:
-    """Samples plans through tables that are made from a network's weights, and made again when the weights change.
+class FastSampler:
+    """Samples with tensors that are precomputed from a network's weights, and recomputed when the weights change.
 
-    Changes are seen by PyTorch's version counters: those of optimizers, averages, initialisers and loading all count;
+    Changes are detected by PyTorch's version counters, which optimizers, averages, initialisers and loading advance;
     writing into `parameter.data` does not.
 
     Args:
-        table: the sampler.
+        coefficients: the sampler.
         backend: "torch", on a CPU "onnx" (ONNX Runtime) or "numba", or "auto" for the fastest of them.
 
     Attributes:
-        used: backends that have planned.
+        used: names of the backends used so far.
     """
 
-    def __init__(self, table: SamplerTable, backend: str):
-        self._table, self._backend = table, backend
+    def __init__(self, coefficients: SamplerCoefficients, backend: str):
+        self._coefficients, self._backend = coefficients, backend
         self._prepared: dict[tuple[int, str], _Prepared] = {}
-        self._most = 0  # plans made at once
+        self._largest_batch = 0
         self.used: set[str] = set()
 
-    def plan(
+    def sample(
         self,
         network: nn.Module,
         condition: Tensor,
@@ -58,56 +58,56 @@ class FastPlanner:
         tokens: int,
         generator: torch.Generator | None = None,
     ) -> Tensor:
-        """The first tokens of a plan.
+        """Samples the first `tokens` actions of each sequence.
 
         Args:
             network: a `TransformerDenoiser` or `MlpDenoiser`.
             condition: `(B, To, condition_size)`.
             noise: `(B, T, action_size)`, standard normal.
-            tokens: how many actions of the plan are wanted, from its first on.
+            tokens: number of actions, from the first one of the sequence on.
             generator: source of the noise that DDPM adds at each step.
 
         Returns:
             `(B, tokens, action_size)` in [-1, 1].
 
         Raises:
-            InvalidValueError: a backend other than torch was asked to plan on another device than the CPU.
+            InvalidValueError: a backend other than torch on another device than the CPU.
         """
         if self._backend not in (AUTO, "torch") and condition.device.type != "cpu":
             raise InvalidValueError(f"policy.device, for policy.backend={self._backend}", "cpu", condition.device.type)
-        backend = self._chosen(condition)
+        backend = self._backend_for(condition)
         self.used.add(backend)
-        ready = self._ready(network, condition.device, tokens, backend)
+        prepared = self._prepare(network, condition.device, tokens, backend)
 
         def denoise(index: int, actions: Tensor) -> Tensor:
-            return ready.denoiser.denoise(actions, at(index))
+            return prepared.denoiser.denoise(actions, inputs_at(index))
 
-        # Automatic mixed precision is torch's; the others take float32.
+        # Automatic mixed precision applies to torch only; other backends take float32.
         with nullcontext() if backend == "torch" else torch.autocast("cpu", enabled=False):
-            at = ready.network.begin(condition if backend == "torch" else condition.float())
-            return self._table.sample(denoise, noise, ready.network.tokens, generator)[:, :tokens]
+            inputs_at = prepared.network.begin(condition if backend == "torch" else condition.float())
+            return self._coefficients.sample(denoise, noise, prepared.network.tokens, generator)[:, :tokens]
 
-    def _chosen(self, condition: Tensor) -> str:
+    def _backend_for(self, condition: Tensor) -> str:
         if self._backend != AUTO:
             return self._backend
-        # The tables of a study end one after the other: the last one is not worth making another backend ready.
-        self._most = max(self._most, len(condition))
-        return fastest_backend(condition, self._most)
+        # In a study the batch shrinks as episodes end; preparing another backend for its last episodes is slower.
+        self._largest_batch = max(self._largest_batch, len(condition))
+        return fastest_backend(condition, self._largest_batch)
 
-    def _ready(self, network: nn.Module, device: torch.device, tokens: int, backend: str) -> _Prepared:
+    def _prepare(self, network: nn.Module, device: torch.device, tokens: int, backend: str) -> _Prepared:
         weights = tuple((weight.data_ptr(), _version(weight)) for weight in network.parameters())
-        ready = self._prepared.get((tokens, backend))
-        if ready is None or ready.weights != weights:
-            timesteps = torch.tensor([step.timestep for step in self._table.steps], device=device)
-            # Tables keep full precision, also where the plan itself is made under automatic mixed precision.
+        prepared = self._prepared.get((tokens, backend))
+        if prepared is None or prepared.weights != weights:
+            timesteps = torch.tensor([step.timestep for step in self._coefficients.steps], device=device)
+            # Precomputed tensors have full precision, also under automatic mixed precision.
             with torch.autocast(device.type, enabled=False):
                 fast = _fast(network)(network, timesteps, tokens)
                 denoiser = _denoiser(fast, backend)
-            ready = self._prepared[tokens, backend] = _Prepared(weights, fast, denoiser)
-        return ready
+            prepared = self._prepared[tokens, backend] = _Prepared(weights, fast, denoiser)
+        return prepared
 
     def __getstate__(self) -> dict:
-        """Without what was prepared: a session of ONNX Runtime can be neither copied nor pickled."""
+        """State without prepared networks: a session of ONNX Runtime can be neither copied nor pickled."""
         return {**self.__dict__, "_prepared": {}}
 
 
