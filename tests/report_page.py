@@ -20,7 +20,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics
-from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
+from copolicy.tasks.table.statistics.route_statistics import route_statistics as routes_of_tables
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REPORT = "report.html"

@@ -87,7 +87,7 @@ def test_a_card_states_what_training_and_evaluation_wrote(run, dataset, tmp_path
     assert "| coplan | unseen, first 5 | ddim, 10 steps, noise x 0.7 | 50.0 ± 4.7 |" in text
     assert "Only a part of the maps of unseen was evaluated." in text
     assert "**Co-planning in simulation: no person took part.**" in text
-    assert "**No person took part.** Two scripted pilots" in text
+    assert "**No person took part.** Two scripted agents" in text
     assert "- Data set: `lab/table`\n- Source: simulated (4)\n- Episodes used: 2 of 4 (50.0 %)" in text
     assert "| training `seed` | 7 |" in text
     assert "| parameters | 1,132,464 |" in text

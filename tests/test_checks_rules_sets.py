@@ -9,19 +9,19 @@ from changed_tables import all_frames, find, of, with_column, with_entry, with_f
 from copolicy.dataset.checks.episode_table import EpisodeTable
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.tasks.table.maps import MAP_SETS, identify, map_set
-from copolicy.tasks.table.rules.maps import named_map
+from copolicy.tasks.table.rules.maps import map_by_name
 
 
 def test_maps_by_name():
     for name in MAP_SETS:
         for config in map_set(name, orientations=True):
-            assert named_map(identify(config)[0]) is not None
+            assert map_by_name(identify(config)[0]) is not None
     config = map_set("training", orientations=True)[4 * 17 + 1]
     assert identify(config)[0] == "training-17-90deg"
-    assert named_map("training-17-90deg") == config
-    assert named_map("training-17-90deg-displaced") == config
+    assert map_by_name("training-17-90deg") == config
+    assert map_by_name("training-17-90deg-displaced") == config
     for name in ("training-84", "training-17-45deg", "nowhere-01", "", "custom-1a2b3c4d"):
-        assert named_map(name) is None
+        assert map_by_name(name) is None
 
 
 def test_wrong_maps(sound):

@@ -20,10 +20,10 @@ from copolicy.evaluate.partner_study.episode_result import PartnerEpisodeResult
 from copolicy.evaluate.partner_study.robots import policy_robot, scripted_robots
 from copolicy.evaluate.partner_study.study import run_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
-from copolicy.tasks.table.agents import Habits
+from copolicy.tasks.table.agents import PlayerProfile
 from copolicy.tasks.table.agents.players import simulated_partner
 from copolicy.tasks.table.agents.profiles import PARTNERS
-from copolicy.tasks.table.agents.scripted import ScriptedPilot
+from copolicy.tasks.table.agents.scripted_player import ScriptedPlayer
 from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
@@ -34,28 +34,28 @@ ROBOTS = scripted_robots(get_task())
 
 
 @pytest.fixture(scope="module")
-def habits():
+def measured_kinds():
     """What an observer measures of each kind, with the same usual robot on the same maps."""
     measured = {}
     for kind in PARTNERS:
         seconds, changes, effort, unrest = [], [], [], []
         for seed, config in enumerate(MAPS):
-            robot, partner = ScriptedPilot(0, config, Habits(), seed), simulated_partner(config, kind, seed)
+            robot, partner = ScriptedPlayer(0, config, PlayerProfile(), seed), simulated_partner(config, kind, seed)
             world, forces, outcome = TableWorld(config, Physics(step_limit=2000)), [], None
             while outcome is None or not outcome.done:
                 state = world.observation
                 forces.append(partner.act(state))
                 outcome = world.step(np.concatenate((robot.act(state), forces[-1])))
             seconds.append(len(forces) / 30)
-            changes.append(partner.intention.changes)
+            changes.append(partner.route_choice.changes)
             effort.append(np.hypot(*np.transpose(forces)).mean())
             unrest.append(np.abs(np.diff(forces, axis=0)).mean())
         measured[kind] = tuple(float(np.mean(one)) for one in (seconds, changes, effort, unrest))
     return measured
 
 
-def test_kinds_of_partner_differ_in_what_can_be_measured(habits):
-    seconds, changes, effort, unrest = ({kind: one[k] for kind, one in habits.items()} for k in range(4))
+def test_kinds_of_partner_differ_in_what_can_be_measured(measured_kinds):
+    seconds, changes, effort, unrest = ({kind: one[k] for kind, one in measured_kinds.items()} for k in range(4))
     assert seconds["slow"] == max(seconds.values()) > 1.2 * seconds["stubborn"]
     assert changes["stubborn"] < min(changes["follower"], changes["erratic"])
     assert effort["follower"] < 0.65 * effort["stubborn"]
@@ -64,8 +64,8 @@ def test_kinds_of_partner_differ_in_what_can_be_measured(habits):
 
 def test_a_partner_wants_its_route_whoever_the_other_is():
     first, second = (simulated_partner(MAPS[0], "erratic", 5) for _ in range(2))
-    assert first.intention.route.sides == second.intention.route.sides
-    wishes = {simulated_partner(MAPS[0], "erratic", seed).intention.route.sides for seed in range(12)}
+    assert first.route_choice.route.sides == second.route_choice.route.sides
+    wishes = {simulated_partner(MAPS[0], "erratic", seed).route_choice.route.sides for seed in range(12)}
     assert len(wishes) > 2
     with pytest.raises(UnknownNameError) as error:
         simulated_partner(MAPS[0], "kind", 0)

@@ -105,7 +105,7 @@ def test_what_select_action_alone_can_do_is_asked_frame_by_frame(random_table, t
     assert policy.keeps_history
     agent = PolicyAgent(policy, task)
     maps = task.scenario_sets["unseen"][:2]
-    rollout = Rollout(task, maps, (agent, agent.other_half()))
+    rollout = Rollout(task, maps, (agent, agent.human_half()))
     seen = []
     for _ in range(9):
         seen.append([world.observation for world in rollout.worlds])

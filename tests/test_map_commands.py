@@ -69,7 +69,7 @@ def test_make_writes_a_file_that_passes(tmp_path, capsys):
     assert output(capsys, "maps", "check", path)[0] == 0
     for bound, line in (
         ("obstacle=2", "unknown bound 'obstacle'; available: goal_x, goal_y, obstacle_size,"),
-        ("obstacles=3:2", "--bounds: expected a lowest value that is not above the highest, found 'obstacles=3:2'"),
+        ("obstacles=3:2", "--bounds: expected LOW not above HIGH, both within 1e6 of 0, found 'obstacles=3:2'"),
         ("obstacles=two", "--bounds: expected NAME=LOW:HIGH or NAME=VALUE, in numbers, found 'obstacles=two'"),
     ):
         status, _, err = output(

@@ -42,7 +42,7 @@ def folders(tmp_path_factory) -> Path:
     """Recordings and data sets under two physics: `half`, `eighth` and, converted together, `both`."""
     folder = tmp_path_factory.mktemp("mixtures")
     simulate(folder / "raw" / "half", 3, seed=1, workers=1)
-    simulate(folder / "raw" / "eighth", 2, seed=2, workers=1, physics=EIGHTH)
+    simulate(folder / "raw" / "eighth", 2, seed=2, workers=1, settings=EIGHTH)
     for name in ("half", "eighth"):
         make_data_set(folder / "raw" / name, folder / name)
     make_data_set(folder / "raw", folder / "both")

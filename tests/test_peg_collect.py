@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from play_session import SimulatedClock, settings
 
-from copolicy.collect.agents import HeldAgent, PersonAgent, PolicyAgent, ReplayAgent
+from copolicy.collect.agents import ConstantAgent, PersonAgent, PolicyAgent, ReplayAgent
 from copolicy.collect.cli import main
 from copolicy.collect.episodes import run_episodes
 from copolicy.collect.inputs import HALVES, InputSample
@@ -324,12 +324,12 @@ def test_one_number_is_the_stick_from_side_to_side(low, high, pushes):
     [Vector(("x", "y", "z"), ("N",) * 3, (-1.0,) * 3, (1.0,) * 3), Vector(("grip",), ("N",), (0.5,), (1.0,))],
 )
 def test_an_action_that_no_stick_gives_is_refused(action):
-    with pytest.raises(InvalidValueError, match="--players joystick: expected a task whose players act by one or two"):
+    with pytest.raises(InvalidValueError, match="--players joystick: expected a task with actions of one or two"):
         PersonAgent("joystick", action=action)
 
 
 def test_a_recording_of_another_task_is_not_replayed_at_a_seat(peg, simulated):
-    assert ReplayAgent(simulated[0], peg).map_config == read_episode(simulated[0]).scenario
+    assert ReplayAgent(simulated[0], peg).scenario == read_episode(simulated[0]).scenario
     with pytest.raises(CopolicyError, match="expected a recording of the task 'table', found one of 'peg'"):
         ReplayAgent(simulated[0])
 
@@ -353,7 +353,7 @@ def test_a_policy_holds_its_actions_at_the_rate_of_the_task(peg):
             return np.full((1, 1, 2), self.frame / 100)
 
     robot = PolicyAgent(Counting(), peg)
-    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, HeldAgent(np.zeros(1))))
+    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, ConstantAgent(np.zeros(1))))
     taken = []
     for _ in range(6):
         rollout.step()
@@ -374,7 +374,7 @@ def test_the_loop_is_measured_at_the_rate_of_the_task():
 
 
 def test_a_policy_is_filmed_with_a_simulated_partner(peg):
-    from copolicy.collect.demonstration.film import SIZE, demonstrate, pictures
+    from copolicy.collect.demonstration.video import SIZE, demonstrate, draw_images
 
     class Pushing:
         """Both push to the right, gently."""
@@ -391,7 +391,7 @@ def test_a_policy_is_filmed_with_a_simulated_partner(peg):
     assert (track.episode.fps, track.episode.meta.duration_s) == (20, track.steps / 20)
     assert (track.task, track.episode.meta.controller_1) == (peg, "scripted:lazy")
     assert verify(track)["max_drift_position"] == 0.0
-    frames = sum(1 for _ in pictures(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
+    frames = sum(1 for _ in draw_images(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
     assert frames == len(sampled(track, 4, 2.0)) + 4
     with pytest.raises(
         InvalidValueError, match="task: expected 'peg', which policy:pushing has learned, found 'table'"

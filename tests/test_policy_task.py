@@ -95,9 +95,9 @@ def test_another_task_trains_on_its_scaled_numbers_alone(peg, tmp_path, capsys):
 
     loaded_again = Checkpoint(out)
     assert loaded_again.task == "peg"
-    assert loaded_again.conditions.physics == peg.settings_type()
+    assert loaded_again.conditions.settings == peg.settings_type()
     assert main([f"--policy.path={trained(out)}", *flags(data, tmp_path / "on", steps=1)[:2], "--steps=1"]) == 0
-    assert Checkpoint(out).conditions.physics == peg.settings_type()
+    assert Checkpoint(out).conditions.settings == peg.settings_type()
     assert main(["export", str(out), "--out", str(tmp_path / "model"), "--json"]) == 0
     assert json.loads((tmp_path / "model" / "config.json").read_text(encoding="utf-8"))["task"] == "peg"
 

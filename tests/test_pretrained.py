@@ -14,7 +14,7 @@ from safetensors import safe_open
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder, load_policy, pretrained_folder
 from copolicy.collect.cli import main as collect
-from copolicy.collect.demonstration.film import demonstrate
+from copolicy.collect.demonstration.video import demonstrate
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PilotSpec
 from copolicy.collect.session import Balance

@@ -9,7 +9,7 @@ from copolicy.dataset.statistics.entropy import entropy, jensen_shannon, miller_
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics, word_entropy
 from copolicy.tasks.table.statistics.human_routes import human_distance, human_route_entropy, human_routes
-from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
+from copolicy.tasks.table.statistics.route_statistics import route_statistics as routes_of_tables
 
 
 def _routes(data):

@@ -19,7 +19,7 @@ from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.collect.play.command import _angular_limit
 from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.rollout import Start
+from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.evaluate.human_study.plan import StudyPlan
@@ -116,7 +116,7 @@ def test_a_mixture_is_recorded_with_its_counts_and_is_no_physics(copied_table, c
 
 def test_what_a_checkpoint_does_not_say_is_assumed_and_said(old, tmp_path):
     conditions = training_conditions(old)
-    assert (conditions.fps, conditions.physics) == (10, Physics())
+    assert (conditions.fps, conditions.settings) == (10, Physics())
     assert conditions.notes == (
         "the checkpoint does not say its rate; 10 frames a second are assumed",
         "the checkpoint does not say its physics; angular acceleration up to pi/2 rad/s^2 is assumed",
@@ -207,7 +207,7 @@ class _Fast:
 def test_a_policy_of_30_hz_at_a_seat_acts_anew_at_every_step():
     agent, worlds = PolicyAgent(_Fast(), real_time=True), np.array([0])
     world = TableWorld(MAP_SETS["training"][0])
-    agent.begin(0, [Start(world.map_config, 0, world.observation)])
+    agent.begin(0, [EpisodeStart(world.map_config, 0, world.observation)])
     forces = []
     for _ in range(3):
         agent.wait(10)

@@ -8,10 +8,10 @@ import pytest
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.outline import placed
 from copolicy.dataset.task import Outcome
+from copolicy.tasks.table.geometry import CIRCLE_CENTRE, TRIANGLE, image_size
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
-from copolicy.tasks.table.outline import CIRCLE_CENTRE, TRIANGLE, image_size
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.reward import reward
 from copolicy.tasks.table.world import Contact, TableWorld

@@ -47,7 +47,7 @@ def coplan_episodes(
         raise InvalidValueError("n_action_steps", f"1 to {loaded.chunk_size}, the actions of a chunk", n_action_steps)
     loaded.n_action_steps = loaded.n_predicted_actions = n_action_steps
     task = get_task(loaded.task)
-    settings, step_limit = loaded.conditions.physics, task.studies.step_limit
+    settings, step_limit = loaded.conditions.settings, task.studies.step_limit
     settings = settings if step_limit is None else replace(settings, step_limit=step_limit)
     robot = PolicyAgent(loaded, task, seed=seed)
     return run_episodes(robot, None, maps, task=loaded.task, limit=limit, seed=seed, settings=settings)

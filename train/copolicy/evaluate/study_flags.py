@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
-from copolicy.collect.angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
+from copolicy.collect.angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, FIGURES, POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number, seed
@@ -102,7 +102,7 @@ def study_protocol(arguments: argparse.Namespace, policies: Iterable[tuple[str, 
             logging.info("%s: %s", name, note)
     task = _one_task({name: conditions.task for name, conditions in policies})
     default, limit_flag = default_settings(task, arguments.step_limit), arguments.angular_limit
-    learned = {name: replace(conditions.physics, step_limit=default.step_limit) for name, conditions in policies}
+    learned = {name: replace(conditions.settings, step_limit=default.step_limit) for name, conditions in policies}
     if limit_flag is None and len(set(learned.values())) > 1:
         summaries = {name: task.settings_summary(settings) for name, settings in learned.items()}
         if angular_limit_of(default) is not None:
@@ -112,10 +112,10 @@ def study_protocol(arguments: argparse.Namespace, policies: Iterable[tuple[str, 
     settings = next(iter(learned.values()), default)
     contradictions: list[str] = []
     if limit_flag is not None:
-        settings = limited(task, settings, limit_flag)
+        settings = with_angular_limit(task, settings, limit_flag)
         contradictions += [
             f"--angular-limit {limit_flag}: {name} learned with {limit:.4g} rad/s^2"
-            for name, limit in ((name, getattr(world, LIMIT)) for name, world in learned.items())
+            for name, limit in ((name, getattr(world, LIMIT_SETTING)) for name, world in learned.items())
             if not math.isclose(limit, ANGULAR_LIMITS[limit_flag])
         ]
     fps_flag = getattr(arguments, "fps", None)
@@ -146,7 +146,7 @@ def default_settings(task: PairTask, step_limit: int | None = None) -> Any:
 
 def recorded_settings(task: PairTask, settings: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """World settings for a result or a study plan: those that flags set, and all of them if others are not default."""
-    names = [field.name for field in fields(settings) if field.name in ("step_limit", LIMIT)]
+    names = [field.name for field in fields(settings) if field.name in ("step_limit", LIMIT_SETTING)]
     flagged = {name: getattr(settings, name) for name in sorted(names, reverse=True)}
     return flagged, ({} if settings == task.settings_type(**flagged) else {"physics": asdict(settings)})
 

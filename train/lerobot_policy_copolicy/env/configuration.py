@@ -8,7 +8,7 @@ import gymnasium
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs import EnvConfig
 
-from copolicy.collect.agents.simulated import pair_name
+from copolicy.collect.agents.simulated_players import pair_name
 from copolicy.dataset.clock import stride
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import (

@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from copolicy.collect.agents import HeldAgent, ScriptedAgent
+from copolicy.collect.agents import ConstantAgent, ScriptedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
@@ -105,10 +105,10 @@ class PairEnv(gymnasium.Env):
         self.map_index, scenario = int(index), self.scenarios[index]
         self._view: SceneView | None = None
         self._environment = self.pair_task.scenario_vector(scenario).astype(np.float32)
-        self._seat_agents = HeldAgent(np.zeros(self._size)), HeldAgent(np.zeros(self._size))
+        self._seat_agents = ConstantAgent(np.zeros(self._size)), ConstantAgent(np.zeros(self._size))
         agents, seed = self._seat_agents, 0
         if self.partner:
-            partner = ScriptedAgent.of_pair(self.partner, self.pair_task)
+            partner = ScriptedAgent.from_pair(self.partner, self.pair_task)
             agents, seed = (self._seat_agents[0], partner), int(self.np_random.integers(2**31))
         self._rollout = Rollout(
             self.pair_task, [scenario], agents, seeds=[seed], settings=self.world_settings, beyond_end=True

@@ -10,7 +10,7 @@ from lerobot.teleoperators.teleoperator import Teleoperator
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 from lerobot.utils.errors import DeviceNotConnectedError
 
-from copolicy.collect.devices import follow_pads, open_pads
+from copolicy.collect.devices import open_gamepads, poll_gamepads
 from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, TwinWatch, user_config_folder
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import get_task
@@ -81,8 +81,8 @@ class CopolicyPair(Teleoperator):
         Raises:
             DeviceNotConnectedError: fewer than two gamepads, no press of a button in time, or a gamepad cannot steer.
         """
-        pads = open_pads(self.config.calibration_dir)
-        follow_pads(pads)
+        pads = open_gamepads(self.config.calibration_dir)
+        poll_gamepads(pads)
         if len(pads) < len(PLAYERS):
             raise DeviceNotConnectedError(f"{self.name}: expected two gamepads, found {len(pads)} plugged in")
         if self.config.join:
@@ -163,7 +163,7 @@ class CopolicyPair(Teleoperator):
 
     def _read(self) -> None:
         assert self._pads is not None
-        for pad in follow_pads(self._pads):
+        for pad in poll_gamepads(self._pads):
             for seat, bound in zip(PLAYERS, self._seats, strict=True):
                 if bound.instance_id == pad.instance_id:
                     # The axes of an unplugged gamepad read as zero.
@@ -185,7 +185,7 @@ class CopolicyPair(Teleoperator):
             end = time.monotonic() + self.config.timeout_s
             alone, together = 0, ""
             while True:
-                follow_pads(pads)
+                poll_gamepads(pads)
                 pressed = [pad for pad in pads if any(_pressed(pad))]
                 free = [pad for pad in pressed if pad not in seats]
                 if free and len(free) < len(pressed):

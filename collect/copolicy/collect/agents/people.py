@@ -1,4 +1,4 @@
-"""People: a joystick, or one half of the keyboard."""
+"""A person as an agent, with a gamepad or one half of the keyboard."""
 
 import time
 from collections.abc import Callable
@@ -18,13 +18,13 @@ _PLANE = Vector(("x", "y"), ("a player's full force",) * 2, (-1.0, -1.0), (1.0, 
 
 
 class PersonAgent(Agent):
-    """A person with a device in hand; which one can change whenever it is unplugged.
+    """A person with an input device, which can be replaced when it is unplugged.
 
-    The device is read in `act` itself, so a reading serves one step and no other. An action of two numbers is where the
-    stick stands, x and y; one of one number is its x, to the right positive. Full deflection is the bound of a number.
+    `act` reads the device, so that each reading is used for one step. An action of two numbers is the deflection of the
+    stick, x and y; an action of one number is its x, positive to the right. Full deflection is the bound of a number.
 
     Attributes:
-        name: of the kind of device.
+        name: kind of the device.
     """
 
     is_person = True
@@ -32,13 +32,14 @@ class PersonAgent(Agent):
     def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns, action: Vector = _PLANE):
         """
         Args:
-            action: of one player of the task.
+            clock: monotonic time, ns.
+            action: vector of one player's action in the task.
 
         Raises:
-            InvalidValueError: it has more numbers than a stick, or a player cannot rest.
+            InvalidValueError: the action has more numbers than a stick, or its bounds exclude 0.
         """
         if not (len(action) in (1, 2) and all(low <= 0 <= high for low, high in zip(*action.bounds, strict=True))):
-            expected = "a task whose players act by one or two numbers that can be 0: a stick has no more"
+            expected = "a task with actions of one or two numbers that can be 0, as a stick has"
             raise InvalidValueError(f"--players {name}", expected, action.names)
         self.name = name
         self._bounds = action.bounds
@@ -49,7 +50,7 @@ class PersonAgent(Agent):
 
     @property
     def device(self) -> Pad | KeyboardHalf | None:
-        """Joystick or half of the keyboard; None until somebody has joined with one."""
+        """Gamepad or half of the keyboard; None until the player has joined."""
         return self._device
 
     @device.setter
@@ -58,7 +59,7 @@ class PersonAgent(Agent):
 
     @property
     def calibration(self) -> StickCalibration:
-        """Of a joystick."""
+        """Calibration of the stick."""
         return self._calibration
 
     @calibration.setter
@@ -67,17 +68,17 @@ class PersonAgent(Agent):
 
     @property
     def push_at_rest(self) -> float:
-        """How hard the stick pushes while nobody touches it, share of the full force; 0 where it does not."""
+        """Force of the stick at rest, as a proportion of the full force; 0 for a centred stick."""
         return self._rest.push
 
     def watch_rest(self) -> None:
-        """Looks at the stick between the episodes; once a tick."""
+        """Measures the stick between episodes; called once a tick."""
         if self._has_stick:
             still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
             self._rest.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
-        """What the device says now.
+        """Reads the device.
 
         Raises:
             RunError: there is no device.
@@ -87,12 +88,12 @@ class PersonAgent(Agent):
         return self.device.sample(self._clock())
 
     def force(self, sample: InputSample) -> Force:
-        """The force that a sample stands for."""
+        """The force of a sample, x and y in [-1, 1]."""
         device = self.device
         return device.force(sample, self.calibration) if isinstance(device, Pad) else keyboard_force(sample)
 
     def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Reads the device, right after the event queue was pumped."""
+        """Reads the device; the event queue must have been pumped just before."""
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:

@@ -13,7 +13,7 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
+from ..angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
 from .settings import PilotSpec, PlaySettings
 
 _AS_GIVEN = (
@@ -122,7 +122,7 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
     task = task or get_task()
     usual = task.settings_type()
     bound = angular_limit_of(usual)
-    given = None if flag is None else angular_limit_of(limited(task, usual, flag))
+    given = None if flag is None else angular_limit_of(with_angular_limit(task, usual, flag))
     learned: dict[str, float] = {}
     for pilot in pilots:
         if pilot.kind == "policy":
@@ -132,10 +132,10 @@ def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask
                 raise InvalidValueError(f"policy:{pilot.detail}", expected, conditions.task)
             for note in conditions.notes:
                 logging.info("%s: %s", pilot.detail, note)
-            rest = conditions.physics
+            rest = conditions.settings
             if bound is not None:
-                learned[pilot.detail] = getattr(conditions.physics, LIMIT)
-                rest = limited(task, rest, bound)
+                learned[pilot.detail] = getattr(conditions.settings, LIMIT_SETTING)
+                rest = with_angular_limit(task, rest, bound)
             if rest != usual:
                 logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)
     if given is None:

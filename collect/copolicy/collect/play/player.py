@@ -122,7 +122,7 @@ def replayed_map(players: Iterable[Player]) -> Any | None:
     Raises:
         InvalidValueError: two recordings of different maps.
     """
-    maps = {one.agent.map_config for one in players if isinstance(one.agent, ReplayAgent)}
+    maps = {one.agent.scenario for one in players if isinstance(one.agent, ReplayAgent)}
     if len(maps) > 1:
         raise InvalidValueError("pilots", "replays of one map", sorted(config.digest for config in maps))
     return maps.pop() if maps else None
@@ -132,7 +132,7 @@ def say_other_physics(players: Iterable[Player], physics: Any, task: PairTask | 
     """Actions of an earlier recording lead elsewhere under other settings."""
     for player in players:
         if isinstance(player.agent, ReplayAgent):
-            recorded = replace(player.agent.physics, step_limit=physics.step_limit)
+            recorded = replace(player.agent.settings, step_limit=physics.step_limit)
             if recorded != physics:
                 words = (player.agent.name, physics_summary(recorded, task), physics_summary(physics, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", *words)
@@ -146,7 +146,7 @@ def keyboard_half(name: int | str) -> KeyboardHalf | None:
 def _agent(spec: PilotSpec, task: PairTask, clock: Callable[[], int]) -> Agent:
     match spec.kind:
         case "scripted":
-            return ScriptedAgent.of_pair(spec.detail, task)
+            return ScriptedAgent.from_pair(spec.detail, task)
         case "replay":
             return ReplayAgent(Path(spec.detail), task)
         case "policy":

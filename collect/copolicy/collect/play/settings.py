@@ -11,8 +11,8 @@ from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import TABLE, get_task
 
-from ..agents.simulated import pair_name
-from ..angular_limit import angular_limit_of, limited
+from ..agents.simulated_players import pair_name
+from ..angular_limit import angular_limit_of, with_angular_limit
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 PILOT_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
@@ -121,7 +121,7 @@ class PlaySettings:
         """Settings of the world."""
         task = get_task(self.task)
         usual = task.settings_type()
-        return usual if self.angular_limit is None else limited(task, usual, self.angular_limit)
+        return usual if self.angular_limit is None else with_angular_limit(task, usual, self.angular_limit)
 
     @functools.cached_property
     def scenarios(self) -> ScenarioSet:

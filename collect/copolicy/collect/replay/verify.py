@@ -11,7 +11,7 @@ from copolicy.dataset.task import Outcome
 from copolicy.dataset.task_spec import TIMEOUT
 
 from ..agents import RecordedAgent
-from ..angular_limit import angular_limit_of, limited
+from ..angular_limit import angular_limit_of, with_angular_limit
 from ..rollout import Rollout, Trace
 from .track import Track
 
@@ -45,7 +45,7 @@ def verify(
         if not 0 < limit < math.inf:
             raise InvalidValueError(f"limit in {name}", "a positive number", limit)
         limits[name] = limit
-    settings = episode.settings if angular_limit is None else limited(task, episode.settings, angular_limit)
+    settings = episode.settings if angular_limit is None else with_angular_limit(task, episode.settings, angular_limit)
     drift, outcome, ended = _simulate(track, settings)
     beyond = np.flatnonzero((drift > list(limits.values())).any(axis=1))
     recorded = episode.meta.termination_reason

@@ -1,8 +1,8 @@
-"""The world's step over whole arrays, forward and backward, for files that do not hold every state.
+"""The step of the world on arrays, forward and backward, for files that do not store every state.
 
 A step from (q, v) with acceleration a goes to q + v dt + a dt^2 / 2 and v + a dt; with both velocities known that
 is q + (v + v') dt / 2. Linear: a = (50 sum u - b v) / m. Angular: alpha = clip((M(theta) - d omega) / I, -c, c)
-with the torque M. The equations are those of the original program; `TableWorld` is the reference they are held to.
+with the torque M. The equations are those of the original program; tests compare them with `TableWorld`.
 """
 
 import math
@@ -42,7 +42,7 @@ def step_linear(
 def undo_linear(
     position: np.ndarray, velocity: np.ndarray, actions: np.ndarray, physics: Physics
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity `(..., 2)` before the step that ended in the given ones; exact."""
+    """Position and velocity `(..., 2)` before the step that ended in these; exact."""
     before = (velocity - _push(actions, physics) * physics.dt) / (
         1 - physics.linear_damping / physics.mass * physics.dt
     )
@@ -52,9 +52,9 @@ def undo_linear(
 def undo_angular(
     theta: np.ndarray, omega: np.ndarray, actions: np.ndarray, physics: Physics
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Orientations and angular velocities before the step, every one that could have led here.
+    """All orientations and angular velocities before a step that could have ended in these.
 
-    Damping multiplies omega by 1 - 40/30 < 0 while the clip leaves it alone, so that up to three predecessors exist.
+    Without the clip, damping multiplies omega by 1 - 40/30 < 0, so that up to three predecessors exist.
 
     Returns:
         Two arrays `(3, ...)`: not clipped, clipped above, clipped below; NaN where that is no predecessor.
@@ -62,13 +62,13 @@ def undo_angular(
     dt, limit = physics.dt, physics.angular_acceleration_limit
     damping = physics.angular_damping / physics.inertia
     free = np.array(omega, dtype=float)
-    for _ in range(_FIXED_POINT_STEPS):  # the torque depends on the orientation that is sought
+    for _ in range(_FIXED_POINT_STEPS):  # the torque depends on the unknown orientation
         push = torque(theta - (free + omega) * dt / 2, actions, physics) / physics.inertia
         free = (omega - push * dt) / (1 - damping * dt)
     before = np.stack((free, omega - limit * dt, omega + limit * dt))
     angles = theta - (before + omega) * dt / 2
-    _, again = step_angular(angles, before, actions, physics)
-    impossible = np.abs(again - omega) > 1e-9
+    _, after = step_angular(angles, before, actions, physics)
+    impossible = np.abs(after - omega) > 1e-9
     return np.where(impossible, np.nan, angles), np.where(impossible, np.nan, before)
 
 
@@ -84,7 +84,7 @@ def integrate(
     x, y, theta, vx, vy, omega = (float(value) for value in (*pose, *velocity))
     states = [(x, y, theta, vx, vy, omega)]
     half = dt * dt / 2
-    # Plain numbers: an array operation costs more than a step.
+    # Python floats, since one array operation takes longer than a whole step.
     for (push_x, push_y), (twist_x, twist_y) in zip(pushes, twists, strict=True):
         ax, ay = push_x - damping * vx, push_y - damping * vy
         alpha = math.sin(theta) * twist_x + math.cos(theta) * twist_y - spin_damping * omega

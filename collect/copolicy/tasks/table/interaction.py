@@ -1,4 +1,4 @@
-"""The interaction force between the two who carry the table."""
+"""The interaction force between the two players."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def interaction_force(theta: np.ndarray | float, actions: np.ndarray, legacy_axi
     Args:
         theta: orientation after the step, `(...)`, rad.
         actions: `(..., 4)` robot xy, human xy in [-1, 1].
-        legacy_axis: the mirrored axis, for comparison with the original program.
+        legacy_axis: use the mirrored axis, for comparison with the original program.
 
     Returns:
         `(...)`, in [-sqrt(2), sqrt(2)].

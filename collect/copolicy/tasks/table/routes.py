@@ -1,4 +1,4 @@
-"""The route class of a path: on which side the table was carried past each obstacle."""
+"""The route class of a path: the side on which the table passed each obstacle."""
 
 import math
 
@@ -14,10 +14,10 @@ def winding(path: np.ndarray, point: tuple[float, float]) -> float:
 
 
 def route_class(path: np.ndarray, config: MapConfig) -> str:
-    """The side word of a path `(T, 2)` of the table's centre, px: one letter an obstacle, empty without obstacles.
+    """The route class of a path `(T, 2)` of the table's centre, px: one letter an obstacle, empty without obstacles.
 
-    L: the table passed below the obstacle on screen when carried to the right, R: above it, that is, the sign of
-    the winding around it. Letters follow the obstacles sorted by atan2(y, x) of their position. Handedness and
+    L: the table passed below the obstacle on screen when carried to the right, R: above it; this is the sign of the
+    winding around it. The letters are in the order of the obstacles sorted by atan2(y, x) of their position. Sides and
     order are those of Yang and Mavrogiannis' labels of the human demonstrations (HRI 2025), as far as documented.
     """
     ordered = sorted(config.obstacles, key=lambda centre: math.atan2(centre[1], centre[0]))

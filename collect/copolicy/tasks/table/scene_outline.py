@@ -1,4 +1,4 @@
-"""The map and the table as figures and pages draw them."""
+"""Vector outline of the map and the table, for figures, pages and screens."""
 
 import math
 
@@ -7,8 +7,8 @@ import numpy as np
 from copolicy.dataset.outline import Point, Shape, circle, square
 
 from .features import theta_of
+from .geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from .map_config import WINDOW, MapConfig
-from .outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from .physics import GOAL_SIZE
 
 _CORNER = [(math.cos(k * math.pi / 12), math.sin(k * math.pi / 12)) for k in range(7)]  # a quarter of a circle

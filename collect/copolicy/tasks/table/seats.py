@@ -1,4 +1,4 @@
-"""The exchange of seats: who held the robot's end holds the human's."""
+"""Exchange of the two seats of the table."""
 
 import math
 from dataclasses import replace
@@ -11,9 +11,9 @@ _HALF_TURN = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])  # of x, y, cos_the
 
 
 class TableSeats:
-    """A table turned by pi has its ends exchanged; place, velocity and forces keep their axes, those of the window.
+    """Exchanges the seats by turning the table by pi; position, velocity and forces keep the axes of the window.
 
-    The dynamics are the same to rounding. The two ends are of unlike outline, so that a touch may come a step earlier
+    The dynamics are the same up to rounding. The two ends differ in outline, so a contact can come some steps earlier
     or later.
     """
 

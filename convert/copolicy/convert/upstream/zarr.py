@@ -14,7 +14,7 @@ import numpy as np
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
-from copolicy.tasks.table.features import map_of, theta_of
+from copolicy.tasks.table.features import map_from_vector, theta_of
 from copolicy.tasks.table.physics import Physics
 
 from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
@@ -77,7 +77,7 @@ class ZarrStore:
         actions, past = np.clip(actions, -1, 1), np.clip(past, -1, 1)
         trajectory = best_fit(lambda physics: _states_before(obs, actions, past, physics), options.angular_limit)
         try:
-            stored = rounded(map_of(obs[0, 7:18], options.obstacle_size))
+            stored = rounded(map_from_vector(obs[0, 7:18], options.obstacle_size))
         except InvalidValueError as error:
             raise FileFormatError(f"{self.path} (episode {index})", "a map", str(error)) from None
         finding = check_by_path(

@@ -44,7 +44,7 @@ def mean_over(runs: Sequence[Mapping[EpisodeKey, Metrics]]) -> dict[EpisodeKey, 
 
 
 def paired_differences(
-    first: Mapping[EpisodeKey, Metrics], second: Mapping[EpisodeKey, Metrics], seed: int = 0
+    first: Mapping[EpisodeKey, Metrics], second: Mapping[EpisodeKey, Metrics], *, seed: int = 0
 ) -> dict[str, Any]:
     """Mean of `first - second` for each metric that both have, over the episodes in which both are finite.
 

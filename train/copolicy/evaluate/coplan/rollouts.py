@@ -101,7 +101,7 @@ def coplan(
 
 def coplanning_rollout(agent: PolicyAgent, scenarios: Sequence[Any], settings: Any) -> Rollout:
     """Creates a rollout in which both players execute the agent's action chunks."""
-    return Rollout(agent.task, scenarios, (agent, agent.other_half()), settings=settings)
+    return Rollout(agent.task, scenarios, (agent, agent.human_half()), settings=settings)
 
 
 def run_traced(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:

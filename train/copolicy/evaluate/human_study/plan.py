@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
-from copolicy.collect.angular_limit import LIMIT
+from copolicy.collect.angular_limit import LIMIT_SETTING
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
@@ -20,7 +20,7 @@ from ..study_flags import default_settings
 
 _VERSION = 1
 _EXPECTED = "a plan of copolicy-eval human plan"
-_WORLD = ("step_limit", LIMIT, "physics")
+_WORLD = ("step_limit", LIMIT_SETTING, "physics")
 
 
 @dataclass(frozen=True)

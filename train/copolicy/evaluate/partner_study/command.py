@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from copolicy.collect.agents.simulated import simulated_players
+from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name

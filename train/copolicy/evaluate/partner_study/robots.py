@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.collect.agents import HeldAgent, PolicyAgent, ScriptedAgent
-from copolicy.collect.agents.simulated import simulated_players
-from copolicy.collect.rollout import Agent, Start
+from copolicy.collect.agents import ConstantAgent, PolicyAgent, ScriptedAgent
+from copolicy.collect.agents.simulated_players import simulated_players
+from copolicy.collect.rollout import Agent, EpisodeStart
 from copolicy.dataset.task import PairTask, Player, get_task
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def scripted_robots(task: PairTask) -> dict[str, StudyRobot]:
     """The robots that `--baseline` takes by name: zero force, and the task's scripted robots."""
     zero = np.zeros(len(task.spec.action))
     passive = StudyRobot(
-        PASSIVE, lambda seed, fps: HeldAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
+        PASSIVE, lambda seed, fps: ConstantAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
     )
     names = task.agents.robots if task.agents is not None else ()
     return {PASSIVE: passive, **{name: _scripted(task, name) for name in names}}
@@ -55,7 +55,7 @@ def _scripted(task: PairTask, name: str) -> StudyRobot:
     profile, description = players.robots[name]
 
     def agent(seed: int, fps: int) -> Agent:
-        def make(seat: int, index: int, start: Start) -> Player:
+        def make(seat: int, index: int, start: EpisodeStart) -> Player:
             # Independent of the partner's random numbers, which come from `start.seed` alone.
             robot_seed = np.random.SeedSequence([start.seed, seed, 0]).generate_state(1)[0]
             return players.make_robot(start.scenario, name, int(robot_seed))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents import ScriptedAgent
-from copolicy.collect.agents.simulated import simulated_players
+from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.rollout import Rollout
 from copolicy.dataset.task import PairTask, get_task
 

@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from copolicy.collect.angular_limit import LIMIT, angular_limit_of
+from copolicy.collect.angular_limit import LIMIT_SETTING, angular_limit_of
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
@@ -93,7 +93,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         "seconds": seconds,
         "samples": len(branch_point.samples),
         "fps": protocol.fps,
-        **({LIMIT: limit} if (limit := angular_limit_of(protocol.settings)) is not None else {}),
+        **({LIMIT_SETTING: limit} if (limit := angular_limit_of(protocol.settings)) is not None else {}),
         **({"told_otherwise": list(protocol.contradictions)} if protocol.contradictions else {}),
         **_counts(branch_point),
         "picture": str(arguments.out),

@@ -93,7 +93,7 @@ def sample_chunks(
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
     world, scenarios = rollout.worlds[0], [scenario] * samples
     agent = agent.branch(samples)
-    branch = _copied_rollout(task, world, (agent, agent.other_half()), scenarios, settings, begin=False)
+    branch = _copied_rollout(task, world, (agent, agent.human_half()), scenarios, settings, begin=False)
     branch_trace = Trace(branch, trace)
     policy.n_predicted_actions, n_predicted_actions = None, policy.n_predicted_actions
     branch.step()

@@ -1,4 +1,4 @@
-"""How the table and its maps look on the screen."""
+"""Draws the table and its maps on the screen."""
 
 from copolicy.collect.screen.outline_view import OutlineView, shrunk
 from copolicy.collect.screen.palette import (
@@ -17,14 +17,14 @@ from copolicy.collect.screen.patch import Point, SmoothPatch
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.outline import Pose
 
+from ..geometry import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import MapConfig
-from ..outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from ..scene_outline import TableOutline, board_outline
 
 
 class TableView(OutlineView):
-    """Draws one map and the table on it: the outline, with rings in the goal, stripes, and boards of wood."""
+    """Draws a map and the table as outlines, with rings in the goal, striped obstacles and a wooden board."""
 
     def __init__(self, map_config: MapConfig):
         super().__init__(TableOutline(), map_config)
@@ -70,8 +70,8 @@ def _draw_goal(surface: pygame.Surface, centre: Point, size: float) -> None:
     square.center = (round(centre[0]), round(centre[1]))
     pygame.draw.rect(surface, mix(GREEN, FLOOR, 0.62), square)
     with SmoothPatch(surface, [centre], size / 2) as patch:
-        for share, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
-            patch.circle(colour, centre, share * size)
+        for radius, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
+            patch.circle(colour, centre, radius * size)
     pygame.draw.rect(surface, GREEN, square, max(2, round(size / 28)))
 
 

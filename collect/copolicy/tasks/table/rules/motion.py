@@ -1,4 +1,4 @@
-"""Whether the table moves as a table can: in the window, not too fast, not never, and where a replay takes it."""
+"""Checks of the table's motion: inside the window, not too fast, not stuck, and reproduced by re-simulation."""
 
 from collections.abc import Iterator
 
@@ -20,7 +20,7 @@ def _jumps(table: EpisodeTable) -> Iterator[Finding]:
 
 def _drift(table: EpisodeTable) -> Iterator[Finding]:
     drift = table.columns["replay_drift_px"]
-    yield from table.graded("drift", drift, "the actions, played again, leave the recorded path by this many px")
+    yield from table.graded("drift", drift, "the re-simulated actions leave the recorded path by this many px")
     unknown = int(np.isnan(drift).sum())
     if unknown:
         message = "episodes were not re-simulated (stored below 30 Hz, or converted with --no-drift)"
@@ -41,7 +41,7 @@ def _stuck(table: EpisodeTable) -> Iterator[Finding]:
     states = table.frames[STATE].astype(float)
     still = np.hypot(states[:, 4], states[:, 5]) < table.limit("stuck_speed")
     seconds, bound = table.longest_run(still) / table.fps, table.limit("stuck")
-    message = "the table rested this many s at a stretch"
+    message = "the table was at rest for this many s without a break"
     yield from table.found("stuck", seconds > bound, seconds, bound, message, "warning")
     origin = np.repeat(states[table.starts, :2], table.counts, axis=0)
     farthest, bound = table.largest(np.linalg.norm(states[:, :2] - origin, axis=1)), table.limit("unmoved")
@@ -53,6 +53,6 @@ def _stuck(table: EpisodeTable) -> Iterator[Finding]:
 RULES = (
     Rule("jumps", "no step is missing from the motion", _jumps, (STATE,)),
     Rule("drift", "re-simulation follows the recorded path", _drift, (), ("replay_drift_px",), ("lerobot",)),
-    Rule("state_range", "the table in the window, its angle an angle", _state_range, (STATE,)),
+    Rule("state_range", "the table is in the window, cosine and sine are of one angle", _state_range, (STATE,)),
     Rule("stuck", "the table moves", _stuck, (STATE,)),
 )

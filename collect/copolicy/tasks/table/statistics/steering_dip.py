@@ -1,4 +1,4 @@
-"""Whether pairs split where they have to decide: Hartigan's dip test of the steering before the first obstacle."""
+"""Multimodality of the steering before the first obstacle, by Hartigan's dip test."""
 
 import numpy as np
 from diptest import dipstat
@@ -10,7 +10,7 @@ from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import Trajectories
 
 MIN_EPISODES = 8
-"""Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""
+"""Fewest episodes for a dip test; below about 20 it detects only modes that are far apart."""
 
 MAX_QUERIES = 2_000
 RADIUS_PX = 50.0
@@ -25,10 +25,10 @@ _STEERING = (
 
 
 def decision_zone(data: Trajectories) -> np.ndarray:
-    """`(N,)` whether a frame lies in the decision zone, that is, before the first obstacle's station.
+    """`(N,)` whether a frame is in the decision zone, that is, before the first obstacle's station.
 
-    The station is the projection on the line from start to goal; once the table has entered the obstacle's side the
-    episode has left the zone for good. Maps without obstacles have none.
+    The station is the projection on the line from start to goal. An episode leaves the zone when the table first
+    reaches the near side of the obstacle. Maps without obstacles have no zone.
     """
     zone = np.zeros(len(data.states), dtype=bool)
     for index, row in enumerate(data.rows):
@@ -50,7 +50,7 @@ def steering(data: Trajectories) -> np.ndarray:
 
 
 def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """The dip test at the places of the decision zone, and once a configuration."""
+    """Dip tests at positions of the decision zone, and one for each configuration."""
     zone, sideways = decision_zone(data), steering(data)
     return {
         "steering_dip": _local(data, zone, _ahead(data, sideways), bootstrap, rng),
@@ -60,42 +60,43 @@ def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Gene
 
 def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Share of its states at which the steering over the next {AHEAD_S} s of other episodes with the "
-        f"same goal and obstacles, at their place nearest to it within {RADIUS_PX:g} px, one value an episode, is not "
-        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of its states at which the steering over the next {AHEAD_S} s of other episodes with "
+        f"the same goal and obstacles, at their position nearest to it within {RADIUS_PX:g} px, one value an episode, "
+        f"is not unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
     per_query: list[tuple[int, np.ndarray]] = []
     inside = np.flatnonzero(zone)
-    share = min(1.0, MAX_QUERIES / max(len(inside), 1))
+    proportion = min(1.0, MAX_QUERIES / max(len(inside), 1))
     for group in data.groups(with_goal=True):
         if len(group) <= MIN_EPISODES:
             continue
         frames = inside[np.isin(data.episode[inside], group)]
-        for query in rng.permutation(frames)[: max(1, round(share * len(frames)))] if len(frames) else ():
+        for query in rng.permutation(frames)[: max(1, round(proportion * len(frames)))] if len(frames) else ():
             sample = _sample(data, frames, query, ahead)
             if len(sample) >= MIN_EPISODES:
                 per_query.append((int(data.episode[query]), sample))
     if not per_query:
-        note = f"no place of a decision zone with {MIN_EPISODES} other episodes within {RADIUS_PX:g} px"
+        note = f"no position in a decision zone with {MIN_EPISODES} other episodes within {RADIUS_PX:g} px"
         return Estimate(None, "1", definition, 0, note=note)
     rejected = _rejected([sample for _, sample in per_query])
-    hits, asked = np.zeros(len(data.rows)), np.zeros(len(data.rows))
-    np.add.at(asked, [episode for episode, _ in per_query], 1)
+    hits, queries = np.zeros(len(data.rows)), np.zeros(len(data.rows))
+    np.add.at(queries, [episode for episode, _ in per_query], 1)
     np.add.at(hits, [episode for episode, _ in per_query], rejected)
-    value, bounds = bootstrap.ratio(hits, asked)
+    value, bounds = bootstrap.ratio(hits, queries)
     null_shares = [
         _rejected([rng.standard_normal(len(sample)) for _, sample in per_query]).mean() for _ in range(_NULL_DRAWS)
     ]
     null = Null.of("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
     sizes = [len(sample) for _, sample in per_query]
     details = {"places": len(per_query), "median_episodes_at_a_place": float(np.median(sizes))}
-    return Estimate(value, "1", definition, int((asked > 0).sum()), bounds, bootstrap.resampled, null, details=details)
+    episodes = int((queries > 0).sum())
+    return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null, details=details)
 
 
 def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Share of configurations in which its mean over the zone, one value an episode, is not unimodal "
-        f"(dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of configurations in which its mean over the zone, one value an episode, is not "
+        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
     frames = data.per_episode(zone)
     mean = np.divide(data.per_episode(zone * sideways), frames, out=np.full(len(frames), np.nan), where=frames > 0)
@@ -124,23 +125,23 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
 
 
 def dip_tests(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The dip of each sample, and its p, interpolated in Hartigan's table: those of `diptest.diptest`, all at once.
+    """Dips of the samples and p-values by Hartigan's table, as of `diptest.diptest`, which takes one sample.
 
     Args:
-        samples: of at least four values each.
+        samples: at least four values each.
     """
     sizes = np.array([len(sample) for sample in samples])
     dips = np.array([dipstat(sample) for sample in samples])
     p = np.empty(len(samples))
     for size in np.unique(sizes):
-        chosen = sizes == size
+        of_size = sizes == size
         critical = _critical(int(size))
-        p[chosen] = 1.0 - np.interp(np.sqrt(size) * dips[chosen], critical, Consts._ALPHA)
+        p[of_size] = 1.0 - np.interp(np.sqrt(size) * dips[of_size], critical, Consts._ALPHA)
     return dips, np.clip(p, 0.0, 1.0)
 
 
 def _critical(size: int) -> np.ndarray:
-    """Hartigan's critical values of sqrt(n) times the dip of `size` values, between those of the sizes in the table."""
+    """Hartigan's critical values of sqrt(n) times the dip of n = `size` values, interpolated between table rows."""
     sizes, values = Consts._SAMPLE_SIZE, Consts._CRIT_VALS
     above = min(int(sizes.searchsorted(size)), len(sizes) - 1)
     below = max(0, above - 1) if size <= sizes[-1] else above
@@ -156,7 +157,7 @@ def _rejected(samples: list[np.ndarray]) -> np.ndarray:
 
 
 def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarray) -> np.ndarray:
-    """Steering of each other episode at its frame nearest to a query's place, where that is near enough."""
+    """Steering of each other episode at its frame nearest to the query's position, within `RADIUS_PX`."""
     distance = np.linalg.norm(data.states[frames, :2] - data.states[query, :2], axis=1)
     near = (distance <= RADIUS_PX) & (data.episode[frames] != data.episode[query])
     frames, distance = frames[near], distance[near]
@@ -167,7 +168,7 @@ def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarra
 
 
 def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
-    """Mean of a value over the next half second of each frame, within its episode."""
+    """Mean of a value over the next `AHEAD_S` of each frame, within its episode."""
     window = max(1, round(AHEAD_S * data.fps))
     total = np.concatenate(([0.0], np.cumsum(values)))
     begin = np.arange(len(values))

@@ -1,4 +1,4 @@
-"""Routes of the table: on which side of each obstacle, and over maps with as many obstacles, beside people's."""
+"""Route statistics: sides of the obstacles, entropy by number of obstacles, and distance to people's routes."""
 
 from collections import Counter
 from dataclasses import replace
@@ -15,11 +15,11 @@ from ..routes import winding
 from .human_routes import human_distance
 
 CLEAR_WINDING = 0.1
-"""Turns around an obstacle below which the side is called unclear."""
+"""Winding around an obstacle, turns, below which the side counts as unclear."""
 
 
 def route_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """Sides of the obstacles, entropy over configurations, and the distance to people."""
+    """Route classes, their entropy by number of obstacles, and the distance to people's routes."""
     taken = labels_of(data)
     return {
         "route_class": _route_class(data, taken),
@@ -47,9 +47,9 @@ def _route_class(data: Trajectories, taken: dict[int, str]) -> Estimate:
         f"{of_successes(data)}"
     )
     estimate = route_classes(data, taken, definition)
-    without, unlike = estimate.details.items()
-    own = (("unclear_side", unclear), ("left_by_obstacle", dict(sorted(sides.items()))))
-    return replace(estimate, details=dict((without, own[0], unlike, own[1])))
+    first, second = estimate.details.items()  # the document has the others between and after them
+    left_by_obstacle = ("left_by_obstacle", dict(sorted(sides.items())))
+    return replace(estimate, details=dict((first, ("unclear_side", unclear), second, left_by_obstacle)))
 
 
 def _pooled_entropy(taken: dict[int, str], rng: np.random.Generator) -> Estimate:
@@ -62,7 +62,7 @@ def _pooled_entropy(taken: dict[int, str], rng: np.random.Generator) -> Estimate
         None,
         "bits",
         "Entropy of the route classes over all configurations with one, two and three obstacles (in details): it mixes "
-        "maps and is no measure of multimodality, but all that can be set beside labels that do not tell the map.",
+        "maps and does not measure multimodality, but it can be compared with labels without maps.",
         len(taken),
         note="one value a number of obstacles, in details",
         details=details,

@@ -1,4 +1,4 @@
-"""An episode of a policy with a simulated partner, and its film: the same every time, without a clock."""
+"""Episodes of a policy with a simulated partner, and their images; reproducible, in simulated time."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 from copolicy.dataset.task import PairTask, SceneView, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
-from ..episodes import episode_of
+from ..episodes import episode_from_trace
 from ..replay.pictures import LAST_S
 from ..replay.track import Track, sampled, track_of
 from ..rollout import Rollout, Trace
@@ -18,7 +18,7 @@ from ..screen.palette import MUTED, TEXT
 from ..sdl import pygame
 
 SIZE = (1200, 690)
-"""Units of the picture."""
+"""Width and height of an image in canvas units."""
 
 _WORLD = (0, 0, 1200, 600)
 _CAPTION_Y = 646
@@ -33,23 +33,24 @@ def demonstrate(
     settings: Any = None,
     task: PairTask | None = None,
 ) -> Track:
-    """Lets a policy on the robot's seat and a simulated partner act to the end of the episode.
+    """Runs an episode of a policy at the robot's seat and a simulated partner to its end.
 
-    Chunks come as in real time, but the world waits for each, so that the speed of the machine changes nothing.
+    The agent requests chunks as in real time, but each step waits for the pending chunk, so that the result does not
+    depend on the speed of the machine.
 
     Args:
         policy: at the robot's seat.
-        scenario: the map.
-        partner: name of a simulated pair, whose human is the partner.
-        seed: of the policy's noise and of the partner.
-        settings: of the world; the usual ones if None.
+        scenario: of the task.
+        partner: name of a simulated pair, whose player at the human's seat is the partner.
+        seed: of the policy and of the partner.
+        settings: of the world; the task's default if None.
         task: the table if None.
 
     Raises:
-        InvalidValueError: the policy has learned another task.
+        InvalidValueError: the policy learned another task.
     """
     task = task or get_task()
-    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.of_pair(partner, task)
+    robot, human = PolicyAgent(policy, task, real_time=True), ScriptedAgent.from_pair(partner, task)
     try:
         rollout = Rollout(task, [scenario], (robot, human), seeds=[seed], settings=settings)
         trace = Trace(rollout)
@@ -58,22 +59,24 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    return track_of(Path(task.name_of(scenario).scenario), episode_of(rollout, trace, 0, scenario, seed, settings))
+    return track_of(
+        Path(task.name_of(scenario).scenario), episode_from_trace(rollout, trace, 0, scenario, seed, settings)
+    )
 
 
-def pictures(track: Track, size: tuple[int, int], frames_per_second: int, speed: float) -> Iterator[pygame.Surface]:
-    """The pictures of an episode in order; the same surface each time, drawn anew.
+def draw_images(track: Track, size: tuple[int, int], images_per_second: int, speed: float) -> Iterator[pygame.Surface]:
+    """Draws the images of an episode in order, all on the same surface.
 
     Args:
         track: the episode.
-        size: of the surface, px.
-        frames_per_second: of the film.
+        size: width and height of the surface, px.
+        images_per_second: of the video.
         speed: times real time.
     """
     surface = new_surface(size)
     view = scene_view(track.task, track.episode.scenario)
-    positions = sampled(track, frames_per_second, speed)
-    for position in [*positions, *[positions[-1]] * round(LAST_S * frames_per_second)]:
+    positions = sampled(track, images_per_second, speed)
+    for position in [*positions, *[positions[-1]] * round(LAST_S * images_per_second)]:
         _draw(surface, view, track, position, speed)
         yield surface
 
@@ -84,7 +87,7 @@ def _draw(surface: pygame.Surface, view: SceneView, track: Track, position: floa
     pose = track.pose_at(position)
     trail = [*track.poses[: int(position) + 1 : _TRAIL_STRIDE], pose]
     view.draw(surface, canvas.rect(*_WORLD), pose, track.forces_at(position), trail)
-    # Whole sizes of a GIF of 600 px stay readable at half of these.
+    # These font sizes are readable in a GIF of 600 px, which shows them at half the size.
     canvas.seat_mark(0, 40, _CAPTION_Y, 20)
     canvas.text("robot", (72, _CAPTION_Y - 16), 36, TEXT, "midleft")
     canvas.text(track.episode.meta.controller_0, (72, _CAPTION_Y + 18), 28, MUTED, "midleft", 400)

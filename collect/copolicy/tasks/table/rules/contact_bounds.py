@@ -1,8 +1,7 @@
-"""What the table certainly touches, and what it certainly does not, without the world's contact queries.
+"""Bounds on the contacts of the table, without the world's contact queries.
 
-The world decides contacts to the pixel and belongs to another room. Two rectangles bracket its table: one that holds
-all its parts, one that lies inside its board. What the outer one does not reach was not touched, what the inner one
-reaches was.
+Two rectangles bracket the table: an outer one that contains all its parts, and an inner one inside its board. The table
+did not touch what the outer one does not reach, and touched what the inner one reaches.
 """
 
 import numpy as np
@@ -20,9 +19,9 @@ INNER: Rectangle = (-2.5, 54.0, 16.5)
 def separation(
     positions: np.ndarray, thetas: np.ndarray, rectangle: Rectangle, centres: np.ndarray, half: np.ndarray | float
 ) -> np.ndarray:
-    """Largest gap along the four axes of a turned rectangle and an upright square; negative where they overlap.
+    """`(M,)` largest gap along the four axes of a rotated rectangle and an upright square, px; negative in an overlap.
 
-    By the separating axis theorem two convex shapes are apart exactly where one of these gaps is positive.
+    By the separating axis theorem two convex shapes are apart if and only if one of these gaps is positive.
 
     Args:
         positions: `(M, 2)` the table's centre, px.
@@ -45,18 +44,18 @@ def separation(
 
 
 def final_poses(states: np.ndarray, fps: float, record_hz: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Where the table can have been when the last frame's action ended, which took one to `record_hz / fps` steps.
+    """Possible poses at the end of the last frame's action, which took one to `record_hz / fps` steps.
 
     Args:
         states: `(F, 7)` state of the last frame.
 
     Returns:
-        Positions `(J, F, 2)` and orientations `(J, F)` after each number of steps, and the error in px that a
-        constant velocity makes at most.
+        Positions `(J, F, 2)` and orientations `(J, F)` after each number of steps, and the largest error, px, of the
+        assumption of a constant velocity.
     """
     steps = max(round(record_hz / fps), 1)
     seconds = np.arange(1, steps + 1)[:, None] / record_hz
     positions = states[None, :, :2] + states[None, :, 4:6] * seconds[..., None]
     thetas = np.arctan2(states[:, 3], states[:, 2]) + states[:, 6] * seconds
-    # Half of the largest acceleration, 50 px/s^2, and of the largest of the table's end, 96 px x pi/2 rad/s^2.
+    # Half of the largest acceleration, 50 px/s^2, plus half of that of the table's end, 96 px x pi/2 rad/s^2.
     return positions, thetas, 100.0 / fps**2

@@ -1,4 +1,4 @@
-"""The table: its outline as three convex parts, and how its picture sits on the pixel grid.
+"""The table's outline as three convex parts, and the position of its image on the pixel grid.
 
 The table is drawn as an image of 191 x 59 px. Its solid part is a circle at the human's end, a board with rounded
 corners and a triangle at the robot's end, with gaps of 4 px between them: a rectangle would collide where the
@@ -9,7 +9,7 @@ at theta = 0; theta turns counter-clockwise on screen.
 import math
 
 IMAGE_SIZE = (191, 59)
-"""Width and height of the table's image at theta = 0, px; the wall rule counts its transparent corners too."""
+"""Width and height of the table's image at theta = 0, px; contact with walls includes its transparent corners."""
 
 CIRCLE_CENTRE = (-78.0, 0.0)
 CIRCLE_RADIUS = 17.5
@@ -22,7 +22,7 @@ REACH = math.hypot(95.5, 17.5)
 """Distance of the outermost solid point from the centre, px."""
 
 CIRCLE_FRINGE = 0.3
-"""How far the corners of square pixels stick out of the circle that they draw, px."""
+"""Distance by which the corners of pixels extend beyond the circle that they draw, px."""
 
 PART_BOUNDS = (
     (*CIRCLE_CENTRE, CIRCLE_RADIUS + CIRCLE_FRINGE),
@@ -33,13 +33,13 @@ PART_BOUNDS = (
 
 
 def image_size(cos: float, sin: float) -> tuple[int, int]:
-    """Width and height of the turned image, px: the box that must stay in the window."""
+    """Width and height of the box of the rotated image, px, which must stay in the window."""
     width, height = IMAGE_SIZE
     cos, sin = abs(cos), abs(sin)
     return int(width * cos + height * sin), int(width * sin + height * cos)
 
 
 def drawn_centre(x: float, y: float, image_width: int) -> tuple[float, float]:
-    """Where the middle of the picture is on screen: the position cut to whole pixels, and half a pixel that
-    depends on the width of the turned image (pygame's rotation, found by comparing 6,000 turned masks)."""
+    """Centre of the drawn image on screen, px: the position truncated to whole pixels, plus half a pixel that
+    depends on the width of the rotated image (pygame's rotation, verified on 6,000 rotated masks)."""
     return int(x) + 0.5 * (image_width & 1), int(y) + 0.5

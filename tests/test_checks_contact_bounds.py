@@ -10,7 +10,7 @@ from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import GOAL_SIZE
 from copolicy.tasks.table.rules import LIMITS
-from copolicy.tasks.table.rules.geometry import INNER, OUTER, final_poses, separation
+from copolicy.tasks.table.rules.contact_bounds import INNER, OUTER, final_poses, separation
 from copolicy.tasks.table.world import TableWorld
 
 GOAL = (600.0, 300.0)
@@ -63,5 +63,5 @@ def test_where_an_episode_can_have_ended(fps):
             end = np.array([95.8 * math.cos(theta), -95.8 * math.sin(theta)])
             true_theta = float(theta_of(world.observation))
             true_end = np.array([95.8 * math.cos(true_theta), -95.8 * math.sin(true_theta)])
-            found = np.linalg.norm(position + end - (np.array(world.pose[:2]) + true_end))
-            assert found <= error * math.sqrt(2)
+            distance = np.linalg.norm(position + end - (np.array(world.pose[:2]) + true_end))
+            assert distance <= error * math.sqrt(2)
