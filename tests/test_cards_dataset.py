@@ -134,7 +134,7 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
     assert "- **route entropy: two**: of routes (too few)" in text
     (dataset / "meta" / "copolicy_stats.json").write_text("{", encoding="utf-8")
     with pytest.raises(
-        FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found no JSON"
+        FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found invalid JSON"
     ):
         render(DatasetFacts.read(dataset), "lab/table")
 

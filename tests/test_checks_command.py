@@ -187,7 +187,7 @@ def test_a_name_of_the_hub_is_looked_up_there(tmp_path, monkeypatch, capsys):
     # Tests may not reach the network: the Hub's client says so, for this name.
     monkeypatch.chdir(tmp_path)
     assert main(["check", "lab/no-such-table", "--revision", "data-1.0.0"]) == 1
-    error = "lab/no-such-table: asking the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"
+    error = "lab/no-such-table: querying the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"
     assert capsys.readouterr().err == f"copolicy-dataset: {error}\n"
 
 

@@ -79,7 +79,7 @@ def test_a_nan_in_any_number_of_the_frames_is_an_error(root, name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is not there"),
+        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is missing"),
         (lambda root: set_columns(root, **{"data/chunk_index": [0, -1, 0]}), "data/chunk_index -1"),
         (lambda root: set_info(root, data_path=None), "data_path None in meta/info.json"),
         (lambda root: set_info(root, data_path="data/{nothing}.parquet"), "data_path"),
@@ -112,15 +112,15 @@ def test_a_task_that_is_not_there(root):
 def test_sentences_that_are_no_index_are_not_found_by_lerobot(root):
     path = root / "meta/tasks.parquet"
     pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
-    assert any("does not mark its sentences as the index" in line for line in errors(root))
+    assert any("does not have its sentences as the pandas index" in line for line in errors(root))
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda path: path.unlink(), "no such file"),
-        (lambda path: path.write_text("{", encoding="utf-8"), "no JSON"),
-        (lambda path: path.write_text("{}", encoding="utf-8"), "says nothing of"),
+        (lambda path: path.write_text("{", encoding="utf-8"), "invalid JSON"),
+        (lambda path: path.write_text("{}", encoding="utf-8"), "has no statistics of"),
         (lambda path: _set_statistic(path, "mean", [math.nan] * 4), "no usable mean of action"),
         (lambda path: _set_statistic(path, "std", [1.0]), "no usable std of action"),
         (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json is not that"),

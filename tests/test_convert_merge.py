@@ -160,7 +160,7 @@ def test_players_are_compared_across_the_seats(roots, tmp_path, capsys):
         (["--prefix-people", "a", "b/c"], "--prefix-people: expected names of letters, digits and underscores"),
         (
             ["--repo-id", "both"],
-            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'both'",
+            "--repo-id: expected USER/NAME that the Hub accepts (one slash between user and name), found 'both'",
         ),
     ],
 )

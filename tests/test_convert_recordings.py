@@ -148,7 +148,7 @@ def test_the_same_episode_twice_is_an_error(recordings, tmp_path, capsys):
         (("--fps", "7"), "fps: expected a divisor of 30 [1, 2, 3, 5, 6, 10, 15, 30], found 7"),
         (
             ("--repo-id", "table"),
-            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'table'",
+            "--repo-id: expected USER/NAME that the Hub accepts (one slash between user and name), found 'table'",
         ),
         (("--workers", "0"), "workers: expected at least 1, found 0"),
     ],
@@ -164,7 +164,7 @@ def test_folders_that_do_not_serve(recordings, tmp_path, capsys):
     assert convert(tmp_path / "empty", tmp_path / "set") == 2
     assert convert(recordings, tmp_path / "empty") == 2
     assert capsys.readouterr().err.splitlines() == [
-        f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found nothing there",
+        f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found no such file or folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found an empty folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected a path that does not exist yet, found one; "
         "nothing was overwritten",

@@ -275,4 +275,4 @@ def test_a_folder_must_hold_one_format(examples, tmp_path, capsys):
     first, second, third = capsys.readouterr().err.splitlines()
     assert first.endswith("found 6 raw, 6 processed, 1 zarr")
     assert second.endswith("found an empty folder")
-    assert third.endswith("files or a zipped Zarr store, found nothing there")
+    assert third.endswith("files or a zipped Zarr store, found no such file or folder")

@@ -292,7 +292,7 @@ def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsy
         "{'not of this plan': 1})"
     )
     assert _summarise(capsys, tmp_path / "none")[1].endswith(
-        "none: expected a folder of recordings, found nothing there"
+        "none: expected a folder of recordings, found no such file or folder"
     )
     status, error = _summarise(capsys, tmp_path, "--ratings", tmp_path / "r.csv")
     assert (

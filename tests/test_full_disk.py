@@ -143,7 +143,7 @@ def test_several_files_are_replaced_together_or_not_at_all(tmp_path):
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == {"a": "old", "b": "old"}
 
 
-def test_the_path_is_that_of_the_finished_file(tmp_path):
+def test_the_error_names_the_final_path(tmp_path):
     with full_disk(100), pytest.raises(OSError, match=os.strerror(errno.EFBIG)) as refused:
         _build(tmp_path / "set")
     assert str(system_line(refused.value)).startswith(str(tmp_path / "set"))

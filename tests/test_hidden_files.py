@@ -1,4 +1,4 @@
-"""What macOS leaves beside files (`._NAME`, `.DS_Store`) is passed over by every command."""
+"""Every command ignores the side files of macOS (`._NAME`, `.DS_Store`)."""
 
 import contextlib
 import io
@@ -24,7 +24,7 @@ from copolicy.train.cli import main as train
 
 
 def litter(folder: Path) -> Path:
-    """Leaves side files in a folder and in each one below, as after a copy to a foreign disk and back."""
+    """Adds side files to a folder and its sub-folders, as after a copy to another disk and back."""
     for inside in [folder, *(path for path in folder.rglob("*") if path.is_dir())]:
         for name in (".DS_Store", "Thumbs.db", *(f"._{path.name}" for path in list(inside.iterdir()))):
             (inside / name).write_bytes(b"\x00\x05\x16\x07\x00\x02\x00\x00Mac OS X")
@@ -66,7 +66,7 @@ def test_recordings_are_converted_checked_and_found(made, tmp_path):
 
 def test_a_data_set_is_checked_described_and_released(made, root):
     assert check_dataset(root).findings == check_dataset(made / "set").findings
-    assert Manifest.of_folder(root).files == Manifest.of_folder(made / "set").files
+    assert Manifest.from_folder(root).files == Manifest.from_folder(made / "set").files
     ok(dataset, "exclude", root, "--episode-ids", 1, "--reason", "stick unplugged")
     ok(dataset, "stats", root)
     ok(dataset, "release", root, "--bump", "minor", "--notes", "The first.")

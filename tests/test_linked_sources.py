@@ -119,7 +119,7 @@ def test_a_data_set_behind_links_is_read_appended_to_and_released(folders, tmp_p
         os.symlink(os.path.relpath(path, root), root / path.name)
     os.symlink(folders / "both", root / "raw")
     before = contents(tmp_path / "disk")
-    assert Manifest.of_folder(root).files == Manifest.of_folder(tmp_path / "disk" / "set").files != {}
+    assert Manifest.from_folder(root).files == Manifest.from_folder(tmp_path / "disk" / "set").files != {}
     assert check_dataset(root).count("error") == 0
     assert converted(folders / "both", root, "--append") == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == 3
@@ -151,7 +151,7 @@ def test_a_recording_whose_link_leads_nowhere_is_named(folders, linked, tmp_path
     assert (summary["damaged"], list(summary["files"])) == (1, ["a/lost.mcap"])
 
 
-def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, caplog):
+def test_a_broken_link_to_a_session_is_reported(linked, tmp_path, capsys, caplog):
     shutil.rmtree(tmp_path / "disk")
     assert converted(linked, tmp_path / "set") == 0
     captured = capsys.readouterr()
@@ -172,8 +172,8 @@ def test_a_session_whose_link_leads_nowhere_is_named(linked, tmp_path, capsys, c
 def test_a_file_of_a_data_set_whose_link_leads_nowhere_is_named(folders, tmp_path, capsys):
     root = Path(shutil.copytree(folders / "whole", tmp_path / "set"))
     os.symlink("/nowhere", root / "meta" / "notes.txt")
-    with pytest.raises(CopolicyError, match=r"notes\.txt: expected a file, found a link that leads nowhere"):
-        Manifest.of_folder(root)
+    with pytest.raises(CopolicyError, match=r"notes\.txt: expected a file, found a broken link"):
+        Manifest.from_folder(root)
     before = set(os.listdir(root / "meta"))
     make_recordings(tmp_path / "raw", 1, seed=9)
     assert converted(tmp_path / "raw", root, "--append") == 2

@@ -149,7 +149,7 @@ def test_metadata_of_a_recording_that_broke_off(recording, tmp_path):
     ("content", "found"),
     [
         (b"", "an MCAP file, found an empty file"),
-        (b"\x89PNG\r\n\x1a\nmore", "an MCAP file, found a PNG picture"),
+        (b"\x89PNG\r\n\x1a\nmore", "an MCAP file, found a PNG image"),
         (b"notes on the session", "an MCAP file, found a text file"),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_failure_shows_the_end_of_the_log_and_the_next_try_goes_on(tmp_path, c
     )
     shown = [line for line in capfd.readouterr().err.splitlines() if line.startswith("    ")]
     assert shown == [
-        f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found nothing there"
+        f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found no such file or folder"
     ]
 
     (out / "rules").write_text("of the step that was done", encoding="utf-8")

@@ -303,7 +303,7 @@ def test_other_files_are_refused(tmp_path):
     part.write_bytes(b"not an MCAP file at all")
     with pytest.raises(FileFormatError, match="metadata and map, found a text file"):
         recover_file(part)
-    with pytest.raises(FileFormatError, match="expected a folder of recordings, found nothing there"):
+    with pytest.raises(FileFormatError, match="expected a folder of recordings, found no such file or folder"):
         recover(tmp_path / "none")
 
 

@@ -111,7 +111,7 @@ def test_damage_is_one_line(folder, tmp_path, capsys):
     assert main(["stats", str(tmp_path)]) == 2
     assert capsys.readouterr().err == (
         f"copolicy-dataset: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none, "
-        f"but one in {folder}\n"
+        f"but a data set in {folder}\n"
     )
     (path,) = (folder / "data").glob("*/*.parquet")
     table = parquet.read_table(path)

@@ -11,7 +11,7 @@ from copolicy.dataset.files.json_file import read_optional_json, require_type
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.policies.documents import (
     EvaluationDocument,
-    KeptEvaluationsDocument,
+    ExportedEvaluationsDocument,
     PolicyConfigDocument,
     RecipeDocument,
     TrainingDocument,
@@ -105,7 +105,7 @@ class CheckpointFacts:
         """
         if not paths:
             path = self.folder / EVALUATIONS
-            stored = read_optional_json(path, KeptEvaluationsDocument, "results of copolicy-eval") or {}
+            stored = read_optional_json(path, ExportedEvaluationsDocument, "results of copolicy-eval") or {}
             results = stored.get("evaluations") or []
             return [self._checked(path, result) for result in results]
         if len({path.resolve() for path in paths}) < len(paths):

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from huggingface_hub import DatasetCardData
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.lerobot_folder.exclusions import FLAG
+from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
 from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
@@ -242,5 +242,5 @@ dataset = LeRobotDataset("{repo_id}", episodes=[k for k, flag in enumerate(disca
 
 
 def _exclusion_reason(flags: str) -> str:
-    reasons = [flag.removeprefix(FLAG) for flag in flags.split(",") if flag.startswith(FLAG)]
+    reasons = [flag.removeprefix(EXCLUDED_PREFIX) for flag in flags.split(",") if flag.startswith(EXCLUDED_PREFIX)]
     return reasons[0] if reasons else "discarded while recording"

@@ -11,7 +11,7 @@ from copolicy.dataset.command_line.commands import add_command, command_parser, 
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number, workers
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import visible_files
 
 from .demonstration.command import add_demo_command
@@ -42,8 +42,8 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("--workers", type=workers(), help="processes (default: one for each processor)")
     # The default is None, so that a flag beside --recipe is an error instead of being ignored.
     command.add_argument("--seed", type=seed(), help="seed of the schedule and of the players (default 0)")
-    add_task_flag(command, given=False)
-    add_maps_flag(command, "training", "map_set", given=False)
+    add_task_flag(command, use_default=False)
+    add_maps_flag(command, "training", "map_set", use_default=False)
     command.add_argument(
         "--orientations", action="store_true", default=None, help="each map with four start orientations"
     )
@@ -54,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     command.add_argument(
         "--clearance",
-        type=number("--clearance", 0, 10, above=True),
+        type=number("--clearance", 0, 10, exclusive=True),
         help="factor on the distance that the players keep from obstacles (default: the pair's, 1.7, like people)",
     )
     command = add_command(
@@ -80,7 +80,7 @@ def parser() -> argparse.ArgumentParser:
     )
     command.add_argument(
         "--test",
-        type=number("--test", 0, 3600, above=True),
+        type=number("--test", 0, 3600, exclusive=True),
         nargs="?",
         const=10.0,
         metavar="SECONDS",
@@ -120,7 +120,7 @@ def _recover(arguments: argparse.Namespace) -> dict:
     recoveries = recover(folder, finished=True, damaged=arguments.damaged)
     # A session without recordings counts as an empty folder.
     if not visible_files(folder, "*.mcap", "*.mcap.part", "session.json") and any(folder.iterdir()):
-        raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
+        raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
     return summary(folder, recoveries)
 
 

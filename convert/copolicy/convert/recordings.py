@@ -10,8 +10,8 @@ from pathlib import Path
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
-from copolicy.dataset.files.listing import broken_links, distinct, distinct_files
+from copolicy.dataset.files.file_kinds import describe_path
+from copolicy.dataset.files.listing import broken_links, distinct_files, without_duplicates
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.recording.log import read_episode, recorded_task
 from copolicy.dataset.worker_pool import WorkerPool
@@ -111,12 +111,12 @@ def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
         elif folder.is_symlink():
             raise FileFormatError(folder, "a folder of recordings", "a broken link")
         else:
-            raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
+            raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
     for link in broken:
         logging.warning("warning: %s: a broken link; its target is skipped", link)
-    files = distinct(files)
+    files = without_duplicates(files)
     if not files:
-        kinds = " and ".join(kind_of(folder) for folder in folders)
+        kinds = " and ".join(describe_path(folder) for folder in folders)
         raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", kinds)
     return files, unfinished
 

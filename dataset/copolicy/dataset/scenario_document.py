@@ -13,7 +13,7 @@ import msgspec
 import yaml
 
 from .exceptions import FileFormatError
-from .files.file_kinds import kind_of
+from .files.file_kinds import describe_path
 from .files.text_files import read_text
 
 _MOST_BYTES = 8 * 2**20
@@ -58,7 +58,7 @@ class Document:
         self.problems: list[Problem] = []
         self._lines: dict[str, int] = {}
         if not path.is_file():
-            raise FileFormatError(path, _WHAT, kind_of(path) if path.exists() else "no such file")
+            raise FileFormatError(path, _WHAT, describe_path(path) if path.exists() else "no such file")
         if path.stat().st_size > _MOST_BYTES:
             raise FileFormatError(path, f"{_WHAT} of at most {_MOST_BYTES} bytes", f"{path.stat().st_size}")
         text = read_text(path)

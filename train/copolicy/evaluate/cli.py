@@ -6,7 +6,7 @@ from pathlib import Path
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import replace_json, require_new
 
 from .comparison import add_compare_command
@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         study_needs,
     )
     coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    add_maps_flag(coplan, _DEFAULT_MAPS, given=False)
+    add_maps_flag(coplan, _DEFAULT_MAPS, use_default=False)
     coplan.add_argument("--orientations", action="store_true", help="run each map with four start orientations")
     add_whole_number(coplan, "--repeats", "episodes per map (default: 1)", 1, 1, 10_000)
     add_whole_number(coplan, "--limit", "use only the first N maps; recorded in the result")
@@ -47,7 +47,7 @@ def _coplan(arguments: argparse.Namespace) -> dict:
     figure = arguments.out.with_suffix(".png")
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
-    chosen = task.scenario_set(set_name(task, arguments.maps, _DEFAULT_MAPS))
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     if arguments.orientations:
         chosen = task.turned(chosen)
     scenarios = chosen.scenarios[: arguments.limit]

@@ -13,8 +13,8 @@ from pathlib import Path
 from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
-from copolicy.dataset.files.local_path import require_hub_name, similar_path
-from copolicy.dataset.files.staging import about, refusal
+from copolicy.dataset.files.local_path import require_repo_id, similar_path
+from copolicy.dataset.files.staging import disk_error_number, named_errors
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
@@ -138,12 +138,12 @@ def _train(arguments: argparse.Namespace) -> dict:
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
-            with about(Path(config.output_dir or "")):
+            with named_errors(Path(config.output_dir or "")):
                 train_from_memory(config)
         except CopolicyError:
             raise
         except Exception as error:
-            if refusal(error) is not None:
+            if disk_error_number(error) is not None:
                 _remove_unfinished(Path(config.output_dir or ""), config.resume)
             if isinstance(error, OSError) and error.errno is not None:
                 raise  # an error of a file; errors of the Hub's client have no errno and a text of many lines
@@ -266,7 +266,7 @@ def _check_local_path(name: str, value: str | None) -> None:
     if value.endswith((".json", ".yaml", ".yml")):
         similar = similar_path(value)
         raise FileFormatError(value, expected, "none" if similar is None else f"none; did you mean {similar}?")
-    require_hub_name(value, expected, "from another folder it is looked up on the Hub")
+    require_repo_id(value, expected, "from another folder it is looked up on the Hub")
 
 
 def _check_repo_id(name: str, value: str | None) -> None:

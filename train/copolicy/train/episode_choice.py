@@ -10,7 +10,7 @@ from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.json_file import read_json
-from copolicy.dataset.lerobot_folder.info import is_ours
+from copolicy.dataset.lerobot_folder.info import is_copolicy_info
 from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.policies.documents import TrainingDocument
 
@@ -104,7 +104,7 @@ def require_episode_columns(meta: Any, requested: bool) -> None:
 
 def _is_ours(meta: Any) -> bool:
     """Whether a data set has copolicy's robot type or features, which LeRobot's tools keep, or a file of copolicy's."""
-    has_features = is_ours({"robot_type": meta.robot_type, "features": dict(meta.features)})
+    has_features = is_copolicy_info({"robot_type": meta.robot_type, "features": dict(meta.features)})
     return has_features or any((Path(meta.root) / "meta").glob("copolicy*.json"))
 
 

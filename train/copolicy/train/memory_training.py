@@ -15,7 +15,7 @@ from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from lerobot.scripts import lerobot_train
 from tqdm import tqdm
 
-from copolicy.dataset.files.listing import on_visible_files
+from copolicy.dataset.files.listing import skipping_hidden_files
 
 from .episode_choice import recorded_episodes, resumed_episodes, selected_episodes
 from .finite_data import NonFiniteError, replacement_statistics, require_finite_frames
@@ -68,7 +68,7 @@ def _patched(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
 @contextmanager
 def _hidden_files_ignored() -> Iterator[None]:
     # LeRobot reads every file in a folder as Parquet, also hidden files that macOS creates.
-    replacements = {"load_nested_dataset": on_visible_files(io_utils.load_nested_dataset)}
+    replacements = {"load_nested_dataset": skipping_hidden_files(io_utils.load_nested_dataset)}
     with _patched(io_utils, replacements), _patched(dataset_reader, replacements):
         yield
 

@@ -12,7 +12,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
+from copolicy.dataset.policies.documents import TrainingDocument, TrainingStepDocument
 from copolicy.dataset.scenarios import set_label
 
 RECIPE_FILE = "recipe.json"
@@ -48,7 +48,7 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     training = read_optional_json(folder / "train_config.json", TrainingDocument, "the settings of a training")
     if training:
         step_file = folder.parent / "training_state" / "training_step.json"
-        reached = read_optional_json(step_file, ReachedStep, "a training's step") or {}
+        reached = read_optional_json(step_file, TrainingStepDocument, "a training's step") or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},

@@ -8,7 +8,7 @@ from typing import Any
 from copolicy.dataset.command_line.commands import add_command, progress
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError
 from copolicy.dataset.task import get_task
 
@@ -30,7 +30,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
         "--policy", default=PRETRAINED, help="checkpoint folder (default: pretrained, the model of the package)"
     )
     add_task_flag(command)
-    add_maps_flag(command, "unseen", given=False)
+    add_maps_flag(command, "unseen", use_default=False)
     command.add_argument(
         "--map",
         type=whole_number("--map", None),
@@ -49,7 +49,7 @@ def add_demo_command(commands: argparse._SubParsersAction) -> None:
 
 def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     task, path = get_task(arguments.task), arguments.out
-    scenario_set = task.scenario_set(set_name(task, arguments.maps, "unseen"))
+    scenario_set = task.scenario_set(map_set_name(task, arguments.maps, "unseen"))
     scenarios = scenario_set.scenarios
     for name, value, minimum, maximum in (
         ("seed", arguments.seed, 0, 2**32 - 1),

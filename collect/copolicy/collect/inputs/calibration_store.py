@@ -7,7 +7,7 @@ from pathlib import Path
 from platformdirs import user_config_path
 
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.staging import replace_json
 
 from .calibration import StickCalibration
@@ -36,7 +36,7 @@ class CalibrationStore:
         self.path = folder / _FILE
         self._by_guid: dict[str, StickCalibration] = {}
         if folder.exists() and not folder.is_dir():
-            raise FileFormatError(folder, "a folder of calibrations", kind_of(folder))
+            raise FileFormatError(folder, "a folder of calibrations", describe_path(folder))
         if not self.path.exists():
             return
         try:

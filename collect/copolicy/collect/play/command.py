@@ -9,7 +9,7 @@ from pathlib import Path
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
@@ -52,7 +52,7 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "(default: the joysticks that are plugged in, the keyboard beside them)",
     )
     add_task_flag(command)
-    add_maps_flag(command, "training", given=False)
+    add_maps_flag(command, "training", use_default=False)
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument(
         "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"
@@ -103,7 +103,7 @@ def settings_of(arguments: argparse.Namespace) -> PlaySettings:
     return PlaySettings(
         **{name: getattr(arguments, name) for name in _AS_GIVEN},
         pilots=pilots,
-        maps=set_name(task, arguments.maps, "training"),
+        maps=map_set_name(task, arguments.maps, "training"),
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
         angular_limit=_angular_limit(pilots or (), arguments.angular_limit, task),

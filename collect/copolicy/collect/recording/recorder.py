@@ -12,7 +12,7 @@ import numpy as np
 
 from copolicy.dataset.episode import EpisodeMeta, termination_reasons
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
-from copolicy.dataset.files.staging import about
+from copolicy.dataset.files.staging import named_errors
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
@@ -114,7 +114,7 @@ class EpisodeRecorder:
         """
         self._file = EpisodeFile(self._path)
         try:
-            with about(self._path):
+            with named_errors(self._path):
                 self._write_start()
         except BaseException:
             self._file.close()

@@ -12,9 +12,9 @@ from typing import Literal
 
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError, OutputExistsError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import distinct_files
-from copolicy.dataset.files.lock import let_others_read, lock
+from copolicy.dataset.files.lock import lock, unlock_on_windows
 from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.soundness import RECOVERY
 
@@ -62,7 +62,7 @@ def recover(folder: Path | str, finished: bool = False, damaged: bool = False) -
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise FileFormatError(folder, "a folder of recordings", kind_of(folder))
+        raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
     parts = distinct_files(folder, f"*.mcap{PART_SUFFIX}")
     recoveries = [_try_recover(part) for part in progress(parts, len(parts), "incomplete")]
     if finished or damaged:
@@ -99,7 +99,7 @@ def recover_file(source: Path | str) -> Recovery:
     with file:
         if not lock(file):
             return Recovery(source, "running", detail="another process is recording it")
-        let_others_read(file)
+        unlock_on_windows(file)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         if output.exists():
             return _earlier_recovery(source, output, digest)

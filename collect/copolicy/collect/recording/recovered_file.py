@@ -15,7 +15,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.files.staging import about, sync_folder
+from copolicy.dataset.files.staging import named_errors, sync_folder
 from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
@@ -44,7 +44,7 @@ def write_recovered(part: IntactPart, output: Path, source_sha256: str) -> None:
     """
     unfinished = output.with_name(output.name + _UNFINISHED)
     try:
-        with about(output, unfinished), unfinished.open("wb") as file:
+        with named_errors(output, unfinished), unfinished.open("wb") as file:
             _write(part, file, source_sha256)
             file.flush()
             os.fsync(file.fileno())

@@ -58,12 +58,12 @@ def add_replay_command(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument(
         "--max-drift-px",
-        type=number("--max-drift-px", above=True),
+        type=number("--max-drift-px", exclusive=True),
         help="of --verify: largest drift, px (default 0.01)",
     )
     command.add_argument(
         "--max-drift-rad",
-        type=number("--max-drift-rad", above=True),
+        type=number("--max-drift-rad", exclusive=True),
         help="of --verify: the same, rad (default 0.0001)",
     )
 

@@ -16,8 +16,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from copolicy.dataset.edit.groups import By, groups
-from copolicy.dataset.edit.parts import Part, deal
+from copolicy.dataset.edit.groups import By, group_episodes
+from copolicy.dataset.edit.parts import Part, assign_groups
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import OBSERVATION_KEYS
 from copolicy.dataset.files.staging import new_file
@@ -111,6 +111,6 @@ def _masks(source: ExportSource, episode: ExportEpisode, splits: bool) -> list[s
 
 def _train_and_valid(source: ExportSource, motions: list[str], validation: Validation) -> dict[str, list[str]]:
     parts = [Part("train", 1 - validation.proportion), Part("valid", validation.proportion)]
-    units = groups(source.rows, motions, validation.by)
-    indices = deal(source.rows, units, parts, validation.by, validation.seed, "--valid")
+    units = group_episodes(source.rows, motions, validation.by)
+    indices = assign_groups(source.rows, units, parts, validation.by, validation.seed, "--valid")
     return {name: [f"demo_{index}" for index in selected] for name, selected in indices.items()}

@@ -11,11 +11,11 @@ from copolicy.dataset.clock import Hold
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
-from copolicy.dataset.files.replace_folder import finish_interrupted, take_place
-from copolicy.dataset.files.staging import about, write_as_lerobot
+from copolicy.dataset.files.replace_folder import finish_interrupted, swap_folders
+from copolicy.dataset.files.staging import named_errors, write_lerobot_json
 from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
 from copolicy.dataset.lerobot_folder.loading import require_loadable
-from copolicy.dataset.lerobot_folder.references import Place, numbered_files
+from copolicy.dataset.lerobot_folder.references import FileIndex, chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, write_minimal_card
 from copolicy.dataset.recording.log import read_metadata
@@ -100,7 +100,7 @@ def append_recordings(
     finish_interrupted(root)
     require_loadable(root)
     files, unfinished = find_recordings(folders)
-    stored = {name for path in numbered_files(root / EPISODES_FOLDER).values() for name in _uuids(path)}
+    stored = {name for path in chunk_files(root / EPISODES_FOLDER).values() for name in _uuids(path)}
     new = [path for path in files if _uuid(path) not in stored]
     summary: dict[str, Any] = {"root": str(root), "already_there": len(files) - len(new), "episodes_added": 0}
     if not new:
@@ -110,13 +110,13 @@ def append_recordings(
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as scratch:
         addition, staged = Path(scratch) / "added", Path(f"{scratch}.whole")
         try:
-            with about(root, places={addition: root, staged: root}):
+            with named_errors(root, targets={addition: root, staged: root}):
                 written = convert_recordings(new, addition, repo_id, conversion, skip_damaged, workers)
                 copy_as_links(target, staged)
                 new_columns = add_later_columns(staged)
                 info = _join(staged, addition)
                 mixtures = _mixtures(staged, rewards)
-                shutil.rmtree(take_place(staged, target))
+                shutil.rmtree(swap_folders(staged, target))
         except CopolicyError as error:
             # The temporary folders no longer exist when the message is read.
             error.args = (str(error).replace(str(addition), str(root)).replace(str(staged), str(root)),)
@@ -155,14 +155,14 @@ def _join(staged: Path, addition: Path) -> dict[str, Any]:
     if read_parquet(staged / TASKS_FILE).to_pylist() != read_parquet(addition / TASKS_FILE).to_pylist():
         raise FileFormatError(staged / TASKS_FILE, "the one task of copolicy-convert", "other tasks")
     shift = Shift(info["total_episodes"], info["total_frames"])
-    data: dict[Place, Place] = {}
-    last, schema_file = list(numbered_files(staged / "data").items())[-1]
-    for old, path in numbered_files(addition / "data").items():
+    data: dict[FileIndex, FileIndex] = {}
+    last, schema_file = list(chunk_files(staged / "data").items())[-1]
+    for old, path in chunk_files(addition / "data").items():
         data[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
         write_with_schema(shift.frame_table(read_parquet(path)), schema_file, _numbered_path(staged / "data", last))
     moved = {"data": data, **_move_videos(staged, addition, info)}
-    last, schema_file = list(numbered_files(staged / EPISODES_FOLDER).items())[-1]
-    for path in numbered_files(addition / EPISODES_FOLDER).values():
+    last, schema_file = list(chunk_files(staged / EPISODES_FOLDER).items())[-1]
+    for path in chunk_files(addition / EPISODES_FOLDER).values():
         last = update_chunk_file_indices(*last, info["chunks_size"])
         table = shift.episode_table(read_parquet(path), moved, last)
         write_with_schema(table, schema_file, _numbered_path(staged / EPISODES_FOLDER, last))
@@ -180,7 +180,7 @@ def _join(staged: Path, addition: Path) -> dict[str, Any]:
     for name in (INFO_FILE, STATS_FILE, RECORD_FILE):
         (staged / name).unlink(missing_ok=True)  # a hard link: writing to it would change the data set in use
     write_stats(aggregate_stats(statistics), staged)
-    write_as_lerobot(staged / INFO_FILE, info)
+    write_lerobot_json(staged / INFO_FILE, info)
     write_record(staged, record)
     return info
 
@@ -194,14 +194,14 @@ def _renew_minimal_card(root: Path) -> None:
     write_minimal_card(path, {row["license"] for row in read_episode_columns(root)}, task_name(read_info(root)))
 
 
-def _move_videos(staged: Path, addition: Path, info: dict[str, Any]) -> dict[str, dict[Place, Place]]:
+def _move_videos(staged: Path, addition: Path, info: dict[str, Any]) -> dict[str, dict[FileIndex, FileIndex]]:
     """Moves the video files behind the existing ones; returns the new number of each file, by folder."""
-    moved: dict[str, dict[Place, Place]] = {}
+    moved: dict[str, dict[FileIndex, FileIndex]] = {}
     for key in (name for name, feature in info["features"].items() if feature["dtype"] == "video"):
         folder = f"videos/{key}"
-        last = list(numbered_files(staged / folder, "mp4"))[-1]
+        last = list(chunk_files(staged / folder, "mp4"))[-1]
         numbers = moved[folder] = {}
-        for old, path in numbered_files(addition / folder, "mp4").items():
+        for old, path in chunk_files(addition / folder, "mp4").items():
             numbers[old] = last = update_chunk_file_indices(*last, info["chunks_size"])
             target = _numbered_path(staged / folder, last, "mp4")
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -209,7 +209,7 @@ def _move_videos(staged: Path, addition: Path, info: dict[str, Any]) -> dict[str
     return moved
 
 
-def _numbered_path(folder: Path, number: Place, suffix: str = "parquet") -> Path:
+def _numbered_path(folder: Path, number: FileIndex, suffix: str = "parquet") -> Path:
     return folder / f"chunk-{number[0]:03d}" / f"file-{number[1]:03d}.{suffix}"
 
 

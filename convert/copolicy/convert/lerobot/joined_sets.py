@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import MissingExtraError
-from copolicy.dataset.files.listing import on_visible_files
+from copolicy.dataset.files.listing import skipping_hidden_files
 from copolicy.dataset.lerobot_folder.info import read_info
 
 from .shifted_tables import Shift
@@ -65,7 +65,10 @@ def _quiet(cache: Path) -> Iterator[None]:
     level, default_cache = logger.level, config.HF_DATASETS_CACHE
     logger.setLevel(logging.WARNING)
     config.HF_DATASETS_CACHE = cache
-    load, io_utils.load_nested_dataset = io_utils.load_nested_dataset, on_visible_files(io_utils.load_nested_dataset)
+    load, io_utils.load_nested_dataset = (
+        io_utils.load_nested_dataset,
+        skipping_hidden_files(io_utils.load_nested_dataset),
+    )
     try:
         with contextlib.redirect_stderr(io.StringIO()):
             yield

@@ -8,7 +8,7 @@ from copolicy.dataset.episode import LATER_COLUMNS, UNKNOWN_VALUES
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.listing import broken_links
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER
-from copolicy.dataset.lerobot_folder.references import numbered_files
+from copolicy.dataset.lerobot_folder.references import chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 from .shifted_tables import write_with_schema
@@ -48,7 +48,7 @@ def copy_as_links(source: Path, target: Path) -> None:
 def add_later_columns(root: Path) -> list[str]:
     """Adds the episode columns that earlier versions lacked, with unknown values; returns the added names."""
     added: list[str] = []
-    for path in numbered_files(root / EPISODES_FOLDER).values():
+    for path in chunk_files(root / EPISODES_FOLDER).values():
         table = read_parquet(path)
         missing = [name for name in LATER_COLUMNS if name not in table.column_names]
         for name in missing:

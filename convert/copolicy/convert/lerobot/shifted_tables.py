@@ -8,7 +8,7 @@ from typing import Any
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.meta_files import EPISODES_FOLDER
-from copolicy.dataset.lerobot_folder.references import Place, numbered_files
+from copolicy.dataset.lerobot_folder.references import FileIndex, chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 
 try:
@@ -50,7 +50,7 @@ class Shift:
         return table
 
     def episode_table(
-        self, table: "pa.Table", moved_files: Mapping[str, Mapping[Place, Place]], own: Place
+        self, table: "pa.Table", moved_files: Mapping[str, Mapping[FileIndex, FileIndex]], own: FileIndex
     ) -> "pa.Table":
         """Shifts a table of meta/episodes.
 
@@ -96,7 +96,7 @@ def write_with_schema(table: "pa.Table", example: "Path | pa.Schema", path: Path
 
 def read_episode_columns(root: Path) -> list[dict[str, Any]]:
     """Reads the episode columns that a data set has, one dict per episode."""
-    tables = [read_parquet(path) for path in numbered_files(root / EPISODES_FOLDER).values()]
+    tables = [read_parquet(path) for path in chunk_files(root / EPISODES_FOLDER).values()]
     return [
         row
         for table in tables
@@ -104,7 +104,7 @@ def read_episode_columns(root: Path) -> list[dict[str, Any]]:
     ]
 
 
-def _with_numbers(table: "pa.Table", folder: str, numbers: list[Place]) -> "pa.Table":
+def _with_numbers(table: "pa.Table", folder: str, numbers: list[FileIndex]) -> "pa.Table":
     for part, name in enumerate(_NUMBER_COLUMNS):
         table = replace_column(table, f"{folder}/{name}", [number[part] for number in numbers])
     return table

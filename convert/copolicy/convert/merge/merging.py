@@ -20,7 +20,7 @@ from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER
 from copolicy.dataset.files.staging import new_folder, require_new
 from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
-from copolicy.dataset.lerobot_folder.references import numbered_files
+from copolicy.dataset.lerobot_folder.references import chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import write_minimal_card
 from copolicy.dataset.versions.content import read_content
@@ -78,7 +78,7 @@ def merge_datasets(
         record = _record(sources, prefixes)
         write_record(partial, record)
         write_minimal_card(partial / CARD_FILE, set(expected.column("license").to_pylist()), task_name(sources[0].info))
-    left_behind = {str(source.root): names for source in sources if (names := source.left_behind(licences_too=True))}
+    left_behind = {str(source.root): names for source in sources if (names := source.uncopied_files(licences=True))}
     return {
         "root": str(root),
         "repo_id": repo_id,
@@ -134,7 +134,7 @@ def _without_nan(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
 
 def _restore_episodes(root: Path, expected: pa.Table) -> None:
     start = 0
-    for path in numbered_files(root / EPISODES_FOLDER).values():
+    for path in chunk_files(root / EPISODES_FOLDER).values():
         merged = read_parquet(path)
         rows = expected.slice(start, merged.num_rows)
         for name in rows.column_names:
@@ -149,7 +149,7 @@ def _restore_frames(root: Path) -> None:
     features = read_info(root)["features"]
     features = {name: {**feature, "shape": tuple(feature["shape"])} for name, feature in features.items()}
     schema = get_hf_features_from_features(features).arrow_schema
-    for path in numbered_files(root / "data").values():
+    for path in chunk_files(root / "data").values():
         table = read_parquet(path).select(schema.names).cast(schema)
         episodes = table.column("episode_index").to_pylist()
         with pq.ParquetWriter(path, schema, compression="snappy", use_dictionary=True) as writer:

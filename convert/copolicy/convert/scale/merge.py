@@ -19,9 +19,9 @@ from copolicy.dataset.files.meta_files import (
     STATS_FILE,
     TASKS_FILE,
 )
-from copolicy.dataset.files.staging import new_folder, replace_json, require_new, write_as_lerobot
+from copolicy.dataset.files.staging import new_folder, replace_json, require_new, write_lerobot_json
 from copolicy.dataset.lerobot_folder.info import read_info, task_name, task_of
-from copolicy.dataset.lerobot_folder.references import numbered_files
+from copolicy.dataset.lerobot_folder.references import chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import write_minimal_card
 
@@ -146,9 +146,9 @@ def aggregate(roots: Sequence[Path], repo_id: str, target: Path, cache: Path) ->
     join_data_sets(roots, repo_id, target, cache, concatenate_data=False)
     info = read_info(target)
     info["features"] = read_info(roots[0])["features"]
-    write_as_lerobot(target / INFO_FILE, info)
-    example = next(iter(numbered_files(roots[0] / EPISODES_FOLDER).values()))
-    for path in numbered_files(target / EPISODES_FOLDER).values():
+    write_lerobot_json(target / INFO_FILE, info)
+    example = next(iter(chunk_files(roots[0] / EPISODES_FOLDER).values()))
+    for path in chunk_files(target / EPISODES_FOLDER).values():
         write_with_schema(read_parquet(path), example, path)
     return info
 

@@ -13,7 +13,7 @@ from copolicy.dataset.clock import Hold, stride
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import broken_links, distinct_files
 from copolicy.dataset.files.staging import require_new
 from copolicy.tasks.table.spec import SPEC
@@ -50,7 +50,9 @@ def open_upstream(path: Path) -> UpstreamSource:
         FileFormatError: none of the formats, or several.
     """
     if not path.is_dir() and not is_zipped(path):
-        raise FileFormatError(path, "a folder of the original program's files or a zipped Zarr store", kind_of(path))
+        raise FileFormatError(
+            path, "a folder of the original program's files or a zipped Zarr store", describe_path(path)
+        )
     files = distinct_files(path, "*") if path.is_dir() else []
     for link in broken_links(path) if path.is_dir() else ():
         if link.suffix not in (".pkl", ".npz"):
@@ -63,7 +65,7 @@ def open_upstream(path: Path) -> UpstreamSource:
     counts = {name: len(files) for name, files in (("raw", raw), ("processed", processed), ("zarr", stores)) if files}
     if len(counts) != 1 or len(stores) > 1:
         layouts = "; ".join(f"{name}: {layout}" for name, layout in FORMATS.items())
-        contents = ", ".join(f"{count} {name}" for name, count in counts.items()) or kind_of(path)
+        contents = ", ".join(f"{count} {name}" for name, count in counts.items()) or describe_path(path)
         if not counts and contents.startswith("a Zarr store"):
             contents = f"a Zarr store without an array {OBSERVATIONS}"
         raise FileFormatError(path, f"files of one format ({layouts})", contents)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from copolicy.dataset.episode import Episode, EpisodeMeta
-from copolicy.dataset.lerobot_folder.exclusions import FLAG
+from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
 from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.features import states_7, theta_of
@@ -142,7 +142,7 @@ def build_episode(
         reason = "timeout" if steps >= physics.step_limit else "unknown"
     excluded = _wrong_map(flags)
     if excluded:
-        flags += (f"{FLAG}map_mismatch",)
+        flags += (f"{EXCLUDED_PREFIX}map_mismatch",)
     digest = hashlib.sha256(content).hexdigest()
     map_id, map_set = identify(config)
     path = np.vstack((states[:, :2], final_state[:2]))

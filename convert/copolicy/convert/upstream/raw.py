@@ -12,7 +12,7 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
 from copolicy.tasks.table.map_config import MapConfig
@@ -35,7 +35,7 @@ def read_raw(path: Path, options: UpstreamOptions) -> Episode:
         FileFormatError: a damaged file, or not a file of the original program.
     """
     if not path.is_file():
-        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", kind_of(path))
+        raise FileFormatError(path, "a pickle of NumPy arrays and plain values", describe_path(path))
     content = path.read_bytes()
     rows = load_pickle(content, path)
     next_states, actions, goal, obstacles, recorded_success = _parse(rows, path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 
 from .restricted_pickle import first_line, load_pickle
 
@@ -35,7 +35,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
     except OSError as error:
         raise FileFormatError(path, "a readable .npz file", error.strerror or str(error)) from None
     except (Exception, MemoryError) as error:  # zipfile, zlib and the header's parser raise many types
-        file_kind = kind_of(path)
+        file_kind = describe_path(path)
         description = (
             f"a damaged one ({first_line(error)})" if "NumPy" in file_kind or "zip" in file_kind else file_kind
         )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 
 from .restricted_pickle import first_line
 
@@ -58,7 +58,7 @@ class ZarrArrays:
             prefixes = {name.removesuffix(end) for name in self._members for end in ends if name.endswith(end)}
             prefixes = {prefix for prefix in prefixes if not prefix or prefix.endswith("/")}
             if len(prefixes) != 1:
-                found = f"{len(prefixes)} of them" if prefixes else f"{kind_of(path)} without it"
+                found = f"{len(prefixes)} of them" if prefixes else f"{describe_path(path)} without it"
                 raise FileFormatError(path, f"one zipped Zarr store with an array {array}", found)
             self._prefix = prefixes.pop()
 
@@ -125,7 +125,7 @@ def _members(path: Path) -> dict[str, zipfile.ZipInfo]:
     except OSError as error:
         raise FileFormatError(path, "a readable zip file", error.strerror or str(error)) from None
     except Exception as error:
-        description = kind_of(path)
+        description = describe_path(path)
         description = f"a damaged one ({first_line(error)})" if "zip" in description else description
         raise FileFormatError(path, "a zipped Zarr store", description) from None
     for member in members:

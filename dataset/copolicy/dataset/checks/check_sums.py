@@ -42,7 +42,7 @@ def _manifest(table: EpisodeTable) -> Iterator[Finding]:
         return
     try:
         # The findings are written by this very command, after every release as well.
-        differences = Manifest.read(path).differences(Manifest.of_folder(table.root), without={CHECK_FILE})
+        differences = Manifest.read(path).differences(Manifest.from_folder(table.root), without={CHECK_FILE})
     except CopolicyError as error:
         yield Finding("", "check_sum", None, None, "error", str(error).replace(str(path), MANIFEST_FILE))
         return

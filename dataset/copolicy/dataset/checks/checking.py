@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
 from ..task import PairTask
@@ -67,7 +67,7 @@ def read_table(root: Path) -> EpisodeTable:
         return read_lerobot(root)
     if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
         broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)] if root.is_dir() else []
-        found = broken[0] if broken else kind_of(root)
+        found = broken[0] if broken else describe_path(root)
         raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
     return read_recordings(root)
 

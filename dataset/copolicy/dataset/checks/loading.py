@@ -29,7 +29,7 @@ def _tasks(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _statistics(table: EpisodeTable) -> Iterator[Finding]:
-    from ..lerobot_folder.loading import read_statistics, statistics_problems
+    from ..lerobot_folder.loading import read_frame_statistics, statistics_problems
 
     problems = list(statistics_problems(table.root, table.info))
     for problem in problems:
@@ -37,7 +37,7 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
     if problems or len(table.framed) < len(table.labels):
         return
     try:
-        stored = read_statistics(table.root)
+        stored = read_frame_statistics(table.root)
     except CopolicyError:
         return
     # LeRobot's merge leaves those of the running numbers (index, episode_index) as they were in the parts.
@@ -49,12 +49,12 @@ def _statistics(table: EpisodeTable) -> Iterator[Finding]:
 
 
 def _against_frames(table: EpisodeTable, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
-    from ..lerobot_folder.loading import STATISTICS, numbers
+    from ..lerobot_folder.loading import STATISTICS, number_array
 
     warning, error = (table.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))
     figures = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}
     scale = 1 + np.abs(rows).max(axis=0)
-    off = {kind: float((np.abs(numbers(stored[kind], None) - figures[kind]) / scale).max()) for kind in STATISTICS}
+    off = {kind: float((np.abs(number_array(stored[kind], None) - figures[kind]) / scale).max()) for kind in STATISTICS}
     kind = max(off, key=lambda kind: off[kind])
     if not off[kind] <= warning:
         severity: Severity = "error" if not off[kind] <= error else "warning"

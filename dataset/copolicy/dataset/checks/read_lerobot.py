@@ -10,7 +10,7 @@ from ..exceptions import FileFormatError
 from ..features import ACTION, STATE, VECTORS, features_of
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
-from ..lerobot_folder.folder import POSITIONS, other_task
+from ..lerobot_folder.folder import POSITIONS, task_mismatch
 from ..lerobot_folder.info import read_info, require_episodes, task_of
 from ..lerobot_folder.tables import ColumnError, column_types, pa, read_parquet, scalars, vectors
 from .episode_table import EpisodeTable
@@ -60,7 +60,7 @@ def _require_task(root: Path, info: dict[str, Any], files: dict[str, tuple[str, 
     """A sound data set of another task is none to hold against the rules of this one."""
     widths = {name: files[name][1] if name in files else None for name in (STATE, ACTION)}
     spec = task_of(info).spec
-    difference = other_task(info)
+    difference = task_mismatch(info)
     if difference and widths != {STATE: len(spec.state), ACTION: len(spec.joint_action)}:
         raise FileFormatError(root / INFO_FILE, f"a data set of {spec.title} (copolicy-convert)", difference)
 

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 
 from ..episode import Episode
 from ..exceptions import CopolicyError, FileFormatError, ForeignRecordingError, UnknownNameError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..task import PairTask, get_task, installed_tasks
 from . import episode_records
 from .contents import RecordingContents
@@ -127,7 +127,7 @@ def read_metadata(path: Path | str) -> dict[str, dict[str, str]]:
 @contextlib.contextmanager
 def _as_format_error(path: Path) -> Iterator[None]:
     if path.exists() and not path.is_file():
-        raise FileFormatError(path, "an MCAP file", kind_of(path))
+        raise FileFormatError(path, "an MCAP file", describe_path(path))
     try:
         yield
     except FileFormatError:

@@ -20,7 +20,7 @@ from mcap.records import Channel, Metadata, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 
 _HEAD = struct.Struct("<BQ")  # opcode, length of the body
 _FOOTER_SIZE = 20  # start of the summary, start of its offsets, check sum
@@ -106,7 +106,7 @@ class RecordWalk:
         begin = self._file.read(len(MCAP0_MAGIC))
         self._file.seek(0)
         if not begin or not MCAP0_MAGIC.startswith(begin):
-            raise FileFormatError(self._path, "an MCAP file", kind_of(self._path))
+            raise FileFormatError(self._path, "an MCAP file", describe_path(self._path))
         self._read(len(MCAP0_MAGIC))
 
     def _end_data(self, crc: int, body: bytes) -> None:
@@ -161,7 +161,7 @@ def walk_metadata(path: Path) -> Iterator[Metadata]:
     size = path.stat().st_size
     with path.open("rb") as file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise FileFormatError(path, "an MCAP file", kind_of(path))
+            raise FileFormatError(path, "an MCAP file", describe_path(path))
         while len(head := file.read(_HEAD.size)) == _HEAD.size:
             opcode, length = _HEAD.unpack(head)
             if opcode in (0, Opcode.DATA_END, Opcode.FOOTER) or length > size - file.tell():

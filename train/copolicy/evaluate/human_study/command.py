@@ -8,9 +8,9 @@ from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.dataset.command_line.commands import add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.publication.licences import checked_licence
@@ -54,7 +54,7 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
     )
     command.add_argument("policies", nargs="+", metavar="NAME=CKPT", help="robots to compare, at least two")
     add_whole_number(command, "--participants", "number of participants (default: 5, as in the paper)", 5, 1, 10_000)
-    add_maps_flag(command, DEFAULT_MAPS, given=False)
+    add_maps_flag(command, DEFAULT_MAPS, use_default=False)
     add_whole_number(
         command,
         "--configurations",
@@ -133,7 +133,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
         robots.append(Robot.from_checkpoint(name, path))
     folders = [(robot.name, checkpoint_folder(robot.checkpoint)) for robot in robots]
     protocol = study_protocol(arguments, [(name, training_conditions(folder)) for name, folder in folders])
-    chosen = protocol.task.scenario_set(set_name(protocol.task, arguments.maps, DEFAULT_MAPS))
+    chosen = protocol.task.scenario_set(map_set_name(protocol.task, arguments.maps, DEFAULT_MAPS))
     starts = study_configurations(chosen, arguments.configurations)
     flagged, unusual = recorded_settings(protocol.task, protocol.settings)
     plan = make_plan(
@@ -203,7 +203,7 @@ def _summarise(arguments: argparse.Namespace) -> dict:
     if arguments.ratings and not arguments.plan:
         raise InvalidValueError("--ratings", "--plan too, which names the robot of each block", "none")
     if not arguments.recordings.is_dir() or not visible_files(arguments.recordings, "*.mcap"):
-        raise FileFormatError(arguments.recordings, "a folder of recordings", kind_of(arguments.recordings))
+        raise FileFormatError(arguments.recordings, "a folder of recordings", describe_path(arguments.recordings))
     plan = StudyPlan.read(arguments.plan) if arguments.plan else None
     ratings = read_ratings(arguments.ratings, plan) if arguments.ratings and plan else []
     rows, left_out = study_rows(arguments.recordings, plan)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.dataset.command_line.commands import add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
@@ -45,7 +45,7 @@ def add_partner_command(commands: argparse._SubParsersAction) -> None:
         "profile) (default: passive and the task's first scripted robot, which is never-yields for the table)",
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="use no baselines")
-    add_maps_flag(command, DEFAULT_MAPS, given=False)
+    add_maps_flag(command, DEFAULT_MAPS, use_default=False)
     add_whole_number(
         command,
         "--configurations",
@@ -76,7 +76,7 @@ def _partner(arguments: argparse.Namespace) -> dict:
     for kind in partners:
         if kind not in profiles:
             raise UnknownNameError("kind of partner", kind, profiles)
-    chosen = task.scenario_set(set_name(task, arguments.maps, DEFAULT_MAPS))
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, DEFAULT_MAPS))
     # Imported here so that `--help` and argument errors do not wait for torch.
     from .figure import save_partner_figure
     from .robots import scripted_robots

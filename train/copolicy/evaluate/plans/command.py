@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from copolicy.collect.angular_limit import LIMIT_SETTING, angular_limit_of
 from copolicy.dataset.command_line.commands import add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 
@@ -32,7 +32,7 @@ def add_plans_command(commands: argparse._SubParsersAction) -> None:
         study_needs,
     )
     command.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
-    add_maps_flag(command, _DEFAULT_MAPS, given=False)
+    add_maps_flag(command, _DEFAULT_MAPS, use_default=False)
     command.add_argument(
         "--map",
         required=True,
@@ -57,7 +57,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
-    chosen = task.scenario_set(set_name(task, arguments.maps, _DEFAULT_MAPS))
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     scenarios = chosen.scenarios
     if not 0 <= arguments.map < len(scenarios):
         raise InvalidValueError("--map", f"0 to {len(scenarios) - 1}", arguments.map)

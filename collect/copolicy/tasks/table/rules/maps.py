@@ -13,7 +13,7 @@ from copolicy.dataset.checks.finding import Finding
 from copolicy.dataset.checks.mixtures import listed
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
-from copolicy.dataset.lerobot_folder.exclusions import FLAG
+from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
 from copolicy.dataset.scenarios import DISPLACED
 from copolicy.dataset.task_parts import Rule
 
@@ -44,7 +44,7 @@ def _named(table: EpisodeTable) -> Iterator[Finding]:
     for index in np.flatnonzero(flagged):
         flags = str(table.columns["quality_flags"][index]).split(",")
         status = "it was recovered" if "map_recovered" in flags else "the one in the rows may be wrong"
-        if any(flag.startswith(FLAG) for flag in flags):
+        if any(flag.startswith(EXCLUDED_PREFIX) for flag in flags):
             status += "; excluded from training"
         message = f"the importer found another map in the file than was played (map_mismatch): {status}"
         yield Finding(table.labels[index], "map_name", None, None, "warning", message)

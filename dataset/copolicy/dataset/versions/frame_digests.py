@@ -1,4 +1,4 @@
-"""Digests of the frames of a data set: one for every episode and feature or video, blind to how files are cut."""
+"""Digests of the frames of a data set, one for each episode and feature or video, however the files are split."""
 
 import functools
 import hashlib
@@ -15,18 +15,18 @@ from ..lerobot_folder.tables import column_types, feature_values, read_parquet
 from .digests import encode
 
 POSITION_COLUMNS = ("index", "episode_index")
-"""Frame columns that only say where a frame stands; verified instead of hashed, as a merge moves them."""
+"""Columns with the position of a frame; they are verified, not hashed, because a merge changes them."""
 
 
 def frame_digests(folder: LeRobotFolder, tasks: dict[int, str]) -> list[dict[str, str]]:
-    """For each episode the sha256 of each of its features but the positions and videos.
+    """For each episode the sha256 of each feature, except positions and videos.
 
-    Numbers are hashed as little-endian values of the feature's declared type, row by row, with one NaN for all;
-    a task by its sentence instead of its number; texts and pictures by `canonical.encode`. One column is in memory
-    at a time.
+    Numbers are hashed row by row as little-endian values of the feature's declared type, with one bit pattern for
+    every NaN; tasks by their sentence instead of their number; texts and images by `digests.encode`. One column is in
+    memory at a time.
 
     Args:
-        tasks: sentence of each task's number.
+        tasks: sentence by task number.
 
     Raises:
         FileFormatError: files that contradict the features, the lengths, or the order of the frames.
@@ -45,22 +45,22 @@ def frame_digests(folder: LeRobotFolder, tasks: dict[int, str]) -> list[dict[str
         rows = _encodable(files, name, features[name], tasks, root)
         if isinstance(rows, np.ndarray):
             rows = rows[order]
-            parts: Iterable[bytes] = (
+            chunks: Iterable[bytes] = (
                 rows[end - length : end].tobytes() for end, length in zip(ends, lengths, strict=True)
             )
         else:
-            rows = [rows[place] for place in order]
-            parts = (encode(rows[end - length : end]) for end, length in zip(ends, lengths, strict=True))
-        for episode, part in zip(digests, parts, strict=True):
-            episode[name] = hashlib.sha256(encode(name) + part).hexdigest()
+            rows = [rows[row] for row in order]
+            chunks = (encode(rows[end - length : end]) for end, length in zip(ends, lengths, strict=True))
+        for episode, chunk in zip(digests, chunks, strict=True):
+            episode[name] = hashlib.sha256(encode(name) + chunk).hexdigest()
     return digests
 
 
 def _order(root: Path, files: list[Path], lengths: Sequence[int]) -> np.ndarray:
-    """Where the frames of `index` 0, 1, 2, ... stand in the files."""
-    index = _numbers(files, "index", "int64", [1])[:, 0]
-    order = np.argsort(index, kind="stable")
-    if not np.array_equal(index[order], np.arange(sum(lengths))):
+    """Row numbers, over all files, of the frames with `index` 0, 1, 2, ..."""
+    indices = _numbers(files, "index", "int64", [1])[:, 0]
+    order = np.argsort(indices, kind="stable")
+    if not np.array_equal(indices[order], np.arange(sum(lengths))):
         raise FileFormatError(root / "data", f"frames with index 0 to {sum(lengths) - 1}, each once", "others")
     episode = _numbers(files, "episode_index", "int64", [1])[:, 0]
     if not np.array_equal(episode[order], np.repeat(np.arange(len(lengths)), lengths)):
@@ -81,7 +81,7 @@ def _encodable(
     if feature["dtype"] == "string":
         return _values(files, name)
     if feature["dtype"] == "image":
-        # The path beside a picture's bytes is a file name of whoever recorded it.
+        # The path stored beside an image's bytes depends on the machine that recorded it.
         return [value.get("bytes") if isinstance(value, dict) else value for value in _values(files, name)]
     try:
         np.dtype(feature["dtype"])
@@ -100,44 +100,44 @@ def _numbers(files: Sequence[Path], name: str, dtype: str, shape: Sequence[int])
     Raises:
         FileFormatError: a file is damaged, lacks a value, or holds rows of another width.
     """
-    kind = np.dtype(dtype).newbyteorder("<")
-    parts = (feature_values(read_parquet(path, [name]), name, shape, path) for path in files)
-    with np.errstate(invalid="ignore"):  # a value that its declared type cannot hold is said by the checks
-        return np.concatenate([part.reshape(len(part), -1).astype(kind) for part in parts])
+    target_dtype = np.dtype(dtype).newbyteorder("<")
+    columns = (feature_values(read_parquet(path, [name]), name, shape, path) for path in files)
+    with np.errstate(invalid="ignore"):  # the checks report values that do not fit the declared type
+        return np.concatenate([column.reshape(len(column), -1).astype(target_dtype) for column in columns])
 
 
 def _values(files: Sequence[Path], name: str) -> list[Any]:
-    """A column of texts or pictures over all files."""
+    """A column of texts or images over all files."""
     return [value for path in files for value in read_parquet(path, [name]).column(name).to_pylist()]
 
 
 def video_digest(path: Path, start: float, end: float, fps: float) -> str:
-    """The sha256 of the encoded pictures shown in [start, end) of a file, s.
+    """The sha256 of the encoded frames of a video file in [start, end) seconds.
 
-    The packets are hashed as they are, without decoding: joining videos copies them, encoding anew does not.
+    Packets are hashed without decoding: joining videos keeps the digest, encoding again changes it.
 
     Raises:
-        FileFormatError: no video file.
+        FileFormatError: not a video file.
         MissingExtraError: PyAV is not installed.
     """
-    total = hashlib.sha256()
-    half = 0.5 / fps  # times in containers are rounded
+    digest = hashlib.sha256()
+    half_frame = 0.5 / fps  # timestamps in containers are rounded
     try:
         status = path.stat()
     except OSError as error:
         raise FileFormatError(path, "a video", error.strerror or str(error)) from None
     for time, packet in _packets(path, (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)):
-        if start - half <= time < end - half:
-            total.update(packet)
-    return total.hexdigest()
+        if start - half_frame <= time < end - half_frame:
+            digest.update(packet)
+    return digest.hexdigest()
 
 
 @functools.lru_cache(maxsize=4)
-def _packets(path: Path, _: tuple[int, ...]) -> tuple[tuple[float, bytes], ...]:
-    """Time and sha256 of every packet of the first video stream, in the order they are shown.
+def _packets(path: Path, file_state: tuple[int, ...]) -> tuple[tuple[float, bytes], ...]:
+    """Time in seconds and sha256 of every packet of the first video stream, in the order of presentation.
 
     Args:
-        _: state of the file: another file may take its place while the program runs.
+        file_state: cache key that changes if the file is replaced while the program runs.
     """
     try:
         import av
@@ -151,5 +151,5 @@ def _packets(path: Path, _: tuple[int, ...]) -> tuple[tuple[float, bytes], ...]:
                 if packet.pts is not None and packet.time_base is not None and packet.size:
                     packets.append((float(packet.pts * packet.time_base), hashlib.sha256(bytes(packet)).digest()))
     except (FFmpegError, IndexError, OSError) as error:
-        raise FileFormatError(path, "a video", str(error) or "no picture") from None
+        raise FileFormatError(path, "a video", str(error) or "no frame") from None
     return tuple(sorted(packets))

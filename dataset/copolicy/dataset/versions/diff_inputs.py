@@ -1,4 +1,4 @@
-"""What `copolicy-dataset diff` compares: a folder, a release of a folder, or a revision on the Hub; with statistics."""
+"""Reads the inputs of `copolicy-dataset diff`: a folder, a release of a folder, or a revision on the Hub."""
 
 import math
 import tempfile
@@ -17,40 +17,40 @@ from .release_record import read_release
 
 
 @dataclass(frozen=True)
-class Side:
-    """One of the two that are compared.
+class DiffInput:
+    """One of the two data sets that are compared.
 
     Attributes:
-        statistics: value by path, or `None` where none are stored.
+        statistics: value by path, or `None` if no statistics are stored.
+        released_hash: content hash in a release record; it stays known after episodes are withdrawn from the record.
     """
 
     name: str
     content: Content
     statistics: dict[str, Any] | None
-    released_hash: str = ""  # of a release, which is known even where episodes were withdrawn from its record
+    released_hash: str = ""
 
     @property
     def content_hash(self) -> str:
         return self.released_hash or self.content.hash
 
 
-def read_side(text: str) -> Side:
-    """Reads `FOLDER`, `FOLDER@1.0.0`, `U/N` or `U/N@REVISION`; what exists as a folder is one.
+def read_diff_input(text: str) -> DiffInput:
+    """Reads `FOLDER`, `FOLDER@1.0.0`, `U/N` or `U/N@REVISION`; an existing folder takes precedence.
 
-    A release of a folder is known by the digests in its record; its files are not needed. A revision on the Hub is
-    downloaded and read like a folder.
+    For a release the digests in its record suffice. A revision on the Hub is downloaded and read like a folder.
 
     Raises:
-        FileFormatError: nothing by this name, or no data set.
+        FileFormatError: no such folder or name, or not a data set.
         UnknownNameError: no such release.
         HubError: the Hub does not answer, or has no such data set or revision.
     """
     if Path(text).is_dir():
-        return Side(text, read_content(Path(text)), read_statistics(Path(text)))
+        return DiffInput(text, read_content(Path(text)), read_statistics(Path(text)))
     name, _, revision = text.rpartition("@") if "@" in text else (text, "", "")
     if revision and Path(name).is_dir():
         record = read_release(Path(name), revision)
-        return Side(text, record.content, None, record.content_hash)
+        return DiffInput(text, record.content, None, record.content_hash)
     if repo_id_problem(name) is None:
         from ..files.meta_files import RAW_FOLDER
         from ..hub.repository import download, resolve
@@ -58,37 +58,37 @@ def read_side(text: str) -> Side:
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder) / "data_set"
             download(name, root, resolve(name, revision or None)[1], skip=f"{RAW_FOLDER}/*")
-            return Side(text, read_content(root), read_statistics(root))
+            return DiffInput(text, read_content(root), read_statistics(root))
     raise FileFormatError(text, f"a folder, FOLDER@{TAG_PREFIX}x.y.z, or U/N[@REVISION] on the Hub", "none of them")
 
 
 def read_statistics(root: Path) -> dict[str, Any] | None:
-    """The stored statistics of a folder by the path of each value, `None` where there are none.
+    """The stored statistics of a folder as value by path, `None` if there are none.
 
     Raises:
-        FileFormatError: a file that is no JSON object.
+        FileFormatError: not a JSON object.
     """
     path = root / STATISTICS_FILE
     if not path.exists():
         return None
-    return dict(_flat(read_json(path, dict, "statistics of copolicy-dataset stats")))
+    return dict(_flatten(read_json(path, dict, "statistics of copolicy-dataset stats")))
 
 
 def compare_statistics(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """For each value that differs, before and after; `None` where one side lacks it."""
+    """The values that differ, before and after; `None` stands for a missing value."""
     names = [*before, *(name for name in after if name not in before)]
     return {
         name: (before.get(name), after.get(name)) for name in names if not _equal(before.get(name), after.get(name))
     }
 
 
-def _flat(value: Any, name: str = ""):
+def _flatten(value: Any, name: str = ""):
     if isinstance(value, dict) and value:
         for key, item in value.items():
-            yield from _flat(item, f"{name}.{key}" if name else str(key))
+            yield from _flatten(item, f"{name}.{key}" if name else str(key))
     elif isinstance(value, list) and any(isinstance(item, (dict, list)) for item in value):
-        for place, item in enumerate(value):
-            yield from _flat(item, f"{name}[{place}]")
+        for index, item in enumerate(value):
+            yield from _flatten(item, f"{name}[{index}]")
     else:
         yield name, value
 
