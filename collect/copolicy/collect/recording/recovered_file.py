@@ -24,7 +24,7 @@ from copolicy.dataset.recording.verification import RECOVERY, UNVERIFIED
 from copolicy.dataset.shared_device import identical_actions, may_be_one_device
 from copolicy.dataset.task import PairTask
 
-from ..session.recorded import OFF_CENTRE, PRACTICE
+from ..session.recording_summaries import OFF_CENTRE, PRACTICE
 from .episode_messages import event_record
 from .intact_records import IntactPart, intact_records
 from .recorder import IDENTICAL_ACTIONS
