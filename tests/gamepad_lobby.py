@@ -7,7 +7,7 @@ from play_session import on_short_map, settings
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.screen import Canvas
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
 
 class Hands:

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, FRAMES, make_data_set, make_recordings, set_columns, set_frames
 
-from copolicy.dataset.checks.checking import check_dataset, check_table, read_table
+from copolicy.dataset.checks.checking import check_data, check_dataset, read_data
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +62,9 @@ def test_a_missing_column_of_lerobot_is_an_error(root, name):
 
 
 def test_a_rule_that_could_not_be_applied_is_an_error(root):
-    table = read_table(root)
+    table = read_data(root)
     frames = {name: values for name, values in table.frames.items() if name != "timestamp"}
-    result = check_table(replace(table, frames=frames))
+    result = check_data(replace(table, frames=frames))
     assert result.failed()
     assert "error: applied: rules that could not be applied: timestamps needs timestamp" in str(result.findings[0])
 
@@ -123,7 +123,7 @@ def test_sentences_that_are_no_index_are_not_found_by_lerobot(root):
         (lambda path: path.write_text("{}", encoding="utf-8"), "has no statistics of"),
         (lambda path: _set_statistic(path, "mean", [math.nan] * 4), "no usable mean of action"),
         (lambda path: _set_statistic(path, "std", [1.0]), "no usable std of action"),
-        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json is not that"),
+        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json differs from"),
     ],
 )
 def test_no_broken_or_foreign_statistics(root, change, message):

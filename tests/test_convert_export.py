@@ -18,8 +18,8 @@ from copolicy.convert.export.source import ExportSource
 from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS, STATE
-from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
+from copolicy.dataset.settings_text import settings_text
 from copolicy.tasks.table.features import BOUNDS
 from copolicy.tasks.table.physics import Physics
 
@@ -192,7 +192,7 @@ def test_minaris_environment_has_the_rate_and_the_limits_of_the_data(
     recordings, tmp_path, fps, physics, kwargs, frames
 ):
     root = make_data_set(recordings, tmp_path / "table", "--no-drift", "--fps", str(fps))
-    set_columns(root, physics=[physics_text(Physics(**physics))] * 3)
+    set_columns(root, physics=[settings_text(Physics(**physics))] * 3)
     metadata = json.loads(
         (export(root, "minari", tmp_path / "table-v0") / "data/metadata.json").read_text(encoding="utf-8")
     )

@@ -11,7 +11,7 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.convert.cli import main
 from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.dataset.episode import EPISODE_COLUMNS, EpisodeMeta
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 

@@ -14,7 +14,7 @@ from sharded_calls import EPISODES, call, content, damage, record_rest
 from video_difference import video_difference
 
 from copolicy.convert.cli import main
-from copolicy.dataset.checks.checking import check_dataset, of_data_sets, of_recordings, rules_of
+from copolicy.dataset.checks.checking import check_dataset, judges_data_set, judges_one_recording, rules_of
 from copolicy.dataset.task import get_task
 
 
@@ -46,7 +46,7 @@ def test_what_lerobot_loads_is_the_same(unsharded, tmp_path):
 
 def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_path, capsys):
     rules = rules_of(get_task())
-    assert {*filter(of_recordings, rules), *filter(of_data_sets, rules)} == set(rules)
+    assert {*filter(judges_one_recording, rules), *filter(judges_data_set, rules)} == set(rules)
     recordings = Path(shutil.copytree(unsharded / "recordings", tmp_path / "recordings"))
     shutil.copy(recordings / "episode_000000.mcap", recordings / "episode_000009.mcap")
     assert main(call(recordings, tmp_path / "twice", "--shard-episodes", "3")) == 1
@@ -62,7 +62,7 @@ def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_pa
     record_rest(recordings / "episode_000004b.mcap")
     assert main(call(recordings, tmp_path / "set", "--shard-episodes", "3", "--shards", str(tmp_path / "shards"))) == 0
     findings = json.loads((tmp_path / "shards/findings.json").read_text(encoding="utf-8"))
-    names = {rule.name for rule in rules if of_recordings(rule)}
+    names = {rule.name for rule in rules if judges_one_recording(rule)}
     applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text(encoding="utf-8"))["applied"]
     assert set(applied) == names
     # The rules of recordings give the same findings in shards as in one folder, with episodes named by index.

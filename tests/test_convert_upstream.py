@@ -30,7 +30,7 @@ from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
 from copolicy.convert.upstream.zarr_episodes import ZarrStore
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.physics_text import physics_of
+from copolicy.dataset.settings_text import parse_settings_text
 from copolicy.tasks.table.physics import Physics
 
 
@@ -114,7 +114,7 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     assert np.abs(episode.states[0, :2] - CONFIG.start[:2]).max() < 1e-9
     mismatched = read_raw(path, UpstreamOptions("pi/8" if name == "pi/2" else "pi/2"))
     assert mismatched.meta.quality_flags == "dynamics_mismatch"
-    assert (physics_of(episode.meta.physics), mismatched.meta.physics) == (physics, "")
+    assert (parse_settings_text(episode.meta.physics), mismatched.meta.physics) == (physics, "")
     assert episode.meta.obstacle_size == OPTIONS.obstacle_size
 
     cosine, sine = np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])
@@ -124,14 +124,14 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     single = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
     assert single.notes[0].endswith(f"angular limit {name}")
     assert np.abs(single.states - episode.states).max() < 1e-4
-    assert physics_of(single.meta.physics) == physics
+    assert parse_settings_text(single.meta.physics) == physics
 
     write_store(tmp_path / "store", states, actions)
     tenth = ZarrStore(tmp_path / "store").read(0, OPTIONS)
     assert tenth.notes[0].endswith(f"angular limit {name}")
     assert tenth.meta.quality_flags == ""
     assert np.abs(tenth.states - episode.states[::3]).max() < 1e-9
-    assert physics_of(tenth.meta.physics) == physics
+    assert parse_settings_text(tenth.meta.physics) == physics
 
 
 def test_rows_that_tell_no_angular_limit_leave_the_physics_unknown(tmp_path):
@@ -141,7 +141,7 @@ def test_rows_that_tell_no_angular_limit_leave_the_physics_unknown(tmp_path):
     assert (episode.meta.physics, episode.meta.quality_flags) == ("", "")
     assert episode.notes[0].endswith("angular limit pi/2, which the rows do not determine")
     stated = read_raw(path, UpstreamOptions("pi/8"))
-    assert physics_of(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
+    assert parse_settings_text(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
 
 
 def test_rows_that_were_skipped_are_refused(tmp_path):

@@ -25,7 +25,7 @@ from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import STATE
 from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.versions.content import read_content
 from copolicy.tasks.table import TableTask
 from copolicy.tasks.table.artist.scene_image import SceneImage

@@ -18,7 +18,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunE
 from copolicy.dataset.files import replace_folder
 from copolicy.dataset.files.replace_folder import finish_interrupted
 from copolicy.dataset.publication.minimal_card import is_minimal_card
-from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.reader import read_metadata
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.manifest import Manifest, file_entry
 from copolicy.dataset.versions.release import release

@@ -17,7 +17,7 @@ from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.staging import replace_json
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
 from copolicy.evaluate.human_study.questionnaire import read_ratings

@@ -14,7 +14,7 @@ from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import Rollout
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.tasks.table.map_config import MapConfig

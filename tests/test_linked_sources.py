@@ -74,10 +74,10 @@ def test_shards_and_append_enter_links(folders, linked, tmp_path, capsys):
 
 def test_check_recover_and_raw_recordings_enter_links(folders, linked, tmp_path, capsys):
     result = check_dataset(linked)
-    assert result.table.labels == ("a/episode_000000.mcap", "a/episode_000001.mcap", "b/episode_000000.mcap")
+    assert result.data.labels == ("a/episode_000000.mcap", "a/episode_000001.mcap", "b/episode_000000.mcap")
     assert result.count("error") == 0
     raw = find_raw_recordings(folders / "whole", linked)
-    assert sorted(raw.files) == [f"raw/{label}" for label in result.table.labels]
+    assert sorted(raw.files) == [f"raw/{label}" for label in result.data.labels]
     assert raw.left_out == []
     broken = tmp_path / "disk" / "b" / "episode_000000.mcap"
     broken.write_bytes(broken.read_bytes()[:-3000])

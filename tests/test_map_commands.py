@@ -9,7 +9,7 @@ from map_file import write_lab
 from copolicy.collect.cli import main
 from copolicy.collect.play.settings import PlaySettings
 from copolicy.collect.session.schedule import BalancedSchedule, EpisodeCounts
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.world import TableWorld
 

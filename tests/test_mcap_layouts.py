@@ -26,8 +26,8 @@ from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError
-from copolicy.dataset.recording.log import read_episode, read_metadata, read_recording
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, chunk_records
+from copolicy.dataset.recording.reader import read_episode, read_metadata, read_recording
 from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.evaluate.human_study.recordings import study_rows
 from copolicy.tasks.table.maps import MAP_SETS
@@ -192,7 +192,7 @@ def test_a_later_schema_version_is_named_as_such(source, tmp_path, caplog):
         records.append(record)
     variants.write(records, tmp_path / "later.mcap", enable_data_crcs=False)
     assert refusal(tmp_path / "later.mcap", ForeignRecordingError) == (
-        "expected a recording of schema version 1, the latest known here, found schema version '2' (update copolicy)"
+        "expected a recording of schema version 1, the latest supported, found schema version '2' (update copolicy)"
     )
     assert list(iter_recordings(tmp_path)) == []
     assert "found schema version '2'" in caplog.text
@@ -267,7 +267,7 @@ def test_a_chunk_that_inflates_beyond_its_head_takes_no_memory(source):
         told = variants.chunk(body, compression, lambda _, stored=stored: stored, crc=False, size=1 << 20)
         tracemalloc.start()
         try:
-            with pytest.raises(ValueError, match="another size than its head says"):
+            with pytest.raises(ValueError, match="whose size contradicts its header"):
                 chunk_records(told)
             assert tracemalloc.get_traced_memory()[1] < 32 << 20
         finally:

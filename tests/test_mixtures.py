@@ -25,8 +25,8 @@ from copolicy.convert.export.source import ExportSource
 from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
-from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
+from copolicy.dataset.settings_text import settings_text
 from copolicy.tasks.table.features import theta_of
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
@@ -101,7 +101,7 @@ def test_a_conversion_in_shards_reports_mixtures(folders, tmp_path, run):
     flags = ("--shard-episodes", 2, "--workers", 1)
     summary, _ = run("mcap", folders / "raw", "--out", tmp_path / "set", "--repo-id", "lab/table", *flags)
     assert summary["physics"] == {HALF_WORDS: 3, EIGHTH_WORDS: 2}
-    assert any(line.startswith("warning: physics: episodes of several physics") for line in summary["findings"])
+    assert any(line.startswith("warning: physics: episodes with different physics") for line in summary["findings"])
     assert physics_in(tmp_path / "set") == physics_in(folders / "both")
 
 
@@ -133,7 +133,7 @@ def test_a_data_set_of_an_earlier_version_can_be_added_to_and_merged(folders, co
     assert str(after.select(before.column_names).to_pylist()) == str(before.to_pylist())
     for root in (old, tmp_path / "merged"):
         rows = load(root).meta.episodes
-        assert rows["physics"] == [""] * 3 + [physics_text(EIGHTH)] * 2
+        assert rows["physics"] == [""] * 3 + [settings_text(EIGHTH)] * 2
         assert rows["obstacle_size"] == [0] * 3 + [50] * 2
         assert findings(root, "physics") == [("info", "", 3)]
         assert {f.rule for f in check_dataset(root).findings if f.severity == "error"} <= {"license"}
@@ -164,7 +164,7 @@ def test_a_mixture_in_recordings_is_a_finding(folders):
 
 def test_a_physics_that_cannot_be_read_is_an_error(copied, tmp_path, capsys):
     root = copied("half")
-    set_columns(root, physics=["pi/8", physics_text(HALF), None])
+    set_columns(root, physics=["pi/8", settings_text(HALF), None])
     assert findings(root, "physics") == [("error", "0", None), ("info", "", 1)]
     assert main(["export", str(root), "--format", "zarr", "--out", str(tmp_path / "a.zarr")]) == 2
     error = capsys.readouterr().err
@@ -282,7 +282,7 @@ def test_obstacles_of_several_sizes_are_reported(tmp_path, run):
 
 def test_other_software_sources_and_rewards_are_reported(folders, copied, tmp_path, run):
     first, second = copied("half"), copied("eighth")
-    set_columns(second, software_version=["0.0.1"] * 2, physics=[physics_text(HALF)] * 2, source=["upstream"] * 2)
+    set_columns(second, software_version=["0.0.1"] * 2, physics=[settings_text(HALF)] * 2, source=["upstream"] * 2)
     set_frames(second, "next.reward", lambda rewards: rewards + 1)
     record = second / "meta" / "copolicy.json"
     record.write_text(

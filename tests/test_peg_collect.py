@@ -27,7 +27,7 @@ from copolicy.collect.sdl import pygame
 from copolicy.collect.session import BalancedSchedule, iter_recordings
 from copolicy.collect.ticker import LoopStatistics, Tick, Ticker
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task_spec import Vector
 
 SIMULATE = ("simulate", "--task", "peg", "--maps", "right", "--seed", "1", "--workers", "1")

@@ -13,8 +13,8 @@ import pytest
 from mcap.reader import make_reader
 
 from copolicy.collect.recording.recover import recover
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
+from copolicy.dataset.recording.reader import read_episode
 
 
 def _command(out: Path, *flags: str) -> list[str]:

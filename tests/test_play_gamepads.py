@@ -8,7 +8,7 @@ from copolicy.collect.inputs import CalibrationStore, MappingStore, StickCalibra
 from copolicy.collect.screen import Canvas
 from copolicy.collect.screen.dialogs import draw_toast
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
 

@@ -11,8 +11,8 @@ from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import Agent
 from copolicy.collect.ticker import DT_NS
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode
 
 SCRIPTED = (PlayerSpec("scripted", "S01"), PlayerSpec("scripted", "S01"))
 

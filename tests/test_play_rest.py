@@ -7,7 +7,7 @@ from gamepad_lobby import flags, lobby
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.inputs import CalibrationStore, StickCalibration
-from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.reader import read_metadata
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
 

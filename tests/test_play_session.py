@@ -15,8 +15,8 @@ from virtual_joystick import VirtualJoystick
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.sdl import pygame
 from copolicy.collect.ticker import DT_NS
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.session import BalancedSchedule
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.maps import MAP_SETS

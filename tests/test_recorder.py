@@ -23,8 +23,8 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError, ShapeError
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 

@@ -25,8 +25,8 @@ from copolicy.collect.recording.recover import recover, recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput, TableState
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 

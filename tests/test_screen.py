@@ -20,7 +20,7 @@ from copolicy.collect.screen.dialogs import (
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
 from copolicy.collect.screen.outline_view import letterbox
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.outline import between
+from copolicy.dataset.outline import interpolate_pose
 from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -107,7 +107,7 @@ def test_nothing_is_drawn_beside_the_world():
 
 @pytest.mark.parametrize(("start", "end", "middle"), [(0.1, 0.3, 0.2), (6.2, 0.1, 6.2 + (0.1 - 6.2 + 2 * math.pi) / 2)])
 def test_a_pose_between_two_turns_the_shorter_way(start, end, middle):
-    x, y, theta = between((0.0, 10.0, start), (2.0, 20.0, end), 0.5)
+    x, y, theta = interpolate_pose((0.0, 10.0, start), (2.0, 20.0, end), 0.5)
     assert (x, y) == (1.0, 15.0)
     assert theta == pytest.approx(middle)
 

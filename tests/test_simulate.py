@@ -22,7 +22,7 @@ from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.collect.simulate.schedule import balanced_schedule
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import RUNNING
 from copolicy.tasks.table.agents import PAIRS
 from copolicy.tasks.table.map_config import MapConfig

@@ -30,7 +30,7 @@ from copolicy.collect.play.settings import PlayerSpec, PlaySettings
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.recover import recover
 from copolicy.dataset.command_line.commands import progress
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.physics import Physics
 

@@ -23,7 +23,7 @@ from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.dataset import clock
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.statistics.estimate import Estimate
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
@@ -86,7 +86,7 @@ def frames(episodes: list[Episode]) -> Trajectories:
         )
         for e in episodes
     ]  # fmt: skip
-    return Trajectories.of(trips, rows, FPS)
+    return Trajectories.from_episodes(trips, rows, FPS)
 
 
 def report(name: str, runs: list[Carried]) -> None:

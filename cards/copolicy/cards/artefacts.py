@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.checks.stored_check import Validity, content_hash, validity
+from copolicy.dataset.checks.check_report import Validity, content_hash, validity
 from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import CHECK_FILE, RELEASE_FILE, STATISTICS_FILE
 from copolicy.dataset.lerobot_folder.documents import CheckDocument, ReleaseDocument, StatisticsDocument

@@ -6,11 +6,11 @@ from huggingface_hub import DatasetCardData
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
-from copolicy.dataset.physics_text import physics_counts
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
 from copolicy.dataset.publication.repo_id import checked_repo_id
 from copolicy.dataset.scenarios import set_label
+from copolicy.dataset.settings_text import count_settings
 from copolicy.dataset.task_words import TaskWords
 
 from .artefacts import newest_release
@@ -130,7 +130,7 @@ def _overview(facts: DatasetFacts, title: str) -> str:
 
 def _physics(facts: DatasetFacts) -> str:
     try:
-        counts = physics_counts((episode["physics"] for episode in facts.episodes), facts.task)
+        counts = count_settings((episode["physics"] for episode in facts.episodes), facts.task)
     except InvalidValueError as error:
         raise FileFormatError(facts.root, "episodes with valid physics settings", str(error)) from None
     total = len(facts.episodes)

@@ -22,7 +22,7 @@ from copolicy.dataset.outline_figure import (
     label_colours,
     obstacles_of,
     panels,
-    places_text,
+    positions_text,
     show_whole,
 )
 
@@ -96,7 +96,7 @@ def _by_obstacles(facts: DatasetFacts, outline: Outline) -> tuple[int, list[Grou
         groups[obstacles_of(episode.fixed)].append(episode)
     largest = sorted(groups, key=lambda key: -len(groups[key]))[:_MOST_PANELS]
     return len(groups), [
-        (places_text(key, outline) or "no obstacle", groups[key])
+        (positions_text(key, outline) or "no obstacle", groups[key])
         for key in sorted(largest, key=lambda key: (len(key), max((size for _, size in key), default=0), key))
     ]
 

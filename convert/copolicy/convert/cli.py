@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.command_line.extras import DATASETS
 from copolicy.dataset.command_line.flag_numbers import whole_number
@@ -84,7 +84,7 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
         help=f"frames per second, a divisor of the recording rate (table: 30; default: {_DEFAULT_FPS})",
     )
     parser.add_argument(
-        "--downsampling", choices=get_args(Hold), default=None,
+        "--downsampling", choices=get_args(Downsampling), default=None,
         help="action of a frame: the mean of its recorded steps or the first (default: mean; first for a zarr store)",
     )  # fmt: skip
     parser.add_argument(

@@ -13,7 +13,7 @@ from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError, 
 from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import broken_links, distinct_files, without_duplicates
 from copolicy.dataset.files.staging import require_new
-from copolicy.dataset.recording.log import read_episode, recorded_task
+from copolicy.dataset.recording.reader import read_episode, recorded_task
 from copolicy.dataset.worker_pool import WorkerPool
 
 from .lerobot.prepare import Conversion, PreparedEpisode, SkippedEpisode, SkipReport, admit, read_and_prepare

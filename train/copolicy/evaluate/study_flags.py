@@ -179,7 +179,7 @@ def task_entry(task: PairTask) -> dict[str, str]:
 
 def unseen_entry(task: PairTask, scenarios: Sequence[Any]) -> dict[str, str]:
     """The `unseen` entry of a result: properties of the scenarios that policies do not observe; logs a warning."""
-    text = task.unseen_in([task.columns_of(scenario) for scenario in scenarios])
+    text = task.unseen_summary([task.columns_of(scenario) for scenario in scenarios])
     if text:
         logging.warning("warning: of the maps, %s", text)
     return {"unseen": text} if text else {}

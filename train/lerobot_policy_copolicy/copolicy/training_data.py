@@ -109,19 +109,19 @@ def require_same_rate(config: CopolicyConfig) -> None:
     if any(not math.isclose(value, settings[name]) for name, value in learned.items()):
         both = replace(environment.world_settings, **learned), environment.world_settings
         logging.warning("The policy learned under %s; the environment has %s", *map(task.settings_summary, both))
-    if unseen := task.unseen_in([task.columns_of(scenario) for scenario in environment.scenarios]):
+    if unseen := task.unseen_summary([task.columns_of(scenario) for scenario in environment.scenarios]):
         logging.warning("Of the maps of the environment, %s", unseen)
 
 
 def _unseen(task: PairTask, meta: Any, episodes: Collection[int] | None) -> str:
-    """`PairTask.unseen_in` of the episodes to train on."""
+    """`PairTask.unseen_summary` of the episodes to train on."""
     scenario = next(iter(scenarios[0] for scenarios in task.scenario_sets.values() if scenarios), None)
     columns = meta.episodes
     names = [name for name in task.columns_of(scenario) if name in columns.column_names] if columns and scenario else []
     if not names:
         return ""
     rows = zip(*(columns[name] for name in names), strict=True)
-    return task.unseen_in(
+    return task.unseen_summary(
         [
             dict(zip(names, row, strict=True))
             for episode, row in zip(columns["episode_index"], rows, strict=True)

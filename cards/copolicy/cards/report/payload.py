@@ -21,7 +21,7 @@ from copolicy.dataset.outline_figure import (
     decimals,
     label_colours,
     obstacles_of,
-    places_text,
+    positions_text,
 )
 from copolicy.dataset.task_spec import TIMEOUT
 
@@ -150,7 +150,7 @@ def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[
             distinct_sizes = sizes if len(set(sizes)) > 1 else sizes[:1]
             size = f" of {', '.join(distinct_sizes)} {outline.unit}" if several_sizes else ""
             count = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}"
-            name = f"{count}{size} at {places_text(obstacles, outline)}"
+            name = f"{count}{size} at {positions_text(obstacles, outline)}"
         polygons = [_polygon(outline, shape) for shape in shapes]
         entries.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
     return entries

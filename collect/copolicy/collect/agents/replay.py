@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import PairTask, get_task
 
 from ..rollout import Agent, EpisodeStart

@@ -2,7 +2,7 @@
 
 from enum import Enum, auto
 
-from copolicy.dataset.outline import between
+from copolicy.dataset.outline import interpolate_pose
 
 from ..inputs import Press
 from ..screen import WORLD, Canvas
@@ -79,7 +79,7 @@ class Phase:
     def draw_world(self, canvas: Canvas, trial: Trial, fraction: float = 1.0, running: bool = True) -> None:
         """Draws the world and the bars around it; with `running` False the bars name the players of the seats."""
         view = self.game.view(trial.scenario)
-        pose = between(trial.previous_pose, trial.pose, fraction)
+        pose = interpolate_pose(trial.previous_pose, trial.pose, fraction)
         trail = [*trial.trail, pose]
         view.draw(canvas.surface, canvas.rect(*WORLD), pose, trial.forces, trail)
         draw_hud(canvas, self.game.hud(trial, running))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.physics_text import physics_summary
+from copolicy.dataset.settings_text import describe_settings
 from copolicy.dataset.task import PairTask, get_task
 
 from ..agents import PersonAgent, PolicyAgent, ReplayAgent, ScriptedAgent, load_policy
@@ -139,7 +139,7 @@ def warn_other_settings(players: Iterable[SeatedPlayer], settings: Any, task: Pa
         if isinstance(player.agent, ReplayAgent):
             recorded = replace(player.agent.settings, step_limit=settings.step_limit)
             if recorded != settings:
-                summaries = (physics_summary(recorded, task), physics_summary(settings, task))
+                summaries = (describe_settings(recorded, task), describe_settings(settings, task))
                 logging.warning("warning: %s was recorded with %s, this session has %s", player.agent.name, *summaries)
 
 

@@ -17,12 +17,12 @@ from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Sch
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
-from copolicy.dataset.recording.log import recorded_task
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, MESSAGE_HEAD, chunk_records
 from copolicy.dataset.recording.mcap_records import RecordWalk
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming
-from copolicy.dataset.recording.soundness import CheckSums, channels_text
-from copolicy.dataset.recording.topics import EVENT, LOOP_TIMING, is_ours
+from copolicy.dataset.recording.reader import recorded_task
+from copolicy.dataset.recording.topics import EVENT, LOOP_TIMING, is_channel_of
+from copolicy.dataset.recording.verification import CheckSums, channels_text
 from copolicy.dataset.task import PairTask
 
 from ..ticker import LoopStatistics, Tick
@@ -220,7 +220,7 @@ class _StepChecker:
             self._schemas[record.id] = record.name
         elif isinstance(record, Channel):
             self._declared.add(record.id)
-            if is_ours(record, self._schemas.get(record.schema_id, ""), self._messages.topics):
+            if is_channel_of(record, self._schemas.get(record.schema_id, ""), self._messages.topics):
                 self._topics[record.id] = record.topic
             else:
                 self._other_topics.add(record.topic)

@@ -13,12 +13,12 @@ import numpy as np
 from copolicy.dataset.episode import EpisodeMeta, termination_reasons
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import named_errors
-from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.recording.topics import Record
+from copolicy.dataset.shared_device import identical_actions, may_be_one_device
 from copolicy.dataset.task import get_task
 
 from . import episode_messages
@@ -259,7 +259,7 @@ class EpisodeRecorder:
         meta, joint = self.meta, self._spec.joint_action
         suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
         actions = np.asarray(self._actions).reshape(-1, len(joint))
-        if suspected and identical(self._spec.full_forces(actions)):
+        if suspected and identical_actions(self._spec.full_forces(actions)):
             columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,

@@ -15,8 +15,8 @@ from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignR
 from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import distinct_files
 from copolicy.dataset.files.lock import lock, unlock_on_windows
-from copolicy.dataset.recording.log import read_episode, read_metadata
-from copolicy.dataset.recording.soundness import RECOVERY
+from copolicy.dataset.recording.reader import read_episode, read_metadata
+from copolicy.dataset.recording.verification import RECOVERY
 
 from .episode_file import PART_SUFFIX
 from .intact_records import read_intact_part

@@ -16,12 +16,12 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.files.staging import named_errors, sync_folder
-from copolicy.dataset.interaction import identical, may_be_one_device
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
-from copolicy.dataset.recording.log import read_episode
-from copolicy.dataset.recording.soundness import RECOVERY, UNVERIFIED
-from copolicy.dataset.recording.topics import EVENT, Record, is_ours
+from copolicy.dataset.recording.reader import read_episode
+from copolicy.dataset.recording.topics import EVENT, Record, is_channel_of
+from copolicy.dataset.recording.verification import RECOVERY, UNVERIFIED
+from copolicy.dataset.shared_device import identical_actions, may_be_one_device
 from copolicy.dataset.task import PairTask
 
 from ..session.recording_summaries import OFF_CENTRE, PRACTICE
@@ -118,7 +118,7 @@ class _RecordCopier:
             schema = self._schemas[record.schema_id]
             channel = writer.register_channel(record.topic, record.message_encoding, schema, record.metadata)
             self._channels[record.id] = channel
-            if is_ours(record, self._names.get(record.schema_id, ""), self._messages.topics):
+            if is_channel_of(record, self._names.get(record.schema_id, ""), self._messages.topics):
                 self._topics[record.id] = record.topic
         elif isinstance(record, Attachment):
             writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
@@ -168,7 +168,7 @@ def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
         "paused": "pause" in events,
         "slow_loop": part.loop.slow,
         OFF_CENTRE: OFF_CENTRE in events,
-        IDENTICAL_ACTIONS: suspected and identical(part.task.spec.full_forces(actions)),
+        IDENTICAL_ACTIONS: suspected and identical_actions(part.task.spec.full_forces(actions)),
         RECOVERED: True,
     }
     meta = EpisodeMeta(

@@ -10,7 +10,7 @@ from typing import Any
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import new_file, require_new
-from copolicy.dataset.outline import Point, Shape, placed
+from copolicy.dataset.outline import Point, Shape, to_scene
 from copolicy.dataset.task_spec import PLAYERS
 
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
@@ -116,7 +116,7 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
             lines = rr.LineStrips2D(strips, colors=[_COLOURS[role]] * len(strips), **labels)
             recording.log(f"world/{entity}", lines, static=True)
     for player, hand, colour in zip(PLAYERS, outline.hands, SEATS, strict=True):
-        points = [placed(pose, hand) for pose in track.poses]
+        points = [to_scene(pose, hand) for pose in track.poses]
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[width / _WIDTH])
         recording.log(f"world/trail/{player}", trail, static=True)
     if track.interaction is not None:
@@ -130,10 +130,10 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
 def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
     outline, pose, forces = track.task.required_outline, track.poses[step], track.forces_at(step)
     radius = outline.size[0] / _WIDTH
-    strips = [_closed([placed(pose, corner) for corner in shape.corners]) for shape in outline.body]
+    strips = [_closed([to_scene(pose, corner) for corner in shape.corners]) for shape in outline.body]
     colours = [_COLOURS.get(shape.role, WOOD) for shape in outline.body]
     recording.log(f"world/{track.task.spec.name}", rr.LineStrips2D(strips, colors=colours, radii=[2.0 * radius]))
-    origins = [placed(pose, hand) for hand in outline.hands]
+    origins = [to_scene(pose, hand) for hand in outline.hands]
     vectors = [(outline.arrow * x, outline.arrow * y) for x, y in (forces[:2], forces[2:])]
     recording.log(
         "world/forces", rr.Arrows2D(origins=origins, vectors=vectors, colors=list(SEATS), radii=[2.5 * radius])

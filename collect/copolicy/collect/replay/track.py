@@ -8,8 +8,8 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.outline import Pose, between
-from copolicy.dataset.recording.log import read_recording
+from copolicy.dataset.outline import Pose, interpolate_pose
+from copolicy.dataset.recording.reader import read_recording
 from copolicy.dataset.task import PairTask, get_task
 
 
@@ -63,7 +63,7 @@ class Track:
         """Returns the pose at a position in [0, T], in steps; interpolated between two states."""
         before = min(int(position), self.steps)
         after = min(before + 1, self.steps)
-        return between(self.poses[before], self.poses[after], position - before)
+        return interpolate_pose(self.poses[before], self.poses[after], position - before)
 
     def forces_at(self, position: float) -> tuple[float, float, float, float]:
         """Returns the forces that act at a position: robot xy, human xy."""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from copolicy.dataset.outline import Outline, Pose, placed
+from copolicy.dataset.outline import Outline, Pose, to_scene
 from copolicy.dataset.task import PairTask, SceneView
 
 from ..sdl import pygame
@@ -82,7 +82,7 @@ class OutlineView:
         return self._rect.left + point[0] * self._scale, self._rect.top + point[1] * self._scale
 
     def _body_points(self, pose: Pose, points: Sequence[Point]) -> list[Point]:
-        return [self.to_screen(placed(pose, point)) for point in points]
+        return [self.to_screen(to_scene(pose, point)) for point in points]
 
     def _draw_background(self, size: tuple[int, int]) -> pygame.Surface:
         floor = new_surface(size)
@@ -115,7 +115,7 @@ class OutlineView:
             return
         width = max(2, round(3 * self._px))
         for hand, colour in zip(self._outline.hands, SEATS, strict=True):
-            points = [self.to_screen(placed(pose, hand)) for pose in trail]
+            points = [self.to_screen(to_scene(pose, hand)) for pose in trail]
             pale = mix(colour, FLOOR, 0.55)
             pygame.draw.lines(surface, pale, False, points, width)
             pygame.draw.aalines(surface, pale, False, points)

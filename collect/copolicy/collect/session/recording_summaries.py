@@ -8,8 +8,8 @@ from pathlib import Path
 from copolicy.dataset.exceptions import FileFormatError, UnknownNameError
 from copolicy.dataset.files.listing import broken_links, distinct_files
 from copolicy.dataset.recording import episode_records
-from copolicy.dataset.recording.log import read_metadata
-from copolicy.dataset.recording.soundness import require_version
+from copolicy.dataset.recording.reader import read_metadata
+from copolicy.dataset.recording.verification import require_version
 from copolicy.dataset.task import TABLE, get_task
 
 PRACTICE = "practice"

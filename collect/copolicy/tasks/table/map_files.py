@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.publication.licences import checked_licence
-from copolicy.dataset.scenario_document import Document, Problem
+from copolicy.dataset.scenario_document import Document, ScenarioProblem
 from copolicy.dataset.scenarios import ScenarioFiles, ScenarioName, ScenarioSet
 
 from .map_config import MAX_OBSTACLES, MapConfig
@@ -103,7 +103,7 @@ class MapFiles(ScenarioFiles):
             raise FileFormatError(path, "maps that can be used", f"{problems[0]}{others}")
         return map_set
 
-    def problems(self, path: Path) -> list[Problem]:
+    def problems(self, path: Path) -> list[ScenarioProblem]:
         """See `ScenarioFiles.problems`."""
         return self._read(path)[1]
 
@@ -125,7 +125,7 @@ class MapFiles(ScenarioFiles):
             "maps": maps,
         }  # fmt: skip
 
-    def _read(self, path: Path) -> tuple[ScenarioSet | None, list[Problem]]:
+    def _read(self, path: Path) -> tuple[ScenarioSet | None, list[ScenarioProblem]]:
         from .map_problems import map_problems  # scipy and pymunk
 
         document = Document(path)
@@ -150,7 +150,7 @@ class MapFiles(ScenarioFiles):
         ), []
 
 
-def _check_texts(document: Document, content: MapFile, problems: list[Problem]) -> None:
+def _check_texts(document: Document, content: MapFile, problems: list[ScenarioProblem]) -> None:
     if content.name in (*MAP_SETS, "custom"):
         problems.append(document.problem("name", f"{content.name} is the name of a set of the package"))
     if not 1 <= len(content.maps) <= _MOST_MAPS:
@@ -168,7 +168,9 @@ def _check_texts(document: Document, content: MapFile, problems: list[Problem]) 
             problems.append(document.problem(f"maps[{index}].name", message))
 
 
-def _configs(document: Document, path: str, entry: Map, number: str, problems: list[Problem]) -> list[MapConfig]:
+def _configs(
+    document: Document, path: str, entry: Map, number: str, problems: list[ScenarioProblem]
+) -> list[MapConfig]:
     """The map in each of its orientations, named as in its file; adds what is wrong at `path` to `problems`."""
     start = entry.start
     if (start.theta is None) == (start.orientations is None):
@@ -205,7 +207,7 @@ def _configs(document: Document, path: str, entry: Map, number: str, problems: l
 
 
 def _splits(
-    document: Document, content: MapFile, maps: list[list[MapConfig]], problems: list[Problem]
+    document: Document, content: MapFile, maps: list[list[MapConfig]], problems: list[ScenarioProblem]
 ) -> dict[str, tuple[int, ...]]:
     """Indices into the set of the maps of each split; a split has all orientations of a map."""
     first = [sum(len(turned) for turned in maps[:index]) for index in range(len(maps))]

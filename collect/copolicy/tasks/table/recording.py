@@ -6,7 +6,7 @@ import numpy as np
 
 from copolicy.dataset.recording.messages.copolicy_pb2 import Interaction, PlayerAction, TableState
 from copolicy.dataset.recording.task_messages import SceneWriter, TaskMessages
-from copolicy.dataset.recording.topics import Record, Topic, of_player
+from copolicy.dataset.recording.topics import Record, Topic, player_metadata
 from copolicy.dataset.task_spec import RECORD_HZ
 
 from .artist.scene import SCENE, SCENE_MAP, TableScene, map_scene
@@ -25,7 +25,7 @@ _ROBOT, _HUMAN = (
     Topic(
         f"/player/{player}/action",
         PlayerAction,
-        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": _FRAME, **of_player(player)},
+        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": _FRAME, **player_metadata(player)},
     )
     for player in range(2)
 )

@@ -15,7 +15,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunE
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.physics_text import physics_counts, physics_of
+from copolicy.dataset.settings_text import count_settings, parse_settings_text
 from copolicy.dataset.task import PairTask
 
 
@@ -111,7 +111,7 @@ class ExportSource:
         rows = folder.rows()
         for row in rows:
             try:
-                physics_of(row["physics"], task)
+                parse_settings_text(row["physics"], task)
             except InvalidValueError as error:
                 raise FileFormatError(root, f"the settings of episode {row['episode_index']}", str(error)) from None
         exported = tuple(row for row in rows if keep_discarded or not row["discarded"])
@@ -135,7 +135,7 @@ class ExportSource:
             "sources": dict(sorted(sources.items())),
             "simulated": bool(sources["simulated"]),
             "licenses": licenses,
-            "physics": physics_counts((row["physics"] for row in self.rows), self.task),
+            "physics": count_settings((row["physics"] for row in self.rows), self.task),
         }
 
     @property
@@ -145,7 +145,7 @@ class ExportSource:
         A setting that differs between episodes keeps its default; `facts` lists the settings of the episodes.
         """
         default: Any = self.task.settings_type()
-        settings = [physics_of(row["physics"], self.task) or default for row in self.rows]
+        settings = [parse_settings_text(row["physics"], self.task) or default for row in self.rows]
         common = {}
         for setting in fields(default):
             values = {getattr(episode_settings, setting.name) for episode_settings in settings}
@@ -166,7 +166,7 @@ class ExportSource:
         for index, frames in self._folder.frames({name: features[name]["shape"] for name in names}):
             if index in rows:
                 row = rows[index]
-                settings = physics_of(row["physics"], self.task) or self.task.settings_type()
+                settings = parse_settings_text(row["physics"], self.task) or self.task.settings_type()
                 yield ExportEpisode(
                     index, frames[STATE], frames[ENVIRONMENT_STATE][0], frames[HUMAN_ACTION], frames[ACTION],
                     frames["next.reward"], {name: row[name] for name in EPISODE_COLUMNS}, self.fps, settings, self.task,

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, MissingExtraError
 from copolicy.dataset.files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, RECORD_FILE, STATS_FILE, TASKS_FILE
@@ -18,7 +18,7 @@ from copolicy.dataset.lerobot_folder.loading import require_loadable
 from copolicy.dataset.lerobot_folder.references import FileIndex, chunk_files
 from copolicy.dataset.lerobot_folder.tables import read_parquet
 from copolicy.dataset.publication.minimal_card import is_minimal_card, write_minimal_card
-from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.reader import read_metadata
 
 from ..recordings import convert_recordings, find_recordings
 from ..video.scene_video import SCENE
@@ -36,7 +36,7 @@ except ImportError as error:
     raise MissingExtraError((error.name or "lerobot").split(".")[0]) from None
 
 
-def stored_sampling(root: Path, fps: int | None, downsampling: Hold | None) -> tuple[int, Hold]:
+def stored_sampling(root: Path, fps: int | None, downsampling: Downsampling | None) -> tuple[int, Downsampling]:
     """Returns the rate and downsampling of a data set, which appended episodes must share.
 
     Raises:

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from copolicy.dataset.clock import Hold, frame_actions, frame_states, previous_actions, stride
+from copolicy.dataset.clock import Downsampling, frame_actions, frame_states, previous_actions, stride
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import get_task
 
 
-def frame_columns(episode: Episode, fps: int, downsampling: Hold = "mean") -> dict[str, np.ndarray]:
+def frame_columns(episode: Episode, fps: int, downsampling: Downsampling = "mean") -> dict[str, np.ndarray]:
     """Returns the columns of an episode (`features_of` its task) at `fps`, `(T', n)` float32 or `(T',)`.
 
     `next.reward` is the reward of the state after the frame's recorded steps; `next.done` marks the last frame,
@@ -39,7 +39,7 @@ def frame_columns(episode: Episode, fps: int, downsampling: Hold = "mean") -> di
     return columns
 
 
-def _at_rate(episode: Episode, record_hz: int, fps: int, downsampling: Hold) -> tuple[np.ndarray, np.ndarray]:
+def _at_rate(episode: Episode, record_hz: int, fps: int, downsampling: Downsampling) -> tuple[np.ndarray, np.ndarray]:
     if not len(episode.actions):
         raise InvalidValueError(f"steps of episode {episode.meta.episode_uuid}", "at least one", 0)
     if episode.fps == record_hz:

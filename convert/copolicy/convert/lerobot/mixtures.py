@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.physics_text import physics_counts
+from copolicy.dataset.settings_text import count_settings
 from copolicy.dataset.task import PairTask
 
 _COLUMNS = ("source", "software_version", "license")
@@ -49,7 +49,7 @@ class Mixtures:
         """
         rows = list(rows)
         try:
-            physics = physics_counts((row.get("physics") for row in rows), task)
+            physics = count_settings((row.get("physics") for row in rows), task)
         except InvalidValueError as error:
             raise FileFormatError(data_set, "episodes that say their physics", str(error)) from None
         counts: dict[str, Mapping[str, int]] = {"physics": physics}

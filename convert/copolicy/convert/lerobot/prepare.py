@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.features import STATE
@@ -33,7 +33,7 @@ class Conversion:
     """
 
     fps: int = 10
-    downsampling: Hold = "mean"
+    downsampling: Downsampling = "mean"
     license: str = ""
     keep_discarded: bool = False
     drift: bool = True

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, features_of
@@ -54,7 +54,7 @@ class WrittenDataset:
     root: Path
     repo_id: str
     fps: int
-    hold: Hold  # named like its key of the summary
+    hold: Downsampling  # named like its key of the summary
     episodes: int
     frames: int
     successes: int
@@ -71,7 +71,7 @@ def write_dataset(
     root: Path,
     repo_id: str,
     fps: int,
-    downsampling: Hold,
+    downsampling: Downsampling,
     record: Callable[[], dict],
     data_file_mb: int | None = None,
     video_file_mb: int | None = None,
@@ -133,7 +133,7 @@ def _warn_of_licences(root: Path, rows: list[dict]) -> None:
         )  # fmt: skip
 
 
-def _features(spec: TaskSpec, downsampling: Hold, example: PreparedEpisode) -> dict[str, dict]:
+def _features(spec: TaskSpec, downsampling: Downsampling, example: PreparedEpisode) -> dict[str, dict]:
     features = features_of(spec)
     action = {**features[ACTION], "hold": downsampling, "record_hz": spec.record_hz}
     video = {SCENE: scene_feature(example.scene.size)} if example.scene else {}

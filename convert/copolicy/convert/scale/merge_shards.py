@@ -6,7 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.checks.checking import check_table, of_data_sets
+from copolicy.dataset.checks.checking import check_data, judges_data_set
 from copolicy.dataset.checks.finding import SEVERITIES, Finding
 from copolicy.dataset.checks.read_lerobot import read_lerobot
 from copolicy.dataset.edit.subset.stored_set import stored_record, write_record
@@ -175,5 +175,5 @@ def all_findings(root: Path, records: Sequence[ShardRecord]) -> list[Finding]:
         start += len(record["episodes"])
     for finding, total in totals.items():
         findings.append(Finding("", finding.rule, total, finding.limit, finding.severity, finding.message))
-    findings += check_table(read_lerobot(root), of_data_sets).findings
+    findings += check_data(read_lerobot(root), judges_data_set).findings
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))

@@ -4,11 +4,11 @@ import shutil
 from dataclasses import asdict
 from importlib.metadata import version
 
-from copolicy.dataset.checks.checking import check_table, of_recordings
-from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
+from copolicy.dataset.checks.checking import check_data, judges_one_recording
+from copolicy.dataset.checks.read_recordings import data_of_recordings, unverified_findings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.files.staging import new_folder, replace_json, replace_text
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
 from ..lerobot.prepare import DamagedEpisodeError, PreparedEpisode, SkippedEpisode, SkipReport, admit, read_and_prepare
 from .shard_plan import DATA_SET, RECORD_FILE, ShardPlan
@@ -86,8 +86,8 @@ def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[E
     if not episodes:
         return {"applied": [], "findings": []}
     labels = [str(index) for index in range(len(prepared))]
-    result = check_table(recordings_table(plan.root, labels, episodes), of_recordings)
+    result = check_data(data_of_recordings(plan.root, labels, episodes), judges_one_recording)
     findings = list(result.findings)
     for label, episode in zip(labels, episodes, strict=True):
-        findings += not_verified(label, episode)
+        findings += unverified_findings(label, episode)
     return {"applied": list(result.applied), "findings": [finding.to_dict() for finding in findings]}

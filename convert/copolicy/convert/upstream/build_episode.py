@@ -20,7 +20,7 @@ import numpy as np
 
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
-from copolicy.dataset.physics_text import physics_text
+from copolicy.dataset.settings_text import settings_text
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.features import states_7, theta_of
 from copolicy.tasks.table.map_config import MapConfig
@@ -158,7 +158,7 @@ def build_episode(
         quality_flags=",".join(flags),
         discarded=excluded,
         source_sha256=digest,
-        physics=physics_text(physics) if trajectory.physics_known and "dynamics_mismatch" not in flags else "",
+        physics=settings_text(physics) if trajectory.physics_known and "dynamics_mismatch" not in flags else "",
         obstacle_size=config.obstacle_size,
     )
     limit = next(name for name, value in ANGULAR_LIMITS.items() if value == physics.angular_acceleration_limit)

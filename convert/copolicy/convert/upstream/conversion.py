@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from copolicy.dataset.clock import Hold, stride
+from copolicy.dataset.clock import Downsampling, stride
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
@@ -82,7 +82,7 @@ def convert_upstream(
     root: Path,
     repo_id: str,
     fps: int = 10,
-    downsampling: Hold | None = None,
+    downsampling: Downsampling | None = None,
     options: UpstreamOptions = UpstreamOptions(),  # noqa: B008 - frozen
     license: str = "",
     skip_damaged: bool = False,

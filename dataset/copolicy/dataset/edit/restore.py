@@ -13,10 +13,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..checks.episode_table import EpisodeTable
+from ..checks.episode_data import EpisodeData
 from ..checks.leakage import motion_digests
 from ..checks.read_lerobot import read_lerobot
-from ..clock import Hold, frame_actions, frame_states
+from ..clock import Downsampling, frame_actions, frame_states
 from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, FileFormatError, RunError
@@ -26,7 +26,7 @@ from ..files.meta_files import RECORD_FILE
 from ..files.replace_folder import finish_interrupted
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
-from ..recording.log import read_episode
+from ..recording.reader import read_episode
 from .amend import today
 from .subset.stored_set import record_text, stored_record
 
@@ -108,7 +108,7 @@ def _episodes_without_columns(tables: Any) -> list[int]:
     return numbers
 
 
-def _motion_digests(table: EpisodeTable, root: Path) -> dict[int, str]:
+def _motion_digests(table: EpisodeData, root: Path) -> dict[int, str]:
     """Digest of the motion of each episode by episode number."""
     if len(table.framed) != len(table.labels):
         missing = next(iter(set(range(len(table.labels))) - set(table.framed.tolist())))
@@ -144,8 +144,10 @@ def _read_recordings(path: Path, root: Path) -> Originals:
         fps, downsampling = int(info["fps"]), info["features"][ACTION]["hold"]
     except (KeyError, TypeError, ValueError):
         raise FileFormatError(root, "fps and hold of the feature action in meta/info.json", "none") from None
-    if downsampling not in get_args(Hold):
-        raise FileFormatError(root, f"a hold of {' or '.join(get_args(Hold))} in meta/info.json", str(downsampling))
+    if downsampling not in get_args(Downsampling):
+        raise FileFormatError(
+            root, f"a hold of {' or '.join(get_args(Downsampling))} in meta/info.json", str(downsampling)
+        )
     originals = Originals("recordings")
     for file in progress(files, len(files), "reading"):
         try:
@@ -157,7 +159,7 @@ def _read_recordings(path: Path, root: Path) -> Originals:
     return originals
 
 
-def _recording_digest(episode: Episode, fps: int, downsampling: Hold) -> str:
+def _recording_digest(episode: Episode, fps: int, downsampling: Downsampling) -> str:
     """Digest of a recording's frames as a data set would store them (`checks.leakage.motion_digests`)."""
     columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, downsampling)
     rows = np.hstack([column.astype(np.float32) for column in columns])

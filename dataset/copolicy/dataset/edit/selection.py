@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, get_args
 
-from ..episode import OTHER_REASONS, Source
+from ..episode import GENERIC_REASONS, Source
 from ..exceptions import InvalidValueError, RunError
 from ..lerobot_folder.episode_rows import select_episodes
 from ..task import get_task, installed_tasks
@@ -40,7 +40,7 @@ class Selection:
 
     def __post_init__(self):
         reasons = (reason for name in installed_tasks() for reason in get_task(name).spec.reasons)
-        results = ("success", "failure", *dict.fromkeys(reasons), *OTHER_REASONS) if self.results else ()
+        results = ("success", "failure", *dict.fromkeys(reasons), *GENERIC_REASONS) if self.results else ()
         for name, values, choices in (
             ("--results", self.results, results),
             ("--sources", self.sources, get_args(Source)),

@@ -9,7 +9,7 @@ import numpy as np
 from copolicy.collect.session import iter_recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.recording.reader import Recording, read_recording
 from copolicy.dataset.task import get_task
 
 from ..coplan.rollouts import interaction_columns

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from copolicy.dataset.files.staging import replacement
-from copolicy.dataset.outline import placed
+from copolicy.dataset.outline import to_scene
 from copolicy.dataset.outline_figure import OBSTACLE, SERIES, draw_body, draw_fixed, show_whole
 from copolicy.dataset.task_spec import PLAYERS
 
@@ -69,7 +69,7 @@ def _forces(axis: Axes, branch_point: BranchPoint, colours: dict[str | None, str
     _scene(axis, branch_point)
     first = outline.forces(np.array([sample.chunk[0] for sample in branch_point.samples])) * _ARROW * outline.arrow
     for grip, forces, name in zip(outline.hands, (first[:, :2], first[:, 2:]), PLAYERS, strict=True):
-        x, y = placed(branch_point.pose, grip)
+        x, y = to_scene(branch_point.pose, grip)
         axis.quiver(
             np.full(len(forces), x), np.full(len(forces), y), *forces.T,
             color=[colours[sample.route] for sample in branch_point.samples],

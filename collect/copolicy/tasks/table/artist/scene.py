@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from copolicy.dataset.outline import placed
+from copolicy.dataset.outline import to_scene
 from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task_spec import PLAYERS
 
@@ -133,7 +133,7 @@ def metres(point: tuple[float, float]) -> tuple[float, float]:
 
 def _to_scene(pose: Pose, point: tuple[float, float]) -> tuple[float, float]:
     """Scene coordinates, m, of a point (u, v) of the table at a pose, px."""
-    x, y = metres(placed(pose, point))
+    x, y = metres(to_scene(pose, point))
     return rounded(x), rounded(y)
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.checks.finding import Finding
-from copolicy.dataset.checks.mixtures import listed
+from copolicy.dataset.checks.provenance import counts_text
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
@@ -24,7 +24,7 @@ from ..maps import MAP_SETS, map_set
 _DIFFERENT = float("inf")
 
 
-def _named(table: EpisodeTable) -> Iterator[Finding]:
+def _named(table: EpisodeData) -> Iterator[Finding]:
     columns = (table.columns[name].tolist() for name in ("map_id", "map_set", "map_set_digest"))
     for label, name, group, digest in zip(table.labels, *columns, strict=True):
         family = name.split("-")[0]
@@ -50,7 +50,7 @@ def _named(table: EpisodeTable) -> Iterator[Finding]:
         yield Finding(table.labels[index], "map_name", None, None, "warning", message)
 
 
-def _rows(table: EpisodeTable) -> Iterator[Finding]:
+def _rows(table: EpisodeData) -> Iterator[Finding]:
     rows = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     bound = table.limit("map_position")
     files: dict[tuple[str, str], MapConfig] = {}
@@ -73,16 +73,16 @@ def _rows(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding(table.labels[index], "map_rows", figure, bound, "error", message)
 
 
-def _start(table: EpisodeTable) -> Iterator[Finding]:
+def _start(table: EpisodeData) -> Iterator[Finding]:
     first = table.frames[STATE][table.starts].astype(float)
     start = table.frames[ENVIRONMENT_STATE][table.starts].astype(float)
     distance = np.linalg.norm(first[:, :2] - start[:, :2], axis=1)
     bound = table.limit("map_start")
     message = "the episode begins this many px from its map's start"
-    yield from table.found("map_start", ~(distance <= bound), distance, bound, message)
+    yield from table.findings("map_start", ~(distance <= bound), distance, bound, message)
 
 
-def _obstacle_sizes(table: EpisodeTable) -> Iterator[Finding]:
+def _obstacle_sizes(table: EpisodeData) -> Iterator[Finding]:
     sizes: dict[str, Counter[str]] = {}
     columns = (table.columns[name].tolist() for name in ("map_set", "map_id", "obstacle_size", "map_set_digest"))
     for label, group, name, size, digest in zip(table.labels, *columns, strict=True):
@@ -95,7 +95,7 @@ def _obstacle_sizes(table: EpisodeTable) -> Iterator[Finding]:
             yield Finding(label, "obstacle_size", size, expected.obstacle_size, "error", message)
     for group, counts in sizes.items():
         if len(counts) > 1:
-            message = f"obstacles of several sizes in map set {group or 'without a name'}: {listed(counts)}"
+            message = f"obstacles of several sizes in map set {group or 'without a name'}: {counts_text(counts)}"
             yield Finding("", "obstacle_size", len(counts), 1, "warning", message)
 
 

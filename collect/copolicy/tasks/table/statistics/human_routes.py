@@ -15,7 +15,7 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.statistics.entropy import jensen_shannon
 from copolicy.dataset.statistics.estimate import Estimate, Null
 from copolicy.dataset.statistics.resampling import interval
-from copolicy.dataset.statistics.route_entropy import MIN_EPISODES, word_entropy
+from copolicy.dataset.statistics.route_entropy import MIN_EPISODES, label_entropy
 from copolicy.dataset.statistics.trajectories import Trajectories
 
 _LABELS = "human_passing_sides/train_passing_labels.csv"
@@ -39,8 +39,8 @@ def human_routes() -> dict[int, Counter[str]]:
 
 
 def human_route_entropy(rng: np.random.Generator) -> dict[str, dict]:
-    """Entropy of the human routes for each number of obstacles, as `word_entropy` has it."""
-    return {f"{size}_obstacles": word_entropy(counts, size, rng) for size, counts in human_routes().items()}
+    """Entropy of the human routes for each number of obstacles, as `label_entropy` has it."""
+    return {f"{size}_obstacles": label_entropy(counts, size, rng) for size, counts in human_routes().items()}
 
 
 def human_reference(rng: np.random.Generator) -> dict[str, dict | str]:
@@ -105,5 +105,5 @@ def _distance(
         "mirrored_bits": mirrored,
         "distance": float(np.sqrt(value)),  # the square root of the divergence is a metric
     }
-    null = Null.of("both drawn from their pooled shares", value, draws)
+    null = Null.from_draws("both drawn from their pooled shares", value, draws)
     return Estimate(value, "bits", definition, total, bounds, "episodes and labels", null, details=details)

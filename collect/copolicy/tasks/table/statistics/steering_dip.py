@@ -32,10 +32,10 @@ def decision_zone(data: Trajectories) -> np.ndarray:
     """
     zone = np.zeros(len(data.states), dtype=bool)
     for index, row in enumerate(data.rows):
-        if not row.map_config.obstacles:
+        if not row.scenario.obstacles:
             continue
-        origin, along = _axis(row.map_config)
-        squares = row.map_config.squares
+        origin, along = _axis(row.scenario)
+        squares = row.scenario.squares
         first = min(float((np.array(centre) - origin) @ along) - size / 2 for centre, size in squares)
         station = (data.path(index) - origin) @ along
         zone[data.starts[index] : data.ends[index]] = np.maximum.accumulate(station) < first
@@ -45,7 +45,7 @@ def decision_zone(data: Trajectories) -> np.ndarray:
 def steering(data: Trajectories) -> np.ndarray:
     """`(N,)` joint force across the line from start to goal, positive to its right on screen, in full forces."""
     total = data.actions[:, :2] + data.actions[:, 2:]
-    across = np.array([(-along[1], along[0]) for along in (_axis(row.map_config)[1] for row in data.rows)])
+    across = np.array([(-along[1], along[0]) for along in (_axis(row.scenario)[1] for row in data.rows)])
     return (total * across[data.episode]).sum(axis=1)
 
 
@@ -86,7 +86,7 @@ def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estima
     null_shares = [
         _rejected([rng.standard_normal(len(sample)) for _, sample in per_query]).mean() for _ in range(_NULL_DRAWS)
     ]
-    null = Null.of("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
+    null = Null.from_draws("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
     sizes = [len(sample) for _, sample in per_query]
     details = {"places": len(per_query), "median_episodes_at_a_place": float(np.median(sizes))}
     episodes = int((queries > 0).sum())
@@ -118,7 +118,7 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     value = float(rejected.mean())
     resampled = rng.binomial(len(rejected), value, size=1000) / len(rejected)
     bounds = (float(np.quantile(resampled, 0.025)), float(np.quantile(resampled, 0.975)))
-    null = Null.of("one Gaussian of as many episodes in each configuration", value, np.array(draws))
+    null = Null.from_draws("one Gaussian of as many episodes in each configuration", value, np.array(draws))
     episodes = sum(test["episodes"] for test in tests.values())
     details = {"configurations": tests}
     return Estimate(value, "1", definition, episodes, bounds, "configurations", null, details=details)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...exceptions import CopolicyError, ForeignRecordingError
 from ...files.staging import replace_text, sync_folder
-from ...recording import log
+from ...recording import reader
 from ..selection import consent_ids
 from .traces import Traces
 
@@ -42,7 +42,7 @@ def is_recording(name: str) -> bool:
 def read_recording(path: Path) -> ScannedRecording:
     """Reads the metadata of a recording, which may be unfinished."""
     try:
-        records = log.read_metadata(path)
+        records = reader.read_metadata(path)
     except CopolicyError:
         return ScannedRecording(path)
     if "consent" not in records and "episode" not in records:
@@ -94,7 +94,7 @@ def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
 
 def _is_foreign(path: Path) -> bool:
     try:
-        log.read_recording(path)
+        reader.read_recording(path)
     except ForeignRecordingError:
         return True
     except CopolicyError:

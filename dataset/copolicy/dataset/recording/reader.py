@@ -1,8 +1,7 @@
-"""Reads a recording: one MCAP file to one `Episode`, bit for bit as it was recorded, or not at all.
+"""Reads a recording: one MCAP file to one `Episode`, bit-identical to what was recorded.
 
-Every command reads recordings through this module, so that one rule holds for all: whatever layout the format allows
-is read, every check sum that the file carries is verified, and what carries none is checked for its structure, used
-as it stands, and named in `Episode.notes`.
+Every command reads recordings through this module: it reads any layout that the format allows, verifies all check sums,
+and checks the structure of parts without a check sum, which it uses and lists in `Episode.notes`.
 """
 
 import contextlib
@@ -17,7 +16,7 @@ from ..exceptions import CopolicyError, FileFormatError, ForeignRecordingError, 
 from ..files.file_kinds import describe_path
 from ..task import PairTask, get_task, installed_tasks
 from . import episode_records
-from .contents import RecordingContents
+from .episode_builder import EpisodeBuilder
 from .mcap_chunks import LARGEST_CHUNK, UnreadChunkError
 from .mcap_records import RecordWalk, metadata_records, walk_metadata
 from .messages.copolicy_pb2 import EpisodeEvent
@@ -27,18 +26,18 @@ _LARGEST: dict[int, int] = {
     Opcode.CHANNEL: 1 << 20,
     Opcode.MESSAGE: 1 << 20,
     Opcode.METADATA: 1 << 20,
-    Opcode.ATTACHMENT: 1 << 20,  # the map is small; a video beside it is read past
+    Opcode.ATTACHMENT: 1 << 20,  # the scenario is small; larger attachments such as videos are skipped
     Opcode.CHUNK: LARGEST_CHUNK,
 }
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What a recording holds.
+    """The content of a recording.
 
     Attributes:
-        episode: its states, actions, metadata and map.
-        events: what happened, by step.
+        episode: states, actions, metadata and scenario.
+        events: events in order of their steps.
     """
 
     episode: Episode
@@ -46,58 +45,58 @@ class Recording:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """The episode in a recording, and what happened in it.
+    """Reads the episode and the events of a recording.
 
-    Reads the file once, one chunk at a time, decodes nothing but states, actions and events, and verifies all that
-    can be: the check sums of chunks, attachments, data section and summary where there are any, the counts of the
-    summary, that every step from 0 has one state and two actions and the last one a state after it, the metadata,
-    and the scenario. `meta.source_sha256` is the digest of the file, `meta.physics` and
-    `meta.obstacle_size` are those of its record `physics` and of its scenario; `notes` say what carries no check sum.
+    Reads the file once, one chunk at a time, and decodes only states, actions and events. Verifies the check sums of
+    chunks, attachments, data section and summary if present, the counts of the summary, the metadata and the scenario,
+    and that every step from 0 has one state and two actions, with one more state at the end. `meta.source_sha256` is
+    the digest of the file; `meta.physics` and `meta.obstacle_size` are from the record `physics` and the scenario;
+    `notes` list the parts without a check sum.
 
     Raises:
-        FileFormatError: the file cannot be read, is damaged or incomplete.
-        ForeignRecordingError: it is another project's, of a task that is not installed, or of a version
-            that this reader does not know.
+        FileFormatError: the file is unreadable, damaged or incomplete.
+        ForeignRecordingError: the file is of another project, of a task that is not installed, or of an unknown schema
+            version.
     """
     path = Path(path)
     with _as_format_error(path), path.open("rb") as file:
         walk = RecordWalk(path, file, path.stat().st_size)
-        contents = RecordingContents(path, recorded_task(path))
+        builder = EpisodeBuilder(path, recorded_task(path))
         unread = ""
         for opcode, body in walk.records(_LARGEST):
             try:
-                contents.take(opcode, body)
+                builder.add_record(opcode, body)
             except UnreadChunkError as error:
-                unread = unread or str(error)  # the end of the file tells whether it matters
+                unread = unread or str(error)  # raised below if the file is a recording of this task
             except Exception as error:
-                # Damaged bytes fail in as many ways as there are parsers (struct, zstd, protobuf, UTF-8, ...).
+                # Damaged bytes cause errors of any parser (struct, zstd, protobuf, UTF-8, ...).
                 raise walk.damage(f"damage ({error or type(error).__name__}) in the record that ends") from None
-        contents.require_this_task(walk.summary_topics)
-        if walk.passed_by > LARGEST_CHUNK:
-            unread = f"a chunk of {walk.passed_by} bytes"
+        builder.require_this_task(walk.summary_topics)
+        if walk.largest_skipped > LARGEST_CHUNK:
+            unread = f"a chunk of {walk.largest_skipped} bytes"
         if unread:
             expected = f"chunks of at most {LARGEST_CHUNK >> 20} MiB, compressed with zstd, lz4 or nothing"
             raise FileFormatError(path, expected, unread)
-        return Recording(contents.episode(walk), contents.events)
+        return Recording(builder.episode(walk), builder.events)
 
 
 def read_episode(path: Path | str) -> Episode:
-    """The episode in a recording: what `read_recording` reads, without the events.
+    """Reads the episode of a recording, see `read_recording`.
 
     Raises:
-        FileFormatError: see `read_recording`.
+        FileFormatError: the file is unreadable, damaged, incomplete or not a recording of an installed task.
     """
     return read_recording(path).episode
 
 
 def recorded_task(path: Path) -> PairTask:
-    """The task of a recording, finished or not, as its metadata name it; the table where they name none.
+    """The task of a recording, also of an unfinished one; the table task if the metadata state none.
 
     Raises:
         ForeignRecordingError: the task is not installed.
     """
     name = "table"
-    # Whoever reads the whole file says what is damaged.
+    # Damage is reported when the whole file is read.
     with contextlib.suppress(Exception):
         records = (record.metadata for record in walk_metadata(path) if record.name == "dataset_info")
         info = next(info for info in records if episode_records.START_DIGEST in info)
@@ -112,12 +111,12 @@ def recorded_task(path: Path) -> PairTask:
 
 
 def read_metadata(path: Path | str) -> dict[str, dict[str, str]]:
-    """The metadata records of a recording by name, in about a millisecond and without verifying the file.
+    """Reads the metadata records of a recording by name, without verifying the file, in about a millisecond.
 
-    Works on a recording that broke off, too: what is written at its start is there.
+    An unfinished recording has the records that are written at its start.
 
     Raises:
-        FileFormatError: the file cannot be read or is no MCAP file.
+        FileFormatError: the file is unreadable or not an MCAP file.
     """
     path = Path(path)
     with _as_format_error(path):

@@ -17,10 +17,10 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.physics_text import physics_text
 from copolicy.dataset.recording.episode_records import decode_settings
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerAction, TableState
+from copolicy.dataset.recording.reader import read_episode, read_metadata
+from copolicy.dataset.settings_text import settings_text
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.features import state_vector
 from copolicy.tasks.table.map_config import MapConfig
@@ -114,7 +114,7 @@ def test_meta_map_and_digest_come_back(recording):
         META, success=True, termination_reason="goal", duration_s=40 / 30, achieved_hz=29.97, late_ticks=3,
         quality_flags="slow,short", source_sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         route_class=episode.meta.route_class, replay_drift_px=episode.meta.replay_drift_px,
-        physics=physics_text(Physics()), obstacle_size=MAP.obstacle_size,
+        physics=settings_text(Physics()), obstacle_size=MAP.obstacle_size,
     )  # fmt: skip
     assert episode.meta == expected
     assert len(episode.meta.route_class) == 2
@@ -188,7 +188,7 @@ def test_appended_bytes_are_refused(recording, tmp_path):
     path, *_ = recording
     longer = tmp_path / "longer.mcap"
     longer.write_bytes(path.read_bytes() + b"\0")
-    assert "found another end" in refusal(longer)
+    assert "found a wrong end of the file" in refusal(longer)
 
 
 @pytest.mark.parametrize("kind", ["bit", "byte", "zeros", "removed", "repeated", "exchanged"])
@@ -290,7 +290,7 @@ def single_precision(record, topic):
         (edit_metadata("dataset_info", fps="10"), "a recording at 30 Hz, found fps '10'"),
         (
             edit_metadata("dataset_info", schema_version="2"),
-            "schema version 1, the latest known here, found schema version '2'",
+            "schema version 1, the latest supported, found schema version '2'",
         ),
         (edit_metadata("episode", seed="x"), "metadata entry 'seed': expected int, found 'x'"),
         (edit_metadata("episode_result", success="yes"), "metadata entry 'success': expected bool, found 'yes'"),

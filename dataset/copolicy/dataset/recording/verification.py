@@ -1,4 +1,4 @@
-"""The checks of a recording: its check sums, and version, digest and counts where it has none."""
+"""Verification of a recording: parts without check sum, schema version, digest of the metadata, counts."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from . import episode_records
 from .mcap_records import RecordWalk
 
 RECOVERY = "recovery"
-"""The metadata record that says what a recovered file was made from."""
+"""The metadata record about the source of a recovered file."""
 
 UNVERIFIED = "unverified"
-"""Its entry that says what of the source carried no check sum."""
+"""The entry of that record about the parts of the source without check sum."""
 
 _USED = "could not be verified and {verb} used as {pronoun}"
 _THEY = _USED.format(verb="are", pronoun="they stand")
@@ -26,20 +26,20 @@ _ENTRIES: dict[str, tuple[str, ...]] = {
     "dataset_info": ("fps", episode_records.START_DIGEST),
     episode_records.RESULT: episode_records.COLUMNS_AT_END,
 }
-"""Entries by which a metadata record is told from another project's of the same name."""
+"""Entries that distinguish a metadata record of ours from another project's record of the same name."""
 
 
 @dataclass
 class CheckSums:
-    """What of a file carries a check sum.
+    """Which parts of a file have a check sum.
 
     Attributes:
-        data: the whole data section passed one, so that nothing else matters.
-        chunks: their number.
-        chunks_without: the chunks that carry none.
-        lone_messages: messages of states, actions and events outside of any chunk, which can carry none.
-        map: the attachment with the map carries one.
-        start: the metadata at the start of the recording carry their digest.
+        data: whether a check sum verified the whole data section, which covers all other parts.
+        chunks: number of chunks.
+        chunks_without: number of chunks without check sum.
+        lone_messages: number of state, action and event messages outside of chunks, which have no check sum.
+        map: whether the attachment with the scenario has a check sum.
+        start: whether the metadata at the start of the recording have a digest.
     """
 
     data: bool = False
@@ -50,7 +50,7 @@ class CheckSums:
     start: bool = False
 
     def content_notes(self) -> tuple[str, ...]:
-        """What of messages and map could not be verified, a sentence each."""
+        """Notes about messages and scenario without check sum."""
         if self.data:
             return ()
         notes = []
@@ -63,7 +63,7 @@ class CheckSums:
         return tuple(notes)
 
     def notes(self) -> tuple[str, ...]:
-        """The same for a whole file, with its metadata."""
+        """Notes about all parts of the file without check sum."""
         if self.data:
             return ()
         metadata = f"the result of the episode {_IT}" if self.start else f"the metadata {_THEY}"
@@ -73,46 +73,46 @@ class CheckSums:
 def sole_records(
     path: Path, records: Mapping[str, Sequence[dict[str, str]]], settings: Iterable[str]
 ) -> dict[str, dict[str, str]]:
-    """The metadata records of a file by name; of several of a name of ours, the one that has our entries.
+    """The metadata records of a file by name; of several records of one name, the one with our entries.
 
-    Another project may have a record of the same name beside ours.
+    Another project may write a record of the same name into the file.
 
     Args:
-        settings: names of the settings of the task, the entries of the record `physics`.
+        settings: names of the task's world settings, the entries of the record `physics`.
 
     Raises:
-        FileFormatError: several of a name are ours.
+        FileFormatError: several records of one name have our entries.
     """
-    known = {**_ENTRIES, "physics": tuple(settings)}
+    entries_of_record = {**_ENTRIES, "physics": tuple(settings)}
     chosen: dict[str, dict[str, str]] = {}
     for name, candidates in records.items():
-        if len(candidates) > 1 and name in known:
-            ours = [entries for entries in candidates if set(known[name]) <= set(entries)]
-            if len(ours) != 1:
+        if len(candidates) > 1 and name in entries_of_record:
+            own_candidates = [entries for entries in candidates if set(entries_of_record[name]) <= set(entries)]
+            if len(own_candidates) != 1:
                 raise FileFormatError(path, "one episode", f"a second metadata record {name!r}")
-            candidates = ours
+            candidates = own_candidates
         chosen[name] = candidates[-1]
     return chosen
 
 
 def require_version(path: Path, records: Mapping[str, Mapping[str, str]]) -> None:
-    """Checks that the metadata are of a version that this reader knows, where they name one.
+    """Checks the schema version in the metadata, if they state one.
 
     Raises:
-        ForeignRecordingError: they are of another.
+        ForeignRecordingError: the schema version is unknown.
     """
-    known = episode_records.SCHEMA_VERSION
-    version = records.get("dataset_info", {}).get("schema_version", known)
-    if version != known:
-        expected = f"a recording of schema version {known}, the latest known here"
+    supported = episode_records.SCHEMA_VERSION
+    version = records.get("dataset_info", {}).get("schema_version", supported)
+    if version != supported:
+        expected = f"a recording of schema version {supported}, the latest supported"
         raise ForeignRecordingError(path, expected, f"schema version {version!r} (update copolicy)")
 
 
 def require_start_digest(path: Path, records: Mapping[str, Mapping[str, str]]) -> bool:
-    """Checks the metadata at the start of a recording by the digest among them; whether there is one.
+    """Verifies the digest of the metadata at the start of a recording; returns whether there is one.
 
     Raises:
-        FileFormatError: they are not what was written.
+        FileFormatError: the digest does not match.
     """
     digest = records["dataset_info"].get(episode_records.START_DIGEST)
     if digest is not None and digest != episode_records.start_digest(records):
@@ -121,32 +121,32 @@ def require_start_digest(path: Path, records: Mapping[str, Mapping[str, str]]) -
 
 
 def require_statistics(path: Path, walk: RecordWalk, messages: int) -> None:
-    """Checks that the file holds as many records as its summary says, where it says so.
+    """Compares the numbers of records with the statistics in the summary, if present.
 
     Args:
-        walk: over the whole file.
-        messages: that were found, in chunks and outside of them.
+        walk: the finished walk over the file.
+        messages: number of messages, in chunks and outside of them.
 
     Raises:
-        FileFormatError: it holds another number.
+        FileFormatError: the numbers differ.
     """
     statistics = walk.statistics
     if statistics is None:
         return
-    for kind, expected, count in (
+    for record_type, expected, count in (
         ("messages", statistics.message_count, messages),
         ("chunks", statistics.chunk_count, walk.counts[Opcode.CHUNK]),
         ("attachments", statistics.attachment_count, walk.counts[Opcode.ATTACHMENT]),
         ("metadata records", statistics.metadata_count, walk.counts[Opcode.METADATA]),
     ):
         if expected != count:
-            raise FileFormatError(path, f"{expected} {kind}, as its summary counts", str(count))
+            raise FileFormatError(path, f"{expected} {record_type}, as its summary counts", str(count))
 
 
 def channels_text(topics: Iterable[str]) -> str:
-    """What a file is that has other channels than ours."""
+    """Description of a file with other channels than those of the task."""
     names = sorted(set(topics))
     if not names:
         return "an MCAP file without channels"
-    more = f" and {len(names) - _TOPICS_SHOWN} more" if len(names) > _TOPICS_SHOWN else ""
-    return f"no recording of this task (channels: {', '.join(names[:_TOPICS_SHOWN])}{more})"
+    suffix = f" and {len(names) - _TOPICS_SHOWN} more" if len(names) > _TOPICS_SHOWN else ""
+    return f"no recording of this task (channels: {', '.join(names[:_TOPICS_SHOWN])}{suffix})"

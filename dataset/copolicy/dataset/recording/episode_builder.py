@@ -1,4 +1,4 @@
-"""What a walk over a recording collects, and the episode that it makes in the end."""
+"""Builds an episode from the records of a recording."""
 
 import zlib
 from array import array
@@ -14,14 +14,15 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 
 from ..episode import Episode
 from ..exceptions import FileFormatError, ForeignRecordingError
-from ..physics_text import physics_text
+from ..settings_text import settings_text
 from ..task import PairTask
 from . import episode_records
 from .generic_messages import messages_of
 from .mcap_chunks import MESSAGE_HEAD, chunk_records, walk_chunk
 from .mcap_records import RecordWalk
 from .messages.copolicy_pb2 import EpisodeEvent
-from .soundness import (
+from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
+from .verification import (
     RECOVERY,
     UNVERIFIED,
     CheckSums,
@@ -31,14 +32,13 @@ from .soundness import (
     require_version,
     sole_records,
 )
-from .topics import EVENT, SCHEMA_PACKAGE, Topic, channel_difference
 
 
-class RecordingContents:
-    """What a walk over a file has collected so far: states, actions and the events, whatever else the file holds.
+class EpisodeBuilder:
+    """Collects states, actions, events, metadata and scenario from the records of a file, and builds the episode.
 
     Attributes:
-        check_sums: what of the file carries one.
+        check_sums: which parts of the file have a check sum.
     """
 
     def __init__(self, path: Path, task: PairTask):
@@ -48,10 +48,10 @@ class RecordingContents:
         self._declared: dict[tuple[int, int], bytes] = {}
         self._schemas: dict[int, Schema] = {}
         self._handlers: dict[int, Callable[[bytes], None]] = {}
-        self._topics: set[str] = set()  # of every channel
-        self._differences: dict[str, str] = {}  # by topic of ours: what keeps a channel of that name from being read
-        self._read: set[str] = set()  # topics of ours with a channel that can be read
-        self._ours = False  # a channel has a schema of ours, of this version or another
+        self._topics: set[str] = set()  # of all channels
+        self._differences: dict[str, str] = {}  # for each expected topic, why a channel of that name is unreadable
+        self._readable: set[str] = set()  # topics of ours with a channel that can be read
+        self._has_copolicy_schema = False  # a channel has a schema of ours, of this version or another
         self._records: dict[str, list[dict[str, str]]] = {}
         self._scenarios: set[bytes] = set()
         self._messages = 0
@@ -61,21 +61,21 @@ class RecordingContents:
 
     @property
     def events(self) -> tuple[EpisodeEvent, ...]:
-        """What happened, by step."""
+        """The events in order of their steps."""
         return tuple(sorted(self._events, key=lambda event: event.step))
 
-    def take(self, opcode: int, body: bytes) -> None:
-        """Keeps what matters of one record of the data section.
+    def add_record(self, opcode: int, body: bytes) -> None:
+        """Adds one record of the data section.
 
         Raises:
-            UnreadChunkError: a chunk that may be sound is not read here.
+            UnreadChunkError: a chunk is too large or has an unknown compression.
             Exception: the record is damaged.
         """
         if opcode == Opcode.CHUNK:
             data, verified = chunk_records(body)
             self.check_sums.chunks += 1
             self.check_sums.chunks_without += not verified
-            self._messages += walk_chunk(data, self._handlers, self._declare)
+            self._messages += walk_chunk(data, self._handlers, self._add_declaration)
         elif opcode == Opcode.MESSAGE:
             if len(body) < MESSAGE_HEAD:
                 raise ValueError(f"a message of {len(body)} bytes")
@@ -87,11 +87,11 @@ class RecordingContents:
             record = Metadata.read(ReadDataStream(BytesIO(body)))
             self._records.setdefault(record.name, []).append(record.metadata)
         elif opcode == Opcode.ATTACHMENT:
-            self._take_attachment(body)
+            self._add_attachment(body)
         else:
-            self._declare(opcode, body)
+            self._add_declaration(opcode, body)
 
-    def _take_attachment(self, body: bytes) -> None:
+    def _add_attachment(self, body: bytes) -> None:
         expected = int.from_bytes(body[-4:], "little")
         if expected not in (0, zlib.crc32(body[:-4])):
             raise ValueError("an attachment that fails its check sum")
@@ -100,7 +100,7 @@ class RecordingContents:
             self._scenarios.add(attachment.data)
             self.check_sums.map = expected != 0
 
-    def _declare(self, opcode: int, body: bytes) -> None:
+    def _add_declaration(self, opcode: int, body: bytes) -> None:
         if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
             return
         key = (opcode, int.from_bytes(body[:2], "little"))
@@ -118,90 +118,90 @@ class RecordingContents:
         schema = self._schemas.get(channel.schema_id)
         if schema is None and channel.schema_id:
             raise ValueError(f"a channel without its schema of number {channel.schema_id}")
-        self._ours |= schema is not None and schema.name.startswith(SCHEMA_PACKAGE)
+        self._has_copolicy_schema |= schema is not None and schema.name.startswith(SCHEMA_PACKAGE)
         self._topics.add(channel.topic)
         for topic in (*self._motion_topics, EVENT):
             if topic.name == channel.topic:
                 difference = channel_difference(channel, schema, topic)
                 if difference:
-                    # Another project may have a channel of this name beside ours.
+                    # Another project may use a channel of this name in the same file.
                     self._differences[topic.name] = difference
                 else:
-                    self._read.add(topic.name)
+                    self._readable.add(topic.name)
                     self._handlers[channel.id] = self._handler(topic)
 
     def _handler(self, topic: Topic) -> Callable[[bytes], None]:
         if topic is EVENT:
             return lambda payload: self._events.append(EpisodeEvent.FromString(payload))
-        step, extend = self._steps[topic.name].append, self._values[topic.name].extend
+        append_step, extend_values = self._steps[topic.name].append, self._values[topic.name].extend
         is_state = topic is self._task_messages.state
         decode = self._task_messages.decode_state if is_state else self._task_messages.decode_action
 
-        def take(payload: bytes) -> None:
-            number, values = decode(payload)
-            step(number)
-            extend(values)
+        def handle(payload: bytes) -> None:
+            step, values = decode(payload)
+            append_step(step)
+            extend_values(values)
 
-        return take
+        return handle
 
     def require_this_task(self, summary_topics: Sequence[str] = ()) -> None:
-        """Checks that the file is a recording of this task and of a version that this reader knows.
+        """Checks that the file is a recording of this task with a known schema version.
 
         Args:
-            summary_topics: further channels of the file, from parts of it that were not read.
+            summary_topics: topics in the summary of the file, for the error message.
 
         Raises:
-            ForeignRecordingError: it is none.
+            ForeignRecordingError: it is not.
         """
         infos = self._records.get("dataset_info", [])
-        ours = [info for info in infos if episode_records.START_DIGEST in info]
-        if not self._ours and not ours:
-            found = channels_text((*self._topics, *summary_topics))
-            raise ForeignRecordingError(self.path, "a recording of this task", found)
-        for info in ours or infos:
+        copolicy_infos = [info for info in infos if episode_records.START_DIGEST in info]
+        if not self._has_copolicy_schema and not copolicy_infos:
+            topics_text = channels_text((*self._topics, *summary_topics))
+            raise ForeignRecordingError(self.path, "a recording of this task", topics_text)
+        for info in copolicy_infos or infos:
             require_version(self.path, {"dataset_info": info})
 
     def episode(self, walk: RecordWalk) -> Episode:
-        """The episode, once the whole file has been walked.
+        """Builds the episode after all records have been added.
 
         Raises:
-            FileFormatError: it is not whole.
-            InvalidValueError: the metadata or the map are not what they should be.
+            FileFormatError: the recording is incomplete.
+            InvalidValueError: the metadata or the scenario are invalid.
         """
         path, settings_type = self.path, self.task.settings_type
         records = sole_records(path, self._records, (setting.name for setting in fields(settings_type)))
         for topic in self._steps:
-            if topic in self._differences and topic not in self._read:
+            if topic in self._differences and topic not in self._readable:
                 raise FileFormatError(path, "a recording of this task", self._differences[topic])
         task, spec = self.task, self.task.spec
         meta = episode_records.decode(records, spec)
         settings = episode_records.decode_settings(records, task)
         if len(self._scenarios) != 1:
-            found = "none" if not self._scenarios else f"{len(self._scenarios)} of them"
-            raise FileFormatError(path, f"an attachment {self._task_messages.scenario_file!r}", found)
+            count_text = "none" if not self._scenarios else f"{len(self._scenarios)} of them"
+            raise FileFormatError(path, f"an attachment {self._task_messages.scenario_file!r}", count_text)
         fps = records["dataset_info"].get("fps")
         if fps != str(spec.record_hz):
             raise FileFormatError(path, f"a recording at {spec.record_hz} Hz", f"fps {fps!r}")
         require_statistics(path, walk, self._messages + walk.counts[Opcode.MESSAGE])
         states, actions = self._motion(records[episode_records.RESULT].get("steps"))
-        sums = self.check_sums
-        sums.data = walk.data_verified
-        if not sums.data:
-            sums.start = require_start_digest(path, records)
+        check_sums = self.check_sums
+        check_sums.data = walk.data_verified
+        if not check_sums.data:
+            check_sums.start = require_start_digest(path, records)
         scenario = task.scenario_of_json(*self._scenarios)
-        seen = {"physics": physics_text(settings), **task.columns_of(scenario)}
-        meta = replace(meta, source_sha256=walk.sha256, **seen)
-        # What a recovered file could not verify in its source, its own check sums do not vouch for.
-        earlier = records.get(RECOVERY, {}).get(UNVERIFIED, "")
-        notes = (*filter(None, (earlier,)), *sums.notes())
-        final = states[-1]
-        return Episode(states[:-1], actions, final, meta, scenario, spec.record_hz, settings, notes, spec.name)
+        recorded_columns = {"physics": settings_text(settings), **task.columns_of(scenario)}
+        meta = replace(meta, source_sha256=walk.sha256, **recorded_columns)
+        # The check sums of a recovered file do not verify what had no check sum in its source.
+        source_notes = records.get(RECOVERY, {}).get(UNVERIFIED, "")
+        notes = (*filter(None, (source_notes,)), *check_sums.notes())
+        final_state = states[-1]
+        return Episode(states[:-1], actions, final_state, meta, scenario, spec.record_hz, settings, notes, spec.name)
 
     def _motion(self, expected: str | None) -> tuple[np.ndarray, np.ndarray]:
-        """States `(T + 1, n)` and actions `(T, m)` by step, whatever the order of their messages.
+        """States `(T + 1, n)` and joint actions `(T, 2 m)`, sorted by step.
 
         Args:
-            expected: steps, as the result of the episode counts them.
+            expected: number of steps according to the result record.
         """
         spec, (state, *actions) = self.task.spec, self._motion_topics
         count = len(self._steps[state.name]) - 1

@@ -1,4 +1,4 @@
-"""What the episodes say of themselves: consent, licence, and mixtures of physics, software, sources."""
+"""Rules on the provenance of episodes: consent, licence, and mixed settings, software versions or sources."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -6,63 +6,63 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ..exceptions import InvalidValueError
-from ..physics_text import UNKNOWN, physics_of, physics_summary
+from ..settings_text import UNKNOWN, describe_settings, parse_settings_text
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _physics(table: EpisodeTable) -> Iterator[Finding]:
+def _physics(data: EpisodeData) -> Iterator[Finding]:
     counts: Counter[str] = Counter()
-    for label, text in zip(table.labels, table.columns["physics"].tolist(), strict=True):
+    for label, text in zip(data.labels, data.columns["physics"].tolist(), strict=True):
         try:
-            counts[physics_summary(physics_of(text, table.task), table.task)] += 1
+            counts[describe_settings(parse_settings_text(text, data.task), data.task)] += 1
         except InvalidValueError as error:
             yield Finding(label, "physics", None, None, "error", str(error))
     unknown = counts.pop(UNKNOWN, 0)
     if unknown:
-        message = "episodes do not say under which physics they were recorded; exports go on under the default"
+        message = "episodes do not state the physics that they were recorded under; exports assume the default"
         yield Finding("", "physics", unknown, 0, "info", message)
     if len(counts) > 1:
-        message = f"episodes of several physics, which move otherwise under the same forces: {listed(counts)}"
+        message = f"episodes with different physics, which move differently under equal forces: {counts_text(counts)}"
         yield Finding("", "physics", len(counts), 1, "warning", message)
 
 
-def _software(table: EpisodeTable) -> Iterator[Finding]:
-    yield from _several(table, "software_version", "recorded by several versions of the software")
+def _software(data: EpisodeData) -> Iterator[Finding]:
+    yield from _mixed_values(data, "software_version", "recorded by several versions of the software")
 
 
-def _sources(table: EpisodeTable) -> Iterator[Finding]:
-    yield from _several(table, "source", "of several sources")
+def _sources(data: EpisodeData) -> Iterator[Finding]:
+    yield from _mixed_values(data, "source", "of several sources")
 
 
-def _several(table: EpisodeTable, column: str, what: str) -> Iterator[Finding]:
-    values = table.columns[column]
+def _mixed_values(data: EpisodeData, column: str, description: str) -> Iterator[Finding]:
+    values = data.columns[column]
     counts = Counter(values[np.char.strip(values) != ""].tolist())
     if len(counts) > 1:
-        yield Finding("", "mixture", len(counts), 1, "info", f"episodes {what}: {listed(counts)}")
+        yield Finding("", "mixture", len(counts), 1, "info", f"episodes {description}: {counts_text(counts)}")
 
 
-def listed(counts: Mapping[str, int]) -> str:
-    """The most frequent first: `3 of 45 px; 1 of 50 px`."""
+def counts_text(counts: Mapping[str, int]) -> str:
+    """Counts as text, most frequent first: `3 of 45 px; 1 of 50 px`."""
     ordered = sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
     return "; ".join(f"{count} {name}" for name, count in ordered)
 
 
-def _consent(table: EpisodeTable) -> Iterator[Finding]:
-    people = table.columns["source"] == "human"
-    consent = table.columns["consent_id"]
+def _consent(data: EpisodeData) -> Iterator[Finding]:
+    people = data.columns["source"] == "human"
+    consent = data.columns["consent_id"]
     missing = people & (np.char.strip(consent) == "")
     message = "people were recorded, but there is no record of their consent"
-    yield from table.found("consent", missing, consent, "a consent_id", message)
+    yield from data.findings("consent", missing, consent, "a consent_id", message)
 
 
-def _license(table: EpisodeTable) -> Iterator[Finding]:
-    licenses = np.char.strip(table.columns["license"])
+def _license(data: EpisodeData) -> Iterator[Finding]:
+    licenses = np.char.strip(data.columns["license"])
     missing = int((licenses == "").sum())
     if missing:
-        # Recordings get theirs when they are converted (--license); what others load must have one.
-        severity = "error" if table.kind == "lerobot" else "warning"
+        # Recordings get a licence at conversion (--license); a data set must have one.
+        severity = "error" if data.kind == "lerobot" else "warning"
         message = f"of {len(licenses)} episodes state no licence; nobody may use them"
         yield Finding("", "license", missing, 0, severity, message)
     several = sorted(set(licenses.tolist()) - {""})

@@ -1,8 +1,7 @@
-"""The findings of a check as they are kept in a data set, `meta/copolicy_check.json`, and whether they still hold.
+"""The check report of a data set, `meta/copolicy_check.json`, and whether it is up to date.
 
-The file describes the data and is no part of them: the content hash leaves it out, a release may be checked again
-without a new version, and neither a manifest nor the checks themselves call its renewal a change. It names the
-content that was checked, so that a reader sees when the data went on without it.
+The check report is metadata: the content hash excludes it, and writing it again changes neither a release nor its
+manifest. It contains the content hash of the checked data, by which readers detect later changes of the data.
 """
 
 import datetime
@@ -24,12 +23,12 @@ State = Literal["current", "stale", "unknown"]
 
 @dataclass(frozen=True)
 class Validity:
-    """Whether kept findings are about the data beside them.
+    """Whether a check report describes the current data.
 
     Attributes:
-        state: `current`; `stale` where the content, the rules or their limits changed since; `unknown` where that
-            cannot be told.
-        reason: why, in one sentence; empty for `current`.
+        state: `current`; `stale` if the content or the rules changed since the check; `unknown` if that cannot be
+            determined.
+        reason: reason in one sentence; empty for `current`.
     """
 
     state: State
@@ -39,12 +38,12 @@ class Validity:
 def check_document(
     result: CheckResult, content: str | None, strict: bool = False, date: datetime.datetime | None = None
 ) -> dict[str, Any]:
-    """What `copolicy-dataset check` prints as JSON and keeps.
+    """The check report, which `copolicy-dataset check` writes and prints as JSON.
 
     Args:
-        content: content hash of what was checked; None where there is none, as for recordings or a damaged data set.
-        strict: whether a warning fails, too.
-        date: of the check; now by default.
+        content: content hash of the checked data; None for recordings or a damaged data set.
+        strict: whether warnings count as failures.
+        date: date of the check; now by default.
     """
     moment = (date or datetime.datetime.now(datetime.UTC)).astimezone(datetime.UTC)
     return {
@@ -53,13 +52,13 @@ def check_document(
         "software_version": version("lerobot_policy_copolicy"),
         "date": moment.strftime("%Y-%m-%dT%H:%M:%SZ"),
         "content_hash": content,
-        "kind": result.table.kind,
-        "episodes": len(result.table.labels),
-        "frames": result.table.frame_count,
+        "kind": result.data.kind,
+        "episodes": len(result.data.labels),
+        "frames": result.data.frame_count,
         "rules": len(result.applied),
         "applied": list(result.applied),
         "not_applied": result.not_applied,
-        "limits": {name: asdict(limit) for name, limit in limits_of(result.table.task).items()},
+        "limits": {name: asdict(limit) for name, limit in limits_of(result.data.task).items()},
         "counts": {severity: result.count(severity) for severity in SEVERITIES},
         "strict": strict,
         "passed": not result.failed(strict),
@@ -68,7 +67,7 @@ def check_document(
 
 
 def content_hash(root: Path) -> str | None:
-    """The content hash of a data set, None where its files cannot be read as one."""
+    """The content hash of a data set; None if it cannot be read."""
     from ..versions.content import read_content
 
     try:
@@ -78,22 +77,22 @@ def content_hash(root: Path) -> str | None:
 
 
 def validity(document: Mapping[str, Any], content: str | None) -> Validity:
-    """Whether findings still hold.
+    """Whether a check report is up to date.
 
     Args:
-        document: what was kept; the output of an earlier `check --json` has neither content hash nor version.
-        content: content hash of the data set as it is now (`content_hash`).
+        document: the check report; early versions have neither content hash nor rules version.
+        content: current content hash of the data set (`content_hash`).
     """
-    checked = document.get("content_hash")
+    checked_hash = document.get("content_hash")
     if "rules_version" not in document:
         return Validity("unknown", "They do not say which content was checked: the data may have changed since.")
-    if checked is None:
+    if checked_hash is None:
         return Validity("unknown", "The content could not be read when it was checked, so it cannot be compared.")
     if content is None:
         return Validity("unknown", "The content cannot be read now, so it cannot be compared with what was checked.")
-    if checked != content:
+    if checked_hash != content:
         return Validity("stale", "The content of the data set changed since it was checked.")
     if document["rules_version"] != RULES_VERSION:
-        found = f"They were made by version {document['rules_version']} of the rules; these are {RULES_VERSION}."
-        return Validity("stale", found)
+        reason = f"They were made by version {document['rules_version']} of the rules; these are {RULES_VERSION}."
+        return Validity("stale", reason)
     return Validity("current")
