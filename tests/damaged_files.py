@@ -10,7 +10,7 @@ import numpy as np
 import upstream_files
 import zarr
 
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 
 STEPS = 12
 

@@ -15,7 +15,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS, STATE
 from copolicy.dataset.physics_text import physics_text

@@ -11,7 +11,7 @@ from checked_data import EPISODES, contents, make_data_set, make_recordings, set
 from loaded_sets import assert_same_frames, assert_same_statistics, load
 
 from copolicy.convert.cli import main
-from copolicy.convert.merge import merging
+from copolicy.convert.merge import merge_datasets
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episodes
 from copolicy.dataset.publication.minimal_card import is_minimal_card
@@ -222,7 +222,7 @@ def test_an_episode_in_both_is_refused(roots, tmp_path, capsys):
 def test_what_comes_out_changed_is_not_written(roots, tmp_path, capsys, monkeypatch):
     before = contents(tmp_path)
     changed = {"late_ticks": lambda values: [7] * len(values)}
-    monkeypatch.setattr(merging, "_restore_episodes", lambda root, expected: set_columns(root, **changed))
+    monkeypatch.setattr(merge_datasets, "_restore_episodes", lambda root, expected: set_columns(root, **changed))
     assert merge(tmp_path / "out", *roots) == 1
     error = capsys.readouterr().err
     assert "expected late_ticks unchanged by the merge, found otherwise; nothing was written" in error

@@ -9,7 +9,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.convert.cli import main
-from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.dataset.episode import EPISODE_COLUMNS, EpisodeMeta
 from copolicy.dataset.recording.log import read_episode
 from copolicy.tasks.table.maps import MAP_SETS

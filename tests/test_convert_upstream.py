@@ -25,10 +25,10 @@ from upstream_files import (
 )
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.build_episode import UpstreamOptions
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
-from copolicy.convert.upstream.zarr import ZarrStore
+from copolicy.convert.upstream.zarr_episodes import ZarrStore
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.physics_text import physics_of
 from copolicy.tasks.table.physics import Physics

@@ -19,10 +19,10 @@ from upstream_files import (
 )
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream.maps import check_by_path, check_by_rewards
+from copolicy.convert.upstream.played_map import check_by_path, check_by_rewards
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
-from copolicy.convert.upstream.zarr import ZarrStore
+from copolicy.convert.upstream.zarr_episodes import ZarrStore
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.lerobot_folder.exclusions import excluded_episodes, include
 from copolicy.tasks.table.map_config import MapConfig

@@ -12,8 +12,8 @@ import torch
 from scipy import stats
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.session import recordings
+from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.staging import replace_json
@@ -278,7 +278,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     found[-1].unlink()
     assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
     capsys.readouterr()
-    kept = [one for one in recordings(out) if one.counts]
+    kept = [one for one in iter_recordings(out) if one.counts]
     assert read_episode(kept[-1].path).meta.controller_0 == codes[-1]
     assert len(kept) == 4
 
@@ -295,10 +295,7 @@ def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsy
         "none: expected a folder of recordings, found no such file or folder"
     )
     status, error = _summarise(capsys, tmp_path, "--ratings", tmp_path / "r.csv")
-    assert (
-        error
-        == "copolicy-eval: --ratings: expected --plan beside it, which tells the robot of each block, found 'none'"
-    )
+    assert error == "copolicy-eval: --ratings: expected --plan too, which names the robot of each block, found 'none'"
 
 
 def test_other_weights_than_the_plans_are_refused(study, tmp_path):
@@ -307,7 +304,7 @@ def test_other_weights_than_the_plans_are_refused(study, tmp_path):
     robot = Robot("first", str(path), "0" * 64)
     plan = make_plan((robot, ROBOTS[1]), "custom", SHORT, 1, 1, 0)
     with pytest.raises(FileFormatError, match=f"{path}: expected the plan's weights {'0' * 12}, found weights "):
-        run_session(plan, "P01", PilotSpec("scripted", "S01"), tmp_path / "out", headless=True)
+        run_session(plan, "P01", PlayerSpec("scripted", "S01"), tmp_path / "out", headless=True)
     assert not (tmp_path / "out").exists()
 
 

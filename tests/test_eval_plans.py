@@ -60,7 +60,7 @@ class Replayed:
     name, task, n_obs_steps, n_action_steps, fps, keeps_history = "replay", "table", 3, 8, 10, False
 
     def __init__(self, *demonstrations: tuple[np.ndarray, np.ndarray]):
-        self.wanted: int | None = 8
+        self.n_predicted_actions: int | None = 8
         self.demonstrations = demonstrations
         self.frame = 0
         self.lengths = []
@@ -69,10 +69,13 @@ class Replayed:
         """A replay has no noise."""
 
     def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        length = 10 if self.wanted is None else self.wanted
+        length = 10 if self.n_predicted_actions is None else self.n_predicted_actions
         self.lengths.append(length)
         places = history[STATE][:, -1, :2]
-        plans = [self._rest(k if self.wanted is None else self._near(place), length) for k, place in enumerate(places)]
+        plans = [
+            self._rest(k if self.n_predicted_actions is None else self._near(place), length)
+            for k, place in enumerate(places)
+        ]
         self.frame += 8
         return np.array(plans)
 
@@ -143,7 +146,8 @@ def test_the_route_of_an_unfinished_path_is_not_decided():
 class Swaying:
     """Forces that follow from the whole history, for as many tables as there are."""
 
-    name, task, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "swaying", "table", 3, 8, 10, False, 8
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history = "swaying", "table", 3, 8, 10, False
+    n_predicted_actions = 8
 
     def reset(self, seed: int) -> None:
         """Nothing here is random."""
@@ -151,7 +155,7 @@ class Swaying:
     def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
         seen = np.concatenate([history[STATE], history[HUMAN_ACTION]], axis=-1).sum(axis=(1, 2))
         phase = seen[:, None, None] + np.arange(10)[:, None] + np.arange(4)
-        return np.sin(phase)[:, : self.wanted or 10]
+        return np.sin(phase)[:, : self.n_predicted_actions or 10]
 
 
 def test_a_branch_goes_on_as_the_table_itself():

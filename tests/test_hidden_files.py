@@ -12,7 +12,7 @@ from training_table import flags
 
 from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 from copolicy.convert.upstream.conversion import open_upstream
@@ -60,7 +60,7 @@ def test_recordings_are_converted_checked_and_found(made, tmp_path):
     ok(convert, "mcap", raw, "--out", tmp_path / "set", "--repo-id", "lab/table", *video)
     assert contents(tmp_path / "set").keys() == contents(made / "set").keys()
     assert check_dataset(raw).findings == check_dataset(made / "raw").findings
-    assert len(find_raw_recordings(made / "set", raw).files) == len(list(recordings(raw))) == 4
+    assert len(find_raw_recordings(made / "set", raw).files) == len(list(iter_recordings(raw))) == 4
     assert ok(collect, "recover", raw)["damaged"] == 0
 
 

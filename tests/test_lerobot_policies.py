@@ -11,7 +11,7 @@ from straight_carry import record
 
 from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import Rollout
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.log import read_episode
@@ -87,10 +87,10 @@ def test_it_is_judged_by_co_planning(runs, name, tmp_path, capsys):
 def test_it_plays_at_a_seat(runs, name, seat, tmp_path):
     # The other one pulls hard towards a goal nearby: the episode is over in seconds.
     puller = record(tmp_path / "puller.mcap", config=MapConfig((620.0, 300.0, 3.0), (820.0, 300.0)), push=(1, 0, 1, 0))
-    pilots = (PilotSpec("policy", str(runs[name])), PilotSpec("replay", str(puller)))
-    with prepared(settings(tmp_path, pilots=pilots, episodes=1, headless=True, swap_seats=False)) as application:
+    players = (PlayerSpec("policy", str(runs[name])), PlayerSpec("replay", str(puller)))
+    with prepared(settings(tmp_path, players=players, episodes=1, headless=True, swap_seats=False)) as application:
         if seat:
-            application.game.reseat()
+            application.game.exchange_seats()
         application.run()
     (path,) = (tmp_path / "recordings").rglob("*.mcap")
     episode = read_episode(path)

@@ -10,7 +10,7 @@ from checked_data import contents, make_data_set, make_recordings
 from loaded_sets import load
 
 from copolicy.collect.cli import main as collect
-from copolicy.collect.session import SessionFolder, recordings
+from copolicy.collect.session import SessionFolder, iter_recordings
 from copolicy.convert.cli import main as convert
 from copolicy.convert.upstream.conversion import open_upstream
 from copolicy.dataset.checks.checking import check_dataset
@@ -56,9 +56,9 @@ def test_a_conversion_enters_links(folders, linked, tmp_path):
 
 
 def test_a_recording_counts_once_however_it_is_named(folders, linked, tmp_path):
-    folders = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
+    sources = [str(linked), str(linked / "b"), str(linked / "latest.mcap")]
     arguments = ["--out", str(tmp_path / "set"), "--repo-id", "lab/table", "--license", "cc-by-4.0"]
-    assert convert(["mcap", *folders, *arguments]) == 0
+    assert convert(["mcap", *sources, *arguments]) == 0
     assert contents(tmp_path / "set") == contents(folders / "whole")
 
 
@@ -94,7 +94,7 @@ def test_a_linked_session_is_counted(tmp_path):
     _record(first)
     (tmp_path / "sessions").mkdir()
     os.symlink(first.path, tmp_path / "sessions" / "P01-01")
-    assert len(list(recordings(tmp_path / "sessions"))) == 1
+    assert len(list(iter_recordings(tmp_path / "sessions"))) == 1
     # The linked session is complete: the next one is begun, and nothing is added to it.
     following = SessionFolder(tmp_path / "sessions", "P01", FIXED, 1)
     assert (following.path.name, following.continued) == ("P01-02", False)
@@ -159,8 +159,8 @@ def test_a_broken_link_to_a_session_is_reported(linked, tmp_path, capsys, caplog
     assert f"warning: {linked / 'b'}: a broken link; its target is skipped" in caplog.text
     found = [(f.episode, f.message) for f in check_dataset(linked).findings if f.severity == "error"]
     assert found == [("b", "a link that leads nowhere")]
-    assert len(list(recordings(linked))) == 2
-    assert f"not counted: {linked / 'b'}: a link that leads nowhere" in caplog.text
+    assert len(list(iter_recordings(linked))) == 2
+    assert f"not counted: {linked / 'b'}: a broken link" in caplog.text
     (tmp_path / "empty").mkdir()
     os.symlink("/nowhere", tmp_path / "empty" / "session")
     assert dataset(["check", str(tmp_path / "empty")]) == 2

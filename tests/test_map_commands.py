@@ -8,7 +8,7 @@ from map_file import write_lab
 
 from copolicy.collect.cli import main
 from copolicy.collect.play.settings import PlaySettings
-from copolicy.collect.session.balance import Balance, Counts
+from copolicy.collect.session.schedule import BalancedSchedule, EpisodeCounts
 from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.world import TableWorld
@@ -88,12 +88,12 @@ def test_schema_is_printed(capsys):
 
 def test_weights_steer_the_schedule_of_play(tmp_path):
     settings = PlaySettings("P01", tmp_path, maps=str(write_lab(tmp_path)))
-    assert settings.fixed()["maps"] == "lab-doors"
-    assert settings.fixed()["maps_digest"] == settings.scenarios.digest
-    balance, counts = Balance(settings.map_configs(), 20, 0, "P01", swap=False), Counts()
+    assert settings.session_settings()["maps"] == "lab-doors"
+    assert settings.session_settings()["maps_digest"] == settings.scenario_set.digest
+    balance, counts = BalancedSchedule(settings.scenarios, 20, 0, "P01", swap=False), EpisodeCounts()
     for _ in range(20):
         config, seating = balance.next(counts)
-        for counter in (counts.kept, counts.tried, counts.kept_here):
+        for counter in (counts.kept, counts.attempted, counts.kept_in_session):
             counter[get_task().identify(config)[0], seating] += 1
     assert counts.kept == {
         ("lab-doors-wide", 0): 8, ("lab-doors-turned-0deg", 0): 4, ("lab-doors-turned-90deg", 0): 4,
@@ -142,8 +142,8 @@ def test_recordings_say_which_file_their_map_is_of(walked):
 
 
 def test_a_data_set_of_a_file_is_checked_and_described(walked, capsys):
+    from copolicy.cards.episode_frames import read_frames
     from copolicy.cards.facts import DatasetFacts
-    from copolicy.cards.frames import read_frames
     from copolicy.dataset.checks.checking import check_dataset
 
     findings = check_dataset(walked / "set").findings

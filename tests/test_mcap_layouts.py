@@ -19,7 +19,7 @@ from copolicy.collect.cli import main as collect
 from copolicy.collect.recording.recover import recover, recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.collect.replay.track import read_track
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
@@ -79,9 +79,9 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
     assert said(episode.notes)
 
     assert {key: value for key, value in read_metadata(file).items() if key != "calibration"} == read_metadata(path)
-    assert [(one.map_id, one.counts) for one in recordings(folder)] == [("training-06", True)]
+    assert [(one.map_id, one.counts) for one in iter_recordings(folder)] == [("training-06", True)]
     assert np.array_equal(ReplayAgent(file)._actions[0], truth.episode.actions)
-    assert read_track(file).moments == read_track(path).moments
+    assert read_track(file).events == read_track(path).events
 
     status, summary, lines = run(collect, "replay", file, "--verify", "--out", tmp_path / "sheet.png")
     assert (status, summary["verify"]["reproduced"], lines) == (0, True, [])
@@ -161,7 +161,7 @@ def test_another_projects_file_is_named_as_such(source, tmp_path, options, caplo
     status, _, lines = run(convert, "mcap", folder, "--out", tmp_path / "set", "--repo-id", "lab/x")
     skip = "nothing was written (--skip-damaged skips such files)"
     assert (status, lines) == (1, [f"copolicy-convert: {line}; {skip}"])
-    assert list(recordings(folder)) == []
+    assert list(iter_recordings(folder)) == []
     assert "not counted: " in caplog.text
     assert "expected a recording of this task, found no metadata entry" in caplog.text
 
@@ -194,7 +194,7 @@ def test_a_later_schema_version_is_named_as_such(source, tmp_path, caplog):
     assert refusal(tmp_path / "later.mcap", ForeignRecordingError) == (
         "expected a recording of schema version 1, the latest known here, found schema version '2' (update copolicy)"
     )
-    assert list(recordings(tmp_path)) == []
+    assert list(iter_recordings(tmp_path)) == []
     assert "found schema version '2'" in caplog.text
 
 

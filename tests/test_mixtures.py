@@ -16,13 +16,13 @@ from checked_data import EPISODES, FRAMES, make_data_set, set_columns, set_frame
 from loaded_sets import load
 
 from copolicy.cards.cli import main as cards
-from copolicy.collect.play.player import make_players, say_other_physics
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.player import make_players, warn_other_settings
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.episode import LATER_COLUMNS, EpisodeMeta
 from copolicy.dataset.physics_text import physics_text
@@ -190,7 +190,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(folders, tmp_path):
         recorded[episode.meta.episode_uuid] = episode
     differ = 0
     for episode, physics in zip(source.episodes(), [EIGHTH] * 2 + [HALF] * 3, strict=True):
-        assert episode.physics == physics == recorded[episode.meta["episode_uuid"]].physics
+        assert episode.settings == physics == recorded[episode.meta["episode_uuid"]].physics
         steps = round(episode.meta["duration_s"] * 30) - 3 * (len(episode) - 1)
         last, action = episode.states[-1].astype(float), episode.actions[-1].astype(float)
         expected = turned(physics, last, action, steps)
@@ -211,7 +211,7 @@ def test_exports_go_on_under_the_physics_of_each_episode(folders, tmp_path):
     start = 0
     for episode, end in zip(source.episodes(), ends, strict=True):
         state, action = episode.states[0].astype(float), episode.actions[0].astype(float)
-        np.testing.assert_allclose(obs[start, :7], turned(episode.physics, state, action, 1), rtol=1e-6, atol=1e-5)
+        np.testing.assert_allclose(obs[start, :7], turned(episode.settings, state, action, 1), rtol=1e-6, atol=1e-5)
         start = end
     with h5py.File(tmp_path / "a.hdf5", "r") as file:
         assert json.loads(str(file["data"].attrs["copolicy"]))["physics"] == counts
@@ -242,11 +242,11 @@ def test_the_card_states_the_physics(copied):
 
 def test_a_replay_of_another_physics_is_reported(folders, caplog):
     path = sorted((folders / "raw" / "eighth").glob("*.mcap"))[0]
-    specs = (PilotSpec.parse(f"replay:{path}"), PilotSpec.parse("scripted"))
+    specs = (PlayerSpec.parse(f"replay:{path}"), PlayerSpec.parse("scripted"))
     players = make_players("P01", specs, ("", ""))
-    say_other_physics(players, EIGHTH)
+    warn_other_settings(players, EIGHTH)
     assert caplog.messages == []
-    say_other_physics(players, HALF)
+    warn_other_settings(players, HALF)
     assert caplog.messages == [
         f"warning: replay:{path.stem} was recorded with {EIGHTH_WORDS}, this session has {HALF_WORDS}"
     ]

@@ -14,7 +14,7 @@ from peg_data import convert_pegs, record_pegs
 import lerobot_policy_copolicy  # noqa: F401 - registers the environment
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.features import PAIR_GYM_ID
 from copolicy.dataset.versions.content import read_content
 

@@ -73,7 +73,7 @@ def test_the_partners_are_the_tasks(runs, tmp_path, capsys):
     assert result["summary"]["deadlock"] is None
     assert set(result["not_measured"]) == {"interaction_force", "deadlock"}
     assert result["definitions"].keys().isdisjoint(result["not_measured"])
-    assert result["definitions"]["success"].startswith("share of episodes that end with mark;")
+    assert result["definitions"]["success"].startswith("proportion of episodes that end with mark;")
     assert "map" not in result["label"]
     # Forces and ways are those of the outline.
     scripted = result["baselines"][1]["summary"]

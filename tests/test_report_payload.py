@@ -9,8 +9,8 @@ import pyarrow.parquet as parquet
 import pytest
 
 from copolicy.cards.cli import main
+from copolicy.cards.episode_frames import read_frames
 from copolicy.cards.facts import DatasetFacts
-from copolicy.cards.frames import read_frames
 from copolicy.cards.report.payload import FRAME_SCALES, build_payload
 from copolicy.dataset.exceptions import FileFormatError
 

@@ -7,8 +7,8 @@ import pytest
 from playwright.sync_api import expect
 from report_page import canvas_pixels
 
+from copolicy.cards.episode_frames import read_frames
 from copolicy.cards.facts import DatasetFacts
-from copolicy.cards.frames import read_frames
 
 EPISODES = 5
 

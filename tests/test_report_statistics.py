@@ -66,8 +66,8 @@ def test_routes_are_shown_with_human_routes(visit, report_set, tmp_path):
     label = figures.nth(1).locator("svg").get_attribute("aria-label")
     assert label is not None
     human = distance["details"]["human"]["counts"]
-    label = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
-    assert f"RL 10 in this data set, {human[label]} of people" in label
+    human_label = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
+    assert f"RL 10 in this data set, {human[human_label]} of people" in label
 
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     cells = section.locator("#configuration-table tbody tr").first.locator("th, td").all_inner_texts()

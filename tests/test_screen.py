@@ -54,8 +54,8 @@ def test_everything_stands_where_it_is_at_any_size(size):
         ((960.0 - 40.0, 180.0 - 40.0), palette.mix(palette.GREEN, palette.FLOOR, 0.62)),
         ((1100.0, 525.0), palette.FLOOR),
     ):
-        found = _colour(surface, view.to_screen(point))
-        assert _close(found, colour), (point, found, colour)
+        drawn = _colour(surface, view.to_screen(point))
+        assert _close(drawn, colour), (point, drawn, colour)
     assert sum(_colour(surface, view.to_screen((600.0, 450.0)))) < 320, "an obstacle is dark"
 
 
@@ -123,7 +123,7 @@ def test_dialogues_stay_in_the_window(size):
     surface = _surface(size)
     canvas = Canvas(surface)
     seats = (SeatStatus("a pad with a rather long name", (0.5, 0.5)), SeatStatus("keys", lost=True))
-    hud = Hud("P01   episode 1 of 36", 0.5, 12.3, 33.3, -12.0, seats, -0.8, late=3)
+    hud = Hud("P01   episode 1 of 36", 0.5, 12.3, 33.3, -12.0, seats, -0.8, late_ticks=3)
     for draw in (
         lambda: draw_hud(canvas, hud),
         lambda: draw_dialog(canvas, "A title", [Line("a line of text " * 9)], ["one", "two"] * 3, 1, hint="how"),

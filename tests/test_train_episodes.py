@@ -102,9 +102,7 @@ def test_a_resumed_run_keeps_its_episodes_less_what_was_excluded_since(copied_ta
     assert _settings(output, 3)["dataset"]["episodes"] == [0, 1, 3, 5]
     with_flag = [f"--config_path={output}", "--resume=true", "--steps=4", "--dataset.episodes=[4,5]"]
     assert main(with_flag) == 0
-    assert "Resuming with 1 of the 2 episodes that --dataset.episodes names; excluded since: [4]" in (
-        capsys.readouterr().err
-    )
+    assert "Resuming with 1 of the 2 episodes of --dataset.episodes; excluded since: [4]" in (capsys.readouterr().err)
 
 
 def test_a_run_without_a_list_of_its_episodes_says_so(random_table, caplog):

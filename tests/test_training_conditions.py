@@ -18,7 +18,7 @@ from untrained_policy import save_untrained_policy
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.collect.play.command import _angular_limit
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.evaluate.cli import main as evaluate
@@ -191,7 +191,7 @@ def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
     plan = tmp_path / "plan.json"
     robots = [f"A={fast}", f"B={fast}"]
     assert evaluate(["human", "plan", *robots, "--participants", "1", "--out", str(plan)]) == 0
-    assert StudyPlan.read(plan).physics.angular_acceleration_limit == math.pi / 8
+    assert StudyPlan.read(plan).world_settings.angular_acceleration_limit == math.pi / 8
 
 
 class _Fast:
@@ -220,14 +220,14 @@ def test_a_policy_of_30_hz_at_a_seat_acts_anew_at_every_step():
 
 
 def test_play_takes_the_limit_of_the_policy_at_the_table(fast, old, caplog):
-    robot, person = PilotSpec("policy", str(fast)), PilotSpec("keyboard")
+    robot, person = PlayerSpec("policy", str(fast)), PlayerSpec("keyboard")
     assert _angular_limit((robot, person), None) == math.pi / 8
     assert _angular_limit((person, person), None) == math.pi / 2
     assert not [record for record in caplog.records if record.levelname == "WARNING"]
     assert _angular_limit((robot, person), "pi/2") == math.pi / 2
-    assert "learned with 0.3927 rad/s^2" in caplog.text
-    with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected a choice"):
-        _angular_limit((robot, PilotSpec("policy", str(old))), None)
+    assert "trained with 0.3927 rad/s^2" in caplog.text
+    with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected one value"):
+        _angular_limit((robot, PlayerSpec("policy", str(old))), None)
 
 
 def test_an_environment_of_another_rate_is_refused(fast, caplog):

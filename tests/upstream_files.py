@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.build_episode import UpstreamOptions
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
 from copolicy.tasks.table.map_config import MapConfig

@@ -23,7 +23,7 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 import numpy as np
 
 from copolicy.collect.recording.recorder import EpisodeRecorder
-from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.convert.lerobot.prepare import Conversion
 from copolicy.convert.recordings import convert_recordings
 from copolicy.dataset.episode import EpisodeMeta

@@ -138,7 +138,7 @@ def main() -> None:
     for sampler, steps in (REFERENCE, *SAMPLERS):
         sampling = {"sampler": sampler, "num_inference_steps": steps, "backend": arguments.backend, **settings}
         policy = Checkpoint(arguments.checkpoint, settings=sampling)
-        policy.n_action_steps = policy.wanted = 8  # as many as the study executes
+        policy.n_action_steps = policy.n_predicted_actions = 8  # as many as the study executes
         begin = time.perf_counter()
         with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
             outcomes = coplan(

@@ -79,7 +79,7 @@ def measure(plans: dict[str, Callable[[], object]], rounds: int, clock: Callable
 
 
 def planned(name: str, batch: dict[str, torch.Tensor], actions: int | None, made: CopolicyPolicy) -> Callable:
-    """A call that makes one plan, after saying once how long the first one took."""
+    """A call that samples once, after printing once how long the first one took."""
     begin = time.perf_counter()
     made.sample_actions(batch, actions=actions)
     if made.config.planner != "plain":
@@ -162,7 +162,7 @@ def batches(rounds: int, clock: Callable[[], float]) -> None:
                 made["auto"].sample_actions(batch, actions=actions)
                 (chosen,) = made.pop("auto").planned_with
                 plans: dict[str, Callable[[], object]] = {
-                    name: partial(planner.plan, batch, actions=actions) for name, planner in made.items()
+                    name: partial(planner.sample_actions, batch, actions=actions) for name, planner in made.items()
                 }
                 took = measure(plans, rounds, clock)
                 medians = " ".join(f"{statistics.median(values):>8.1f}" for values in took.values())

@@ -20,7 +20,7 @@ from copolicy.dataset.policies.training_run import find_policy_folder
 from copolicy.dataset.task import TABLE, PairTask, get_task
 
 from .facts import DatasetFacts
-from .training_data import TrainingData
+from .training_facts import TrainingData
 
 WEIGHTS = "model.safetensors"
 RECIPE = "recipe.json"

@@ -17,7 +17,7 @@ from .artefacts import newest_release
 from .datasheet import datasheet
 from .facts import DatasetFacts
 from .findings import findings
-from .markdown import count_text, missing_part_note, table
+from .formatting import count_text, missing_part_note, table
 from .multimodality import multimodality
 
 _UPSTREAM = (
@@ -173,9 +173,10 @@ def _episodes(facts: DatasetFacts) -> str:
 
 def _features(facts: DatasetFacts) -> str:
     rows = [
-        (f"`{key}`", feature["dtype"], "x".join(map(str, feature["shape"])), ", ".join(_names(feature)))
+        (f"`{key}`", feature["dtype"], "x".join(map(str, feature["shape"])),
+         ", ".join(map(str, names)) if isinstance(names := feature.get("names"), list) else "")
         for key, feature in facts.info["features"].items()
-    ]
+    ]  # fmt: skip
     return "\n\n".join(
         (
             "## Features",
@@ -202,11 +203,6 @@ print(dataset.meta.episodes["pair_id"][0], dataset[0]["action"])
 pip install 'lerobot_policy_copolicy[train]'
 copolicy-train --policy.type=copolicy --dataset.repo_id={repo_id}
 ```"""
-
-
-def _names(feature: dict) -> Iterable[str]:
-    names = feature.get("names")
-    return map(str, names) if isinstance(names, list) else ()
 
 
 def _excluded(facts: DatasetFacts, repo_id: str) -> list[str]:

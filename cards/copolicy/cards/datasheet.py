@@ -13,7 +13,7 @@ from copolicy.dataset.versions.withdrawals import read_withdrawals
 
 from .artefacts import newest_release
 from .facts import DatasetFacts
-from .markdown import count_text, counts_text
+from .formatting import count_text, counts_text
 
 
 def datasheet(facts: DatasetFacts) -> Iterator[str]:

@@ -26,8 +26,8 @@ from copolicy.dataset.outline_figure import (
     show_whole,
 )
 
+from .episode_frames import read_frames
 from .facts import DatasetFacts
-from .frames import read_frames
 from .human_figure import human_figure
 
 FOLDER = Path("figures")

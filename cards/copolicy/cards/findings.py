@@ -6,7 +6,7 @@ from copolicy.dataset.files.meta_files import CHECK_FILE
 
 from .artefacts import stored_findings
 from .facts import DatasetFacts
-from .markdown import format_number, table
+from .formatting import format_number, table
 
 _HEADING = "## Checks"
 _SEVERITIES: tuple[object, ...] = ("error", "warning", "info")

@@ -11,7 +11,7 @@ from copolicy.dataset.outline_figure import BLUE, ORANGE
 
 from .artefacts import stored_statistics
 from .facts import DatasetFacts
-from .routes import HumanDistance, RouteStatistics, route_statistics
+from .route_statistics import HumanDistance, RouteStatistics, route_statistics
 
 _DATA_SET, _PEOPLE, _NULL = BLUE, ORANGE, "#BBBBBB"
 _HEIGHT = 0.38  # of a bar; a route has two bars

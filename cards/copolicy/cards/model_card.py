@@ -7,7 +7,7 @@ from huggingface_hub import ModelCardData
 
 from .checkpoint_facts import CheckpointFacts
 from .dataset_card import citation, source_text
-from .markdown import count_text, counts_text, table
+from .formatting import count_text, counts_text, table
 from .model_index import eval_results
 from .model_results import results
 

@@ -8,7 +8,7 @@ from typing import Any
 from copolicy.dataset.task import PairTask
 from copolicy.dataset.task_words import TaskWords
 
-from .markdown import format_number, missing_part_note, table
+from .formatting import format_number, missing_part_note, table
 
 
 def results(evaluations: Sequence[dict[str, Any]], task: PairTask) -> str:

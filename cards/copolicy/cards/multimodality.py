@@ -7,8 +7,8 @@ from copolicy.dataset.files.meta_files import STATISTICS_FILE
 
 from .artefacts import estimates, stale_statistics_reason, stored_statistics
 from .facts import DatasetFacts
-from .markdown import format_number, table
-from .routes import RouteStatistics, route_statistics
+from .formatting import format_number, table
+from .route_statistics import RouteStatistics, route_statistics
 
 
 def multimodality(facts: DatasetFacts) -> str:

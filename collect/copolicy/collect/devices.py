@@ -7,7 +7,7 @@ from typing import Any, TextIO
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
-from .inputs import CalibrationStore, InputSample, MappingStore, Pad, Pads, StickCalibration, user_config_folder
+from .inputs import CalibrationStore, Gamepad, Gamepads, InputSample, MappingStore, StickCalibration, user_config_folder
 from .sdl import init_events, pygame
 
 _UPDATE_HZ = 20
@@ -26,7 +26,7 @@ _JOYSTICK_EVENTS = (
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
-def open_gamepads(config_folder: Path | None = None) -> Pads:
+def open_gamepads(config_folder: Path | None = None) -> Gamepads:
     """Opens all connected gamepads; needs neither a window nor a display.
 
     Args:
@@ -37,14 +37,14 @@ def open_gamepads(config_folder: Path | None = None) -> Pads:
     """
     mappings = MappingStore(config_folder or user_config_folder())
     init_events()
-    pads = Pads(mappings)
+    pads = Gamepads(mappings)
     # The events of connected gamepads may have been read by other code of this process.
     for index in range(pygame.joystick.get_count()):
         pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
     return pads
 
 
-def poll_gamepads(pads: Pads) -> list[Pad]:
+def poll_gamepads(pads: Gamepads) -> list[Gamepad]:
     """Handles the joystick events and returns the gamepads that were unplugged.
 
     Removes all joystick events from the queue, so that it does not fill up, and leaves those of the window.
@@ -57,7 +57,7 @@ def poll_gamepads(pads: Pads) -> list[Pad]:
     return unplugged
 
 
-def list_devices(pads: Pads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
+def list_devices(pads: Gamepads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
     """Facts about every gamepad, sorted by instance id, JSON-able."""
     return [
         {
@@ -84,7 +84,7 @@ def table_lines(devices: list[dict[str, Any]]) -> list[str]:
 
 
 def show_input(
-    pads: Pads,
+    pads: Gamepads,
     calibrations: CalibrationStore,
     seconds: float,
     out: TextIO,
@@ -118,7 +118,7 @@ def show_input(
         for pad in pads:
             sample = pad.sample(time.monotonic_ns())
             _add_sample(summaries, pad, sample)
-            lines += _pad_lines(pad, sample, calibrations.of(pad))
+            lines += _pad_lines(pad, sample, calibrations.for_gamepad(pad))
         if out.isatty():
             # Move the cursor up over the last lines and clear the screen below it.
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
@@ -143,7 +143,7 @@ def devices_command(seconds: float | None, as_json: bool, config_folder: Path | 
     return {"devices": devices, "test": summaries} if as_json else {}
 
 
-def _add_sample(summaries: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:
+def _add_sample(summaries: dict[int, dict[str, Any]], pad: Gamepad, sample: InputSample) -> None:
     new = {"name": pad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
     summary = summaries.setdefault(pad.instance_id, new)
     summary["readings"] += 1
@@ -156,7 +156,7 @@ def _add_sample(summaries: dict[int, dict[str, Any]], pad: Pad, sample: InputSam
     summary["buttons"] = sorted(pressed | set(summary["buttons"]))
 
 
-def _pad_lines(pad: Pad, sample: InputSample, calibration: StickCalibration) -> list[str]:
+def _pad_lines(pad: Gamepad, sample: InputSample, calibration: StickCalibration) -> list[str]:
     x, y = pad.force(sample, calibration)
     lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}", f"  {_description(pad, calibration)}"]
     lines += [f"  axis {index:<3} {_bar(value)} {value:+.2f}" for index, value in enumerate(sample.axes)]
@@ -167,10 +167,12 @@ def _pad_lines(pad: Pad, sample: InputSample, calibration: StickCalibration) -> 
     return [*lines, f"  buttons  {pressed or '-'}"]
 
 
-def _description(pad: Pad, calibration: StickCalibration) -> str:
-    buttons = "buttons known" if pad.mapping.known else "buttons unknown: set them up in the lobby of play"
+def _description(pad: Gamepad, calibration: StickCalibration) -> str:
+    buttons = "buttons known" if pad.mapping.is_known else "buttons unknown: set them up in the lobby of play"
     steering = (
-        f"steers with: {pad.steering(calibration).label}" if pad.steerings else "cannot steer: no stick, no d-pad"
+        f"steers with: {pad.steering(calibration).label}"
+        if pad.steering_options
+        else "cannot steer: no stick, no d-pad"
     )
     return f"{steering}; {buttons}"
 

@@ -19,8 +19,8 @@ from .lerobot.prepare import Conversion
 from .merge.command import add_merge_command
 from .recordings import convert_recordings
 from .scale.command import add_scale_flags, convert_in_shards, scale_from_flags, shards_requested
+from .upstream.build_episode import ANGULAR_LIMITS, UpstreamOptions
 from .upstream.conversion import convert_upstream
-from .upstream.episode import ANGULAR_LIMITS, UpstreamOptions
 
 _DEFAULT_FPS = 10
 

@@ -11,7 +11,14 @@ from lerobot.utils.decorators import check_if_already_connected, check_if_not_co
 from lerobot.utils.errors import DeviceNotConnectedError
 
 from copolicy.collect.devices import open_gamepads, poll_gamepads
-from copolicy.collect.inputs import CalibrationRun, CalibrationStore, Pad, Pads, TwinWatch, user_config_folder
+from copolicy.collect.inputs import (
+    CalibrationRun,
+    CalibrationStore,
+    DuplicateDetector,
+    Gamepad,
+    Gamepads,
+    user_config_folder,
+)
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import get_task
 from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
@@ -50,9 +57,9 @@ class CopolicyPair(Teleoperator):
             raise InvalidValueError("timeout_s", "a positive number", config.timeout_s)
         self.config = config
         self._calibrations = CalibrationStore(config.calibration_dir or user_config_folder())
-        self._pads: Pads | None = None
-        self._seats: list[Pad] = []
-        self._twins = TwinWatch()
+        self._pads: Gamepads | None = None
+        self._seats: list[Gamepad] = []
+        self._duplicates = DuplicateDetector()
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -72,7 +79,7 @@ class CopolicyPair(Teleoperator):
     @property
     def is_calibrated(self) -> bool:
         """Whether both gamepads have been calibrated, here or in the lobby of `copolicy-collect play`."""
-        return bool(self._seats) and all(self._calibrations.of(pad).measured for pad in self._seats)
+        return bool(self._seats) and all(self._calibrations.for_gamepad(pad).measured for pad in self._seats)
 
     @check_if_already_connected
     def connect(self, calibrate: bool = True) -> None:
@@ -90,11 +97,11 @@ class CopolicyPair(Teleoperator):
         else:
             seats = [_by_number(pads, number) for number in (self.config.robot_pad, self.config.human_pad)]
         for pad in seats:
-            if not pad.steerings:
+            if not pad.steering_options:
                 raise DeviceNotConnectedError(
                     f"{self.name}: expected a stick or a d-pad to steer with, found none on {pad.name}"
                 )
-        self._pads, self._seats, self._twins = pads, seats, TwinWatch()
+        self._pads, self._seats, self._duplicates = pads, seats, DuplicateDetector()
         for seat, pad in zip(PLAYERS, seats, strict=True):
             logger.info("%s seat: %s", seat, pad.name)
         if calibrate and not self.is_calibrated:
@@ -109,7 +116,7 @@ class CopolicyPair(Teleoperator):
             DeviceNotConnectedError: a gamepad was unplugged.
         """
         for seat, pad in zip(PLAYERS, self._seats, strict=True):
-            current = self._calibrations.of(pad)
+            current = self._calibrations.for_gamepad(pad)
             if current.measured:
                 continue
             run = CalibrationRun(current)
@@ -137,15 +144,15 @@ class CopolicyPair(Teleoperator):
         """
         self._read()
         samples = [pad.sample(time.monotonic_ns()) for pad in self._seats]
-        self._twins.add(*samples)
-        if self._twins.twins:
+        self._duplicates.add(*samples)
+        if self._duplicates.duplicate:
             names = " and ".join(pad.name for pad in self._seats)
             raise DeviceNotConnectedError(
                 f"{self.name}: expected two gamepads, found one that is listed twice ({names})"
             )
         forces: list[float] = []
         for pad, sample in zip(self._seats, samples, strict=True):
-            forces += pad.force(sample, self._calibrations.of(pad))
+            forces += pad.force(sample, self._calibrations.for_gamepad(pad))
         return dict(zip(get_task().spec.joint_action.names, forces, strict=True))
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
@@ -172,14 +179,14 @@ class CopolicyPair(Teleoperator):
 
     def _warn_of_resting_push(self) -> None:
         for seat, pad in zip(PLAYERS, self._seats, strict=True):
-            calibration = self._calibrations.of(pad)
+            calibration = self._calibrations.for_gamepad(pad)
             push = math.hypot(*pad.force(pad.sample(0), calibration))
             if push and not calibration.measured:
                 logger.warning("%s seat: %s pushes with %.2f and was never calibrated", seat, pad.name, push)
 
-    def _join(self, pads: Pads) -> list[Pad]:
+    def _join(self, pads: Gamepads) -> list[Gamepad]:
         """Assigns to each seat a gamepad that is pressed alone, since some drivers list one gamepad twice."""
-        seats: list[Pad] = []
+        seats: list[Gamepad] = []
         for seat in PLAYERS:
             logger.info("%s seat: press a button", seat)
             end = time.monotonic() + self.config.timeout_s
@@ -206,13 +213,13 @@ class CopolicyPair(Teleoperator):
         return seats
 
 
-def _pressed(pad: Pad) -> tuple[bool, ...]:
+def _pressed(pad: Gamepad) -> tuple[bool, ...]:
     """State of the buttons and directions; with the latter, a gamepad without buttons can be assigned too."""
     sample = pad.sample(0)
     return (*sample.buttons, *(direction != 0 for direction in sample.directions))
 
 
-def _by_number(pads: Pads, number: int) -> Pad:
+def _by_number(pads: Gamepads, number: int) -> Gamepad:
     ordered = sorted(pads, key=lambda pad: pad.instance_id)
     if number >= len(ordered):
         raise DeviceNotConnectedError(

@@ -27,10 +27,10 @@ from copolicy.dataset.task_spec import TIMEOUT
 
 from ..artefacts import StoredFindings, estimates, stale_statistics_reason
 from ..dataset_card import source_text
+from ..episode_frames import EpisodeFrames, read_frames
 from ..facts import DatasetFacts
-from ..frames import EpisodeFrames, read_frames
-from ..markdown import missing_part_note
-from ..routes import route_statistics
+from ..formatting import missing_part_note
+from ..route_statistics import route_statistics
 
 FRAME_SCALES = {
     "x": 20, "y": 20, "theta": 10_000,

@@ -9,7 +9,7 @@ from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task_spec import Vector
 
-from ..inputs import InputSample, KeyboardHalf, Pad, RestWatch, StickCalibration, keyboard_force
+from ..inputs import Gamepad, InputSample, KeyboardHalf, RestOffsetDetector, StickCalibration, keyboard_force
 from ..rollout import Agent
 
 Force = tuple[float, float]
@@ -43,19 +43,19 @@ class PersonAgent(Agent):
             raise InvalidValueError(f"--players {name}", expected, action.names)
         self.name = name
         self._bounds = action.bounds
-        self._device: Pad | KeyboardHalf | None = None
+        self._device: Gamepad | KeyboardHalf | None = None
         self._calibration = StickCalibration()
-        self._rest = RestWatch()
+        self._rest = RestOffsetDetector()
         self._clock = clock
 
     @property
-    def device(self) -> Pad | KeyboardHalf | None:
+    def device(self) -> Gamepad | KeyboardHalf | None:
         """Gamepad or half of the keyboard; None until the player has joined."""
         return self._device
 
     @device.setter
-    def device(self, device: Pad | KeyboardHalf | None) -> None:
-        self._device, self._rest = device, RestWatch()
+    def device(self, device: Gamepad | KeyboardHalf | None) -> None:
+        self._device, self._rest = device, RestOffsetDetector()
 
     @property
     def calibration(self) -> StickCalibration:
@@ -64,17 +64,17 @@ class PersonAgent(Agent):
 
     @calibration.setter
     def calibration(self, calibration: StickCalibration) -> None:
-        self._calibration, self._rest = calibration, RestWatch()
+        self._calibration, self._rest = calibration, RestOffsetDetector()
 
     @property
     def push_at_rest(self) -> float:
         """Force of the stick at rest, as a proportion of the full force; 0 for a centred stick."""
-        return self._rest.push
+        return self._rest.force
 
     def watch_rest(self) -> None:
         """Measures the stick between episodes; called once a tick."""
         if self._has_stick:
-            still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
+            still = RestOffsetDetector.MEASURED if self.calibration.measured else RestOffsetDetector.UNMEASURED
             self._rest.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
@@ -90,14 +90,14 @@ class PersonAgent(Agent):
     def force(self, sample: InputSample) -> Force:
         """The force of a sample, x and y in [-1, 1]."""
         device = self.device
-        return device.force(sample, self.calibration) if isinstance(device, Pad) else keyboard_force(sample)
+        return device.force(sample, self.calibration) if isinstance(device, Gamepad) else keyboard_force(sample)
 
     def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """Reads the device; the event queue must have been pumped just before."""
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
-            self._rest.add(force, RestWatch.CARRYING)
+            self._rest.add(force, RestOffsetDetector.IN_EPISODE)
         age = self._clock() - sample.time_ns
         self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
         low, high = self._bounds
@@ -107,4 +107,4 @@ class PersonAgent(Agent):
     @property
     def _has_stick(self) -> bool:
         device = self.device
-        return isinstance(device, Pad) and not device.steering(self.calibration).digital
+        return isinstance(device, Gamepad) and not device.steering(self.calibration).digital

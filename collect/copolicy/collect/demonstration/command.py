@@ -67,8 +67,8 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     # Imports of torch and pygame are slow, and `--help` does not need them.
     from ..agents import load_policy
     from ..agents.simulated_players import pair_name
-    from ..replay.film import save_gif
-    from ..replay.pictures import picture_count
+    from ..replay.frames import frame_count
+    from ..replay.video import save_gif
     from .video import SIZE, demonstrate, draw_images
 
     task.required_outline  # noqa: B018 (raises without one)
@@ -78,7 +78,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     tracks = [demonstrate(policy, scenarios[index], partner, arguments.seed, settings, task) for index in arguments.map]
     size = (arguments.width // 2 * 2, round(arguments.width * SIZE[1] / SIZE[0] / 2) * 2)
     images = itertools.chain.from_iterable(draw_images(track, size, arguments.fps, arguments.speed) for track in tracks)
-    count = sum(picture_count(track, arguments.fps, arguments.speed) for track in tracks)
+    count = sum(frame_count(track, arguments.fps, arguments.speed) for track in tracks)
     if arguments.overwrite:
         path.unlink(missing_ok=True)
     save_gif(progress(images, count, "images"), path, size, arguments.fps, colours=64)

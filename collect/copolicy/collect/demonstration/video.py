@@ -8,8 +8,8 @@ from copolicy.dataset.task import PairTask, SceneView, get_task
 
 from ..agents import Policy, PolicyAgent, ScriptedAgent
 from ..episodes import episode_from_trace
-from ..replay.pictures import LAST_S
-from ..replay.track import Track, sampled, track_of
+from ..replay.frames import LAST_FRAME_S
+from ..replay.track import Track, frame_positions, track_from_episode
 from ..rollout import Rollout, Trace
 from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
@@ -59,7 +59,7 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    return track_of(
+    return track_from_episode(
         Path(task.name_of(scenario).scenario), episode_from_trace(rollout, trace, 0, scenario, seed, settings)
     )
 
@@ -75,8 +75,8 @@ def draw_images(track: Track, size: tuple[int, int], images_per_second: int, spe
     """
     surface = new_surface(size)
     view = scene_view(track.task, track.episode.scenario)
-    positions = sampled(track, images_per_second, speed)
-    for position in [*positions, *[positions[-1]] * round(LAST_S * images_per_second)]:
+    positions = frame_positions(track, images_per_second, speed)
+    for position in [*positions, *[positions[-1]] * round(LAST_FRAME_S * images_per_second)]:
         _draw(surface, view, track, position, speed)
         yield surface
 

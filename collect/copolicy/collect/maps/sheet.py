@@ -8,7 +8,7 @@ import numpy as np
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import PairTask
 
-from ..replay.pictures import write_png
+from ..replay.frames import write_png
 from ..screen.canvas import Canvas, new_surface
 from ..screen.outline_view import scene_view
 from ..screen.palette import MUTED, TEXT

@@ -30,7 +30,6 @@ from .wall_clock import WallClockAnchor
 # together less than a second, even where the loop runs slightly fast.
 _FLUSH_NS = 9 * 10**8
 
-
 IDENTICAL_ACTIONS = "identical_actions"
 """Quality flag of an episode in which two people with gamepads had the same actions: one device is listed twice."""
 

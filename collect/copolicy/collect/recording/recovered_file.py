@@ -24,7 +24,7 @@ from copolicy.dataset.recording.soundness import RECOVERY, UNVERIFIED
 from copolicy.dataset.recording.topics import EVENT, Record, is_ours
 from copolicy.dataset.task import PairTask
 
-from ..session.recorded import OFF_CENTRE, PRACTICE
+from ..session.recording_summaries import OFF_CENTRE, PRACTICE
 from .episode_messages import event_record
 from .intact_records import IntactPart, intact_records
 from .recorder import IDENTICAL_ACTIONS

@@ -170,11 +170,11 @@ class TableTask(PairTask):
         """Limits of position and orientation; rounding of doubles stays below 1e-9."""
         return {"px": 0.01, "rad": 1e-4}
 
-    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def drift(self, recorded: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Distance of the positions, px, and of the orientations, rad in [0, pi]."""
-        turn = recorded[:, 2] - other[:, 2]
+        turn = recorded[:, 2] - reference[:, 2]
         rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)
-        return np.column_stack((np.linalg.norm(recorded[:, :2] - other[:, :2], axis=1), rad))
+        return np.column_stack((np.linalg.norm(recorded[:, :2] - reference[:, :2], axis=1), rad))
 
     def displaced(self, scenario: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
         """See `displaced_start`."""

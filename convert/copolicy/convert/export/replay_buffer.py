@@ -27,7 +27,7 @@ from copolicy.dataset.files.staging import new_folder
 from copolicy.dataset.task import TABLE
 from copolicy.dataset.task_spec import RECORD_HZ
 
-from ..upstream.zarr import ZARR_HZ, advance_one_step
+from ..upstream.zarr_episodes import ZARR_HZ, advance_one_step
 from .source import ExportEpisode, ExportSource
 
 Alignment = Literal["ours", "upstream"]

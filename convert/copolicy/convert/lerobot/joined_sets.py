@@ -65,10 +65,8 @@ def _quiet(cache: Path) -> Iterator[None]:
     level, default_cache = logger.level, config.HF_DATASETS_CACHE
     logger.setLevel(logging.WARNING)
     config.HF_DATASETS_CACHE = cache
-    load, io_utils.load_nested_dataset = (
-        io_utils.load_nested_dataset,
-        skipping_hidden_files(io_utils.load_nested_dataset),
-    )
+    load = io_utils.load_nested_dataset
+    io_utils.load_nested_dataset = skipping_hidden_files(load)
     try:
         with contextlib.redirect_stderr(io.StringIO()):
             yield

@@ -13,7 +13,7 @@ from copolicy.dataset.features import STATE
 from copolicy.dataset.task import get_task
 
 from ..column_statistics import episode_statistics
-from .frames import frame_columns
+from .frame_columns import frame_columns
 
 if TYPE_CHECKING:
     from ..video.scene_video import SceneClip

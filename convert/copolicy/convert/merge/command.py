@@ -31,7 +31,7 @@ def add_merge_command(commands: argparse._SubParsersAction) -> None:
 
 
 def _merge(arguments: argparse.Namespace) -> dict:
-    from .merging import merge_datasets
+    from .merge_datasets import merge_datasets
 
     if len(arguments.roots) < 2:
         raise InvalidValueError("PATH", "at least two data sets", len(arguments.roots))

@@ -14,7 +14,7 @@ from copolicy.dataset.files.staging import require_new
 
 from ..lerobot.prepare import Conversion
 from ..recordings import find_recordings, require_rate
-from .plan import LOCK_FILE, ShardPlan, absolute
+from .shard_plan import LOCK_FILE, ShardPlan, absolute
 
 SHARD_EPISODES = 500
 """Default number of recordings in a shard: a killed process loses seconds of work, and few parts are merged."""
@@ -157,7 +157,7 @@ def convert_in_shards(
             run_ray(plan, scale.workers)
         else:
             run_local(plan, scale.workers or 1)
-        from .merge import merge_shards
+        from .merge_shards import merge_shards
 
         summary = {**merge_shards(plan), "finished_before": finished}
     if scale.folder is not None:

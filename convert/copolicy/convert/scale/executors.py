@@ -21,7 +21,7 @@ from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.worker_pool import WorkerPool
 
 from ..lerobot.prepare import DamagedEpisodeError
-from .plan import ShardPlan
+from .shard_plan import ShardPlan
 
 SUMMARY_FILE = "summary.json"
 
@@ -55,7 +55,7 @@ class MergeShards(_Step):
 
     def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Writes the data set of the plan."""
-        from .merge import merge_shards
+        from .merge_shards import merge_shards
 
         summary = merge_shards(self.plan)
         replace_json(self.plan.folder / SUMMARY_FILE, summary)

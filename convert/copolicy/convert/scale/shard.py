@@ -11,7 +11,7 @@ from copolicy.dataset.files.staging import new_folder, replace_json, replace_tex
 from copolicy.dataset.recording.log import read_episode
 
 from ..lerobot.prepare import DamagedEpisodeError, PreparedEpisode, SkippedEpisode, SkipReport, admit, read_and_prepare
-from .plan import DATA_SET, RECORD_FILE, ShardPlan
+from .shard_plan import DATA_SET, RECORD_FILE, ShardPlan
 
 
 def convert_shard(plan: ShardPlan, rank: int) -> int:

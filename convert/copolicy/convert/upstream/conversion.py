@@ -19,11 +19,11 @@ from copolicy.dataset.files.staging import require_new
 from copolicy.tasks.table.spec import SPEC
 
 from ..lerobot.prepare import Conversion, PreparedEpisode, SkipReport, admit, read_and_prepare
-from .episode import UpstreamOptions
+from .build_episode import UpstreamOptions
 from .processed import read_processed
 from .raw import read_raw
-from .zarr import OBSERVATIONS, ZARR_HZ, ZarrStore
-from .zarr_store import array_metadata_files, is_zipped
+from .zarr_arrays import array_metadata_files, is_zipped
+from .zarr_episodes import OBSERVATIONS, ZARR_HZ, ZarrStore
 
 FORMATS = {
     "raw": "trajectories/ep_N.pkl",

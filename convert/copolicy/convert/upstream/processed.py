@@ -2,8 +2,8 @@
 
 Its rows hold the pose after each action in single precision, and no velocities, which the script overwrites. They are
 computed from the actions, since an episode starts at rest and the dynamics are known, and verified by the positions.
-Goal and obstacles come from a map file that may be another episode's (see `maps`). Files written with the script's
-options to skip, drop or smooth rows do not hold consecutive steps and are rejected.
+Goal and obstacles come from a map file that may be another episode's (see `played_map`). Files written with the
+script's options to skip, drop or smooth rows do not hold consecutive steps and are rejected.
 """
 
 from pathlib import Path
@@ -17,8 +17,8 @@ from copolicy.tasks.table.dynamics import step_linear, torque
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from .episode import Trajectory, UpstreamOptions, best_fit, build_episode
-from .maps import check_by_rewards, rounded
+from .build_episode import Trajectory, UpstreamOptions, best_fit, build_episode
+from .played_map import check_by_rewards, rounded
 from .restricted_npz import load_npz
 
 _FOLLOWS = 0.01  # px, rad; single precision alone gives 1e-4

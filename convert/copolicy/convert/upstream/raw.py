@@ -18,8 +18,8 @@ from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angula
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, start_pose
-from .maps import start_differs
+from .build_episode import Trajectory, UpstreamOptions, best_fit, build_episode, start_pose
+from .played_map import start_differs
 from .restricted_npz import load_npz
 from .restricted_pickle import load_pickle
 

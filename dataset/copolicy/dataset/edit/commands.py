@@ -36,7 +36,7 @@ def add_split_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="new folder of parts; must not exist")
     parser.add_argument(
-        "--parts", nargs="+", required=True, metavar="NAME=WHAT",
+        "--parts", nargs="+", required=True, metavar="NAME=VALUE",
         help="a proportion (train=0.8), pairs or maps (test=P03,P07), or rest for all others",
     )  # fmt: skip
     parser.add_argument(

@@ -31,7 +31,7 @@ MANIFEST_FILE = "meta/manifest.json"
 """Size and sha256 of every file of a release."""
 
 WITHDRAWALS_FILE = "meta/copolicy_withdrawals.json"
-"""Dates and numbers of withdrawn episodes."""
+"""Date of each withdrawal and how many episodes it removed."""
 
 CROISSANT_FILE = "meta/croissant.json"
 """Croissant metadata, written by `copolicy-cards dataset --croissant`."""

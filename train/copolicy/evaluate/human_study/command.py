@@ -164,14 +164,14 @@ def _plan(arguments: argparse.Namespace) -> dict:
 
 
 def _run(arguments: argparse.Namespace) -> dict:
-    from copolicy.collect.play.settings import PilotSpec
+    from copolicy.collect.play.settings import PlayerSpec
 
     from .plan import StudyPlan
 
     checked_licence(arguments.license)
     plan = StudyPlan.read(arguments.plan)
     plan.trials_of(arguments.participant)
-    human = PilotSpec.parse(arguments.human, plan.task_name)
+    human = PlayerSpec.parse(arguments.human, plan.task_name)
     # Imported here so that argument errors do not wait for torch and pygame.
     from .session import run_session
 

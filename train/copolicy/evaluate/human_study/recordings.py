@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.recording.log import Recording, read_recording
@@ -33,7 +33,7 @@ def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any
     rows: list[dict[str, Any]] = []
     left_out: dict[str, int] = {}
     paths: dict[tuple[str, str], Path] = {}
-    for file in recordings(folder):
+    for file in iter_recordings(folder):
         recording = read_recording(file.path)
         reason = _reason_left_out(recording.episode, file.counts, plan)
         if reason:

@@ -9,7 +9,7 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.play.settings import PlaySettings
-from copolicy.collect.session import Balance, Counts
+from copolicy.collect.session import BalancedSchedule, EpisodeCounts
 
 from .plan import PlannedTrial, StudyPlan
 
@@ -23,15 +23,16 @@ class StudySettings(PlaySettings):
     plan: StudyPlan = field(kw_only=True)
 
     @property
-    def physics(self) -> Any:
+    def world_settings(self) -> Any:
         """Settings of the world, from the plan."""
         return self.plan.world_settings
 
-    def map_configs(self) -> tuple[Any, ...]:
+    @property
+    def scenarios(self) -> tuple[Any, ...]:
         """The plan's starts."""
         return self.plan.configurations
 
-    def fixed(self) -> dict[str, Any]:
+    def session_settings(self) -> dict[str, Any]:
         """What must not change when a session is continued: plan and participant."""
         return {"study_plan": self.plan.plan_id, "participant": self.pair}
 
@@ -67,7 +68,7 @@ class BlindPolicy:
             return self._current.predict_action_chunk(observations)
 
 
-class StudySchedule(Balance):
+class StudySchedule(BalancedSchedule):
     """A participant's trials in order; a discarded trial is repeated at once, and seats are never swapped."""
 
     def __init__(self, plan: StudyPlan, participant: str, policy: BlindPolicy, agent: PolicyAgent):
@@ -78,9 +79,9 @@ class StudySchedule(Balance):
         self._agent = agent
         super().__init__(plan.configurations, len(self._trials), plan.seed, participant, swap=False, task=plan.task)
 
-    def next(self, counts: Counts) -> tuple[Any, int]:
+    def next(self, counts: EpisodeCounts) -> tuple[Any, int]:
         """Start and seats of the next trial; selects its robot."""
-        trial = self._trials[min(counts.kept_here.total(), len(self._trials) - 1)]
+        trial = self._trials[min(counts.kept_in_session.total(), len(self._trials) - 1)]
         return self._play(trial, trial.code), 0
 
     def practice(self, number: int) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.train.checkpoint import Checkpoint
 
@@ -16,7 +16,7 @@ from .schedule import BlindPolicy, StudySchedule, StudySettings
 
 
 def run_session(
-    plan: StudyPlan, participant: str, human: PilotSpec, out: Path, device: str = "cpu", **play: Any
+    plan: StudyPlan, participant: str, human: PlayerSpec, out: Path, device: str = "cpu", **play: Any
 ) -> dict[str, Any]:
     """Runs or continues a participant's session until it is complete or is ended.
 
@@ -35,12 +35,12 @@ def run_session(
     if human.kind not in ("joystick", "keyboard", "scripted"):
         raise InvalidValueError("--human", "joystick, keyboard or scripted[:PAIR]", f"{human.kind}:{human.detail}")
     trials = plan.trials_of(participant)
-    # At the robot's seat until `play_by` replaces it by the plan's robots.
-    placeholder = PilotSpec.parse("scripted", plan.task_name)
+    # At the robot's seat until `set_schedule` replaces it by the plan's robots.
+    placeholder = PlayerSpec.parse("scripted", plan.task_name)
     settings = StudySettings(
         pair=participant,
         out=out,
-        pilots=(placeholder, human),
+        players=(placeholder, human),
         episodes=len(trials),
         seed=plan.seed,
         swap_seats=False,
@@ -55,7 +55,7 @@ def run_session(
         agent = PolicyAgent(policy, plan.task, real_time=True)
         stack.callback(agent.close)
         game = application.game
-        game.play_by(StudySchedule(plan, participant, policy, agent), agent)
+        game.set_schedule(StudySchedule(plan, participant, policy, agent), agent)
         with stopped_by_signals(game):
             application.run()
         return {"participant": participant, "plan": plan.plan_id, **application.summary()}

@@ -43,9 +43,9 @@ class TableView(OutlineView):
     def _draw_body(self, surface: pygame.Surface, pose: Pose) -> None:
         scale = self._scale
         edge = 2.5 * scale
-        board = self._of_body(pose, board_outline())
-        triangle = self._of_body(pose, TRIANGLE)
-        (circle,) = self._of_body(pose, [CIRCLE_CENTRE])
+        board = self._body_points(pose, board_outline())
+        triangle = self._body_points(pose, TRIANGLE)
+        (circle,) = self._body_points(pose, [CIRCLE_CENTRE])
         radius = CIRCLE_RADIUS * scale
         drop = 5 * scale
         with SmoothPatch(surface, [*board, *triangle, circle], radius + drop + 2 * edge) as patch:
@@ -59,7 +59,7 @@ class TableView(OutlineView):
                 patch.polygon(colour, outline)
                 patch.outline(rim, shrunk(outline, edge / 2), edge)
             for v in (-14.0, 0.0, 14.0):
-                start, end = self._of_body(pose, [(-44.0, v), (39.0, v)])
+                start, end = self._body_points(pose, [(-44.0, v), (39.0, v)])
                 patch.line(mix(WOOD, WOOD_EDGE, 0.3), start, end, 1.6 * scale)
             patch.circle(SEATS[1], circle, radius)
             patch.circle(mix(SEATS[1], INK, 0.4), circle, radius, edge)

@@ -1,4 +1,4 @@
-"""A replay as a film: H.264 through PyAV or the ffmpeg program, or a GIF through Pillow."""
+"""A replay as a video: H.264 through PyAV or the ffmpeg program, or a GIF through Pillow."""
 
 import contextlib
 import shutil
@@ -14,7 +14,7 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, Missin
 from copolicy.dataset.files.staging import new_file
 
 from ..sdl import pygame
-from .pictures import picture_count, picture_size, pictures
+from .frames import frame_count, frame_size, render_frames
 from .track import Track
 
 VIDEO_WIDTH, VIDEO_FPS = 1200, 30
@@ -28,31 +28,31 @@ _PRESET = "veryfast"
 def write_video(
     track: Track, path: Path, speed: float = 1.0, width: int | None = None, fps: int | None = None
 ) -> dict[str, Any]:
-    """Writes an H.264 video that plays everywhere.
+    """Writes an H.264 video, 8 bit 4:2:0, which common players support.
 
     Args:
-        track: what to show.
+        track: to show.
         path: of the file, `.mp4` or `.mkv`.
         speed: times real time.
         width: px.
-        fps: pictures a second.
+        fps: frames per second.
 
     Returns:
-        Size, pictures and seconds of the film, JSON-able.
+        Size, number of frames and seconds of the video, JSON-able.
 
     Raises:
         OutputExistsError: the file exists.
-        InvalidValueError: another ending, or a speed, width or rate that makes no film.
-        CopolicyError: neither PyAV nor ffmpeg is there.
+        InvalidValueError: the suffix, speed, width or rate is invalid.
+        CopolicyError: neither PyAV nor ffmpeg is installed.
         RunError: the encoder failed.
     """
-    size, fps, frames = _film(track, path, tuple(_CONTAINERS), speed, width or VIDEO_WIDTH, fps or VIDEO_FPS)
+    size, fps, frames = _checked_frames(track, path, tuple(_CONTAINERS), speed, width or VIDEO_WIDTH, fps or VIDEO_FPS)
     encode = video_encoder()
     with new_file(path) as unfinished:
         try:
             encode(unfinished, _CONTAINERS[path.suffix.lower()], frames, size, fps)
         except RunError as error:
-            # The hidden file is gone when somebody reads this.
+            # Names the final file, since the unfinished one is removed.
             raise RunError(str(error).replace(unfinished.name, path.name)) from None
     return _summary(path, track, size, fps, speed)
 
@@ -60,35 +60,35 @@ def write_video(
 def write_gif(
     track: Track, path: Path, speed: float = 1.0, width: int | None = None, fps: int | None = None
 ) -> dict[str, Any]:
-    """Writes an endless GIF; arguments, result and errors as for `write_video`.
+    """Writes a looping GIF; arguments, result and errors as for `write_video`.
 
     Raises:
-        MissingExtraError: Pillow is not there.
+        MissingExtraError: Pillow is not installed.
     """
-    size, fps, frames = _film(track, path, (".gif",), speed, width or GIF_WIDTH, fps or GIF_FPS)
+    size, fps, frames = _checked_frames(track, path, (".gif",), speed, width or GIF_WIDTH, fps or GIF_FPS)
     save_gif(frames, path, size, fps)
     return _summary(path, track, size, fps, speed)
 
 
 def save_gif(frames: Iterable[pygame.Surface], path: Path, size: tuple[int, int], fps: int, colours: int = 256) -> None:
-    """Writes pictures as an endless GIF.
+    """Writes frames as a looping GIF.
 
     Args:
-        frames: the pictures; the palette is that of the first one.
+        frames: of which the first one sets the palette.
         path: of the file, which must not exist.
-        size: of a picture, px.
-        fps: pictures a second.
+        size: of a frame, px.
+        fps: frames per second.
         colours: in the palette, at most 256; fewer make a smaller file.
 
     Raises:
         OutputExistsError: the file exists.
-        MissingExtraError: Pillow is not there.
+        MissingExtraError: Pillow is not installed.
     """
     try:
         from PIL import Image
     except ImportError:
         raise MissingExtraError("Pillow") from None
-    # One palette for all pictures, without dithering: what stands still then compresses to nothing.
+    # One palette for all frames, without dithering: unchanged areas then compress well.
     palette = None
     images = []
     for surface in frames:
@@ -102,24 +102,24 @@ def save_gif(frames: Iterable[pygame.Surface], path: Path, size: tuple[int, int]
         )
 
 
-def _film(
-    track: Track, path: Path, endings: tuple[str, ...], speed: float, width: int, fps: int
+def _checked_frames(
+    track: Track, path: Path, suffixes: tuple[str, ...], speed: float, width: int, fps: int
 ) -> tuple[tuple[int, int], int, Iterable[pygame.Surface]]:
-    """Size, rate and pictures of a film that can be written to a path."""
-    if path.suffix.lower() not in endings:
-        raise InvalidValueError(str(path), f"a name that ends with {' or '.join(endings)}", path.suffix)
+    """Checks path and settings; returns size, rate and frames of the video."""
+    if path.suffix.lower() not in suffixes:
+        raise InvalidValueError(str(path), f"a name that ends with {' or '.join(suffixes)}", path.suffix)
     if path.exists():
         raise OutputExistsError(path)
     if not 0.05 <= speed <= 100:
         raise InvalidValueError("speed", "0.05 to 100", speed)
     if not 1 <= fps <= 120:
         raise InvalidValueError("fps", "1 to 120", fps)
-    size = picture_size(width)
-    return size, fps, progress(pictures(track, size, fps, speed), picture_count(track, fps, speed), "pictures")
+    size = frame_size(width)
+    return size, fps, progress(render_frames(track, size, fps, speed), frame_count(track, fps, speed), "frames")
 
 
 def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: float) -> dict[str, Any]:
-    count = picture_count(track, fps, speed)
+    count = frame_count(track, fps, speed)
     return {
         "out": str(path),
         "bytes": path.stat().st_size,
@@ -131,15 +131,15 @@ def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: f
 
 
 def video_encoder():
-    """What encodes a film here.
+    """Returns a function that encodes a video with PyAV or ffmpeg.
 
     Raises:
-        CopolicyError: neither PyAV nor ffmpeg is there.
+        CopolicyError: neither PyAV nor ffmpeg is installed.
     """
     try:
         import av
 
-        # A build of PyAV without x264 cannot write what we want; ffmpeg may.
+        # Some builds of PyAV lack x264, which ffmpeg may have.
         if "libx264" in av.codecs_available:
             return _encode_with_pyav
     except ImportError:
@@ -156,14 +156,14 @@ def _encode_with_pyav(
     from av.error import FFmpegError
 
     try:
-        with av.open(str(path), "w", format=container, options={"movflags": "+faststart"}) as film:
-            stream = film.add_stream("libx264", rate=Fraction(fps), options={"crf": _QUALITY, "preset": _PRESET})
+        with av.open(str(path), "w", format=container, options={"movflags": "+faststart"}) as output:
+            stream = output.add_stream("libx264", rate=Fraction(fps), options={"crf": _QUALITY, "preset": _PRESET})
             stream.width, stream.height = size
             stream.pix_fmt = "yuv420p"
             for surface in frames:
                 frame = av.VideoFrame.from_ndarray(pygame.surfarray.array3d(surface).swapaxes(0, 1), format="rgb24")
-                film.mux(stream.encode(frame))
-            film.mux(stream.encode())
+                output.mux(stream.encode(frame))
+            output.mux(stream.encode())
     except OSError:
         raise
     except FFmpegError as error:
@@ -186,5 +186,5 @@ def _encode_with_ffmpeg(
                 pipe.write(pygame.image.tobytes(surface, "RGB"))
         if process.returncode:
             errors.seek(0)
-            told = errors.read().decode(errors="replace").strip().splitlines()
-            raise RunError(f"{path.name}: expected ffmpeg to encode the video, found {(told or ['nothing said'])[-1]}")
+            lines = errors.read().decode(errors="replace").strip().splitlines()
+            raise RunError(f"{path.name}: expected ffmpeg to encode the video, found {(lines or ['no message'])[-1]}")

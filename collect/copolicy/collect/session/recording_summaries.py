@@ -1,4 +1,4 @@
-"""What the recordings of a folder say about themselves: the only memory that a session trusts."""
+"""Summaries of the recordings in a folder, from which a session counts its episodes."""
 
 import logging
 from collections.abc import Iterator
@@ -13,20 +13,20 @@ from copolicy.dataset.recording.soundness import require_version
 from copolicy.dataset.task import TABLE, get_task
 
 PRACTICE = "practice"
-"""Quality flag of an episode to try things out; it is marked discarded too."""
+"""Quality flag of a practice episode; it is marked discarded too."""
 
 OFF_CENTRE = "stick_off_centre"
-"""Quality flag of an episode with a stick that pushed while nobody touched it; the event of it says whose."""
+"""Quality flag of an episode with a stick that was off centre at rest; its event of the same name says whose."""
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """One recording, as far as the schedule needs it.
+class RecordingSummary:
+    """The metadata of one recording that the schedule needs.
 
     Attributes:
-        counts: it was played to its end and kept, and was no practice.
-        seating: 1 where player b sat on the robot's seat.
-        task: its name.
+        seating: 1 if player b sat on the robot seat, else 0.
+        counts: the episode ran to its end and was kept, and was not practice.
+        task: name of the task.
     """
 
     path: Path
@@ -39,22 +39,22 @@ class Recorded:
     task: str = TABLE
 
 
-def recordings(folder: Path) -> Iterator[Recorded]:
-    """The complete recordings in a folder and all below it, by path; one that cannot be read is told and left out."""
+def iter_recordings(folder: Path) -> Iterator[RecordingSummary]:
+    """Yields the complete recordings in a folder and its subfolders, by path; logs and skips those it cannot read."""
     for link in broken_links(folder):
         if not link.match("*.mcap"):
-            logging.warning("not counted: %s: a link that leads nowhere", link)
+            logging.warning("not counted: %s: a broken link", link)
     for path in distinct_files(folder, "*.mcap"):
         task = TABLE
         try:
             records = read_metadata(path)
             info = records.get("dataset_info", {})
-            if episode_records.START_DIGEST in info:  # else it is not ours
+            if episode_records.START_DIGEST in info:  # otherwise written by another program
                 require_version(path, records)
             task = info.get("task", TABLE)
             result = records[episode_records.RESULT]
             players, flags = records["players"], result["quality_flags"].split(",")
-            yield Recorded(
+            yield RecordingSummary(
                 path,
                 records["session"]["session_id"],
                 records["episode"]["map_id"],

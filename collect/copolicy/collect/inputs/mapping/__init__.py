@@ -1,4 +1,4 @@
-"""What the buttons and axes of a gamepad mean: SDL's mappings, the user's own, and the labels printed on the pad."""
+"""Gamepad mappings: SDL's and the user's, from buttons and axes to controls, and the labels printed on the buttons."""
 
 from .labels import Labels
 from .mapping import UNKNOWN, Binding, GamepadMapping

@@ -17,9 +17,9 @@ from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angula
 from copolicy.tasks.table.features import map_from_vector, theta_of
 from copolicy.tasks.table.physics import Physics
 
-from .episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
-from .maps import check_by_path, rounded
-from .zarr_store import ZarrArrays
+from .build_episode import Trajectory, UpstreamOptions, best_fit, build_episode, states_7
+from .played_map import check_by_path, rounded
+from .zarr_arrays import ZarrArrays
 
 ZARR_HZ = 10
 """Rows per second of the store."""

@@ -1,9 +1,9 @@
-"""Setting up a pad that SDL does not know: press what is asked for, one control after the other."""
+"""The set-up of a gamepad that SDL does not know: the player presses each control when prompted."""
 
 from ...sdl import pygame
 from .mapping import Binding, GamepadMapping
 
-_TILTED = 0.5  # of an axis, from where it was: a trigger may rest at its end
+_MIN_MOVE = 0.5  # axis units from its value at rest, since a trigger may rest at its end
 
 _BUTTONS = {
     "a": "choose and start",
@@ -14,7 +14,7 @@ _BUTTONS = {
     "leftshoulder": "add a note",
     "rightshoulder": "undo",
 }
-_NEEDED = ("a", "b")  # the lobby's menu is gone through with these two
+_REQUIRED = ("a", "b")  # the lobby's menu needs these two
 _STEER = {
     "dpright": "push the stick or d-pad that steers to the right",
     "dpdown": "now push it down, towards you",
@@ -24,18 +24,18 @@ _STEER = {
 
 
 class MappingRun:
-    """Turns the events of one pad into a mapping of it.
+    """Builds the mapping of one gamepad from its events.
 
-    First the buttons, then the stick or d-pad that steers, to the right and down (a d-pad of buttons to all four
-    sides). A button that has its meaning already leaves the present one without any, save for the two of the menu.
+    Asks for the buttons, then for the stick or d-pad that steers: right and down, and all four directions for a d-pad
+    of buttons. Pressing a button that is already assigned skips the control, except for the two required ones.
     """
 
     def __init__(self, name: str, axes: list[float], hats: int):
         """
         Args:
-            name: of the pad.
-            axes: what its axes say at rest, each in [-1, 1].
-            hats: how many it has.
+            name: of the gamepad.
+            axes: values of its axes at rest, each in [-1, 1].
+            hats: number of hats.
         """
         self._name = name
         self._rest = axes
@@ -47,44 +47,45 @@ class MappingRun:
 
     @property
     def done(self) -> bool:
-        """All was asked."""
+        """All controls have been asked for."""
         return not self._steps
 
     @property
     def progress(self) -> float:
-        """Share of the questions that were answered."""
+        """Proportion of the prompts that are done, in [0, 1]."""
         return 1 - len(self._steps) / self._questions
 
     @property
     def prompt(self) -> str:
-        """What to do next."""
+        """The instruction for the player; empty when done."""
         if self.done:
             return ""
         step = self._steps[0]
         if step in _STEER:
             return _STEER[step]
-        return f"press the button for: {_BUTTONS[step]}" + ("" if step in _NEEDED else "   (a used one leaves it out)")
+        skip = "" if step in _REQUIRED else "   (press a used one to skip it)"
+        return f"press the button for: {_BUTTONS[step]}{skip}"
 
     def handle(self, event: pygame.event.Event) -> None:
-        """Takes an event of the pad."""
-        found = None if self.done else self._binding(event)
-        if found is None:
+        """Assigns the control of an event to the current prompt."""
+        bound = None if self.done else self._binding(event)
+        if bound is None:
             return
-        binding, sign = found
+        binding, sign = bound
         if self._steps[0] in _STEER:
             self._steer(binding, sign)
         elif binding.kind == "b":
             used = binding in self._bindings.values()
-            if used and self._steps[0] in _NEEDED:
+            if used and self._steps[0] in _REQUIRED:
                 return
             control = self._steps.pop(0)
             if not used:
                 self._bindings[control] = binding
 
     def result(self) -> tuple[GamepadMapping, tuple[int, int], tuple[bool, bool]]:
-        """The mapping, the axes that steer and which of them are turned round.
+        """Returns the mapping, the x, y axes that steer, and whether each is reversed.
 
-        Axes are counted as in `InputSample.positions`: the axes, two for each hat, then those of a d-pad of buttons.
+        Axes are numbered as in `InputSample.positions`: the axes, two for each hat, then those of a d-pad of buttons.
         """
         (right, right_sign), (down, down_sign) = self._steering[:2]
         bindings, invert = dict(self._bindings), (right_sign < 0, down_sign < 0)
@@ -117,7 +118,7 @@ class MappingRun:
                 return
             if binding.kind == "b" and (binding in self._bindings.values() or (binding, 1) in self._steering):
                 return
-            # The stick is still on its way back from the right.
+            # The stick is still returning from the right.
             if binding.kind == "a" and binding.index == first.index:
                 return
             if binding.kind == "h" and (binding.index != first.index or binding.direction not in (1, 4)):
@@ -131,11 +132,11 @@ class MappingRun:
         if event.type == pygame.JOYHATMOTION:
             x, y = event.value
             if bool(x) == bool(y):
-                return None  # at rest, or between two directions
+                return None  # at rest, or diagonal
             direction = (2 if x > 0 else 8) if x else (1 if y > 0 else 4)
             return Binding("h", event.hat, direction=direction), (x if x else -y)
         if event.type == pygame.JOYAXISMOTION and event.axis < len(self._rest):
             moved = event.value - self._rest[event.axis]
-            if abs(moved) > _TILTED:
+            if abs(moved) > _MIN_MOVE:
                 return Binding("a", event.axis), (1 if moved > 0 else -1)
         return None

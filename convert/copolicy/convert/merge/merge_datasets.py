@@ -30,7 +30,7 @@ from ..lerobot.joined_sets import join_data_sets
 from ..lerobot.mixtures import Mixtures
 from ..lerobot.shifted_tables import replace_column
 from ..lerobot.stored_rewards import reward_differences
-from .source import LOCAL_NAMES, read_source, require_distinct_names, require_prefixes, require_same_format, with_prefix
+from .checks import LOCAL_NAMES, read_source, require_distinct_names, require_prefixes, require_same_format, with_prefix
 
 _RENUMBERED = ("data/", "videos/", "meta/episodes/", "stats/index/", "stats/episode_index/", "stats/task_index/")
 _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}

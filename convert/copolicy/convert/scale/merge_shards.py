@@ -30,7 +30,7 @@ from ..lerobot.mixtures import Mixtures
 from ..lerobot.prepare import RepeatedEpisodeError, SkipReport
 from ..lerobot.shifted_tables import read_episode_columns, write_with_schema
 from ..lerobot.writer import WrittenDataset
-from .plan import DATA_SET, ShardPlan, ShardRecord
+from .shard_plan import DATA_SET, ShardPlan, ShardRecord
 
 FINDINGS_FILE = "findings.json"
 

@@ -1,4 +1,4 @@
-"""What is printed on the buttons of a pad, by its maker."""
+"""The labels printed on the buttons of a gamepad, by manufacturer."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,8 @@ _PLAYSTATION: dict[str, str] = dict(
 _PLAYSTATION_OLD = _PLAYSTATION | {"back": "Select", "start": "Start"}
 _DUALSENSE = _PLAYSTATION | {"back": "Create"}
 _NINTENDO = _XBOX | {"back": "-", "start": "+", "leftshoulder": "L", "rightshoulder": "R"}
-# In the order in which they are looked for: words of the names of devices and of SDL's mappings, in lower case.
-_BY_WORD: tuple[tuple[tuple[str, ...], Mapping[str, str]], ...] = (
+# Words in the names of devices and of SDL's mappings, in lower case; the first match applies.
+_BY_NAME: tuple[tuple[tuple[str, ...], Mapping[str, str]], ...] = (
     (("ps5", "dualsense"), _DUALSENSE),
     (("ps3", "ps2", "psx", "sixaxis", "playstation(r)3", "playstation 3", "playstation 2"), _PLAYSTATION_OLD),
     (("ps4", "dualshock", "playstation", "sony"), _PLAYSTATION),
@@ -22,42 +22,42 @@ _BY_WORD: tuple[tuple[tuple[str, ...], Mapping[str, str]], ...] = (
 )
 _SONY, _NINTENDO_VENDOR, _MICROSOFT = 0x054C, 0x057E, 0x045E
 _SONY_PRODUCTS = {0x0268: _PLAYSTATION_OLD, 0x0CE6: _DUALSENSE, 0x0DF2: _DUALSENSE}  # PS3, PS5, PS5 Edge
-_WORDS = {"back": "Back", "start": "Start"}
+_GENERIC = {"back": "Back", "start": "Start"}
 
 
 class Labels:
-    """The labels of one pad; `labels["a"]` is `A`, `Cross` or `button 0`."""
+    """The labels of one gamepad; `labels["a"]` is `A`, `Cross` or `button 0`."""
 
     def __init__(self, mapping: GamepadMapping, device_name: str, guid: str):
         self._mapping = mapping
         self._printed = _printed(mapping, device_name, guid)
 
     def __getitem__(self, control: str) -> str:
-        """The label of a control; empty where the pad has none."""
+        """Returns the label of a control; empty if the gamepad lacks it."""
         binding = self._mapping.bindings.get(control)
         if binding is None:
             return ""
         if self._printed is None:
-            return f"button {binding.index}" if binding.kind == "b" else _WORDS.get(control, control)
+            return f"button {binding.index}" if binding.kind == "b" else _GENERIC.get(control, control)
         return self._printed.get(control, control)
 
     def either(self, *controls: str) -> str:
-        """The labels of several controls, those that the pad has."""
+        """Returns the labels of those controls that the gamepad has, joined by "or"."""
         return " or ".join(label for label in (self[control] for control in controls) if label)
 
 
 def vendor_and_product(guid: str) -> tuple[int, int]:
-    """USB numbers of a device, out of SDL's GUID of it; zeros where it has none."""
-    numbers = bytes.fromhex(guid)
-    # Without numbers SDL fills the rest with the name.
-    if len(numbers) != 16 or numbers[6:8] != b"\0\0" or numbers[10:12] != b"\0\0":
+    """Returns the USB vendor and product ids in SDL's GUID of a device; zeros if it has none."""
+    data = bytes.fromhex(guid)
+    # Without ids SDL fills these bytes with the device's name.
+    if len(data) != 16 or data[6:8] != b"\0\0" or data[10:12] != b"\0\0":
         return 0, 0
-    return int.from_bytes(numbers[4:6], "little"), int.from_bytes(numbers[8:10], "little")
+    return int.from_bytes(data[4:6], "little"), int.from_bytes(data[8:10], "little")
 
 
 def _printed(mapping: GamepadMapping, device_name: str, guid: str) -> Mapping[str, str] | None:
-    """None where what is printed on the pad is not known, so that its buttons go by their numbers."""
-    if not mapping.known:
+    """Returns the label of each control, or None if unknown: then buttons are shown by their numbers."""
+    if not mapping.is_known:
         return None
     vendor, product = vendor_and_product(guid)
     if vendor == _SONY:
@@ -67,8 +67,8 @@ def _printed(mapping: GamepadMapping, device_name: str, guid: str) -> Mapping[st
     if vendor == _MICROSOFT:
         return _XBOX
     name = f"{mapping.name} {device_name}".lower()
-    for words, printed in _BY_WORD:
+    for words, printed in _BY_NAME:
         if any(word in name for word in words):
             return printed
-    # SDL's list says nothing of letters, but most of its pads have these; of the user's own pad nobody knows.
+    # SDL's list has no labels, but most of its gamepads have these; those of a user's mapping are unknown.
     return _XBOX if mapping.source == "sdl" else None

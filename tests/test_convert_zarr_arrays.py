@@ -14,10 +14,10 @@ from numcodecs.registry import get_codec
 from zarr.codecs import BloscCodec, GzipCodec
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream import zarr_store
+from copolicy.convert.upstream import zarr_arrays
+from copolicy.convert.upstream.build_episode import UpstreamOptions
 from copolicy.convert.upstream.conversion import open_upstream
-from copolicy.convert.upstream.episode import UpstreamOptions
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.exceptions import FileFormatError
 
 LZ4 = {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1, "blocksize": 0}
@@ -241,7 +241,7 @@ def test_zip_files_that_are_refused(tmp_path, members, found):
 
 
 def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
-    monkeypatch.setattr(zarr_store, "_LARGEST", 3 << 20)
+    monkeypatch.setattr(zarr_arrays, "_LARGEST", 3 << 20)
     members = {"a/.zarray": METADATA, **{f"a/{number}": bytes(1 << 20) for number in range(4)}}
     path = zipped(tmp_path / "bomb.zarr.zip", members)
     assert path.stat().st_size < 10_000

@@ -13,7 +13,7 @@ from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.reward import reward
 from copolicy.tasks.table.world import TableWorld
 
-from .episode import outcome, start_pose
+from .build_episode import outcome, start_pose
 
 _START_TOLERANCE = 1.0  # px
 _REWARD_TOLERANCE = 2e-6  # rewards were computed from, and stored as, single precision
