@@ -82,7 +82,7 @@ def measure(minutes: float, windowed: bool, size: str) -> dict:
     from virtual_joystick import VirtualJoystick
 
     from copolicy.collect.play.application import Application
-    from copolicy.collect.play.phase import To
+    from copolicy.collect.play.phase import NextPhase
     from copolicy.collect.play.session_run import prepared
     from copolicy.collect.play.settings import PlayerSpec, PlaySettings
     from copolicy.collect.sdl import pygame
@@ -100,7 +100,7 @@ def measure(minutes: float, windowed: bool, size: str) -> dict:
             if windowed:
                 for pad in application.game.roster.gamepads:
                     application.game.roster.assign(pad)
-                application = Application(application.game, application._window, To.READY)
+                application = Application(application.game, application._window, NextPhase.READY)
             hands = _Hands(application, pads, minutes * 60)
             hands.start()
             application.run()
