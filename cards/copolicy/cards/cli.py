@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import Commands, add_command, command_parser, run
 from copolicy.dataset.command_line.extras import FIGURES, HUB, TABLES
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_text, require_new
@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run(parser, argv)
 
 
-def add_dataset_command(commands: argparse._SubParsersAction) -> None:
+def add_dataset_command(commands: Commands) -> None:
     """Adds the command `dataset`."""
     dataset = add_command(
         commands,
@@ -46,7 +46,7 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
     dataset.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
 
 
-def add_model_command(commands: argparse._SubParsersAction) -> None:
+def add_model_command(commands: Commands) -> None:
     """Adds the command `model`."""
     model = add_command(
         commands,

@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.meta_files import CHECK_FILE
@@ -32,7 +32,7 @@ _PALETTE = " ".join(
 )
 
 
-def add_report_command(commands: argparse._SubParsersAction) -> None:
+def add_report_command(commands: Commands) -> None:
     """Adds the command `report`."""
     report = add_command(
         commands,

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task_spec import Vector
@@ -92,7 +93,7 @@ class PersonAgent(Agent):
         device = self.device
         return device.force(sample, self.calibration) if isinstance(device, Gamepad) else keyboard_force(sample)
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """Reads the device; the event queue must have been pumped just before."""
         sample = self.sample()
         force = self.force(sample)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import TABLES
 from copolicy.dataset.command_line.flag_numbers import number, seed
 from copolicy.dataset.exceptions import InvalidValueError
@@ -18,7 +18,7 @@ FORMATS = {
 _WRITERS = {"zarr": "numcodecs", "robomimic": "h5py", "minari": "h5py"}
 
 
-def add_export_command(commands: argparse._SubParsersAction) -> None:
+def add_export_command(commands: Commands) -> None:
     """Adds `export`."""
     parser = add_command(
         commands, "export", _export, "write a LeRobot data set of this project in another project's format",

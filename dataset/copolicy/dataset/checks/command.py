@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
+from ..command_line.commands import Commands, add_command
 from ..command_line.extras import TABLES
 from ..exceptions import InvalidValueError
 from ..files.meta_files import CHECK_FILE
@@ -23,7 +23,7 @@ _EXAMPLE = """copolicy-dataset check recordings/session-1
 _SHOWN = ("kind", "episodes", "frames", "rules", "not_applied", "counts")
 
 
-def add_check_command(commands: argparse._SubParsersAction) -> None:
+def add_check_command(commands: Commands) -> None:
     """Adds `check`."""
     parser = add_command(
         commands, "check", _check, "check recordings or a data set against rules; changes no data", _EXAMPLE,

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ..command_line.commands import add_command
+from ..command_line.commands import Commands, add_command
 from ..command_line.extras import TABLES
 from ..command_line.flag_numbers import seed
 from ..exceptions import InvalidValueError
@@ -11,7 +11,7 @@ from ..exceptions import InvalidValueError
 _ROOT = "folder of a LeRobot data set"
 
 
-def add_select_command(commands: argparse._SubParsersAction) -> None:
+def add_select_command(commands: Commands) -> None:
     """Adds `select`."""
     parser = add_command(
         commands, "select", _select, "copy selected episodes to a new data set",
@@ -25,7 +25,7 @@ def add_select_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--drop-excluded", action="store_true", help="leave out discarded and excluded episodes")
 
 
-def add_split_command(commands: argparse._SubParsersAction) -> None:
+def add_split_command(commands: Commands) -> None:
     """Adds `split`."""
     parser = add_command(
         commands, "split", _split, "split a data set into parts that share no person or no map",
@@ -55,7 +55,7 @@ def add_split_command(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
 
 
-def add_withdraw_command(commands: argparse._SubParsersAction) -> None:
+def add_withdraw_command(commands: Commands) -> None:
     """Adds `withdraw`."""
     parser = add_command(
         commands, "withdraw", _withdraw, "delete all episodes of a consent id from recordings and data sets",
@@ -68,7 +68,7 @@ def add_withdraw_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--yes", action="store_true", help="delete; without this flag nothing is changed")
 
 
-def add_amend_command(commands: argparse._SubParsersAction) -> None:
+def add_amend_command(commands: Commands) -> None:
     """Adds `amend`."""
     parser = add_command(
         commands, "amend", _amend, "correct declared episode columns in place, or restore lost ones",

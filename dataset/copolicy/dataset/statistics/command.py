@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
+from ..command_line.commands import Commands, add_command
 from ..command_line.extras import TABLES
 from ..command_line.flag_numbers import seed
 from ..episode import Source
@@ -13,7 +13,7 @@ from ..files.meta_files import STATISTICS_FILE
 from ..files.staging import replace_json
 
 
-def add_stats_command(commands: argparse._SubParsersAction) -> None:
+def add_stats_command(commands: Commands) -> None:
     """Adds `stats`."""
     summary_text = "compute statistics with intervals and null distributions, into meta/copolicy_stats.json"
     needed = (*TABLES, "sklearn", "diptest")

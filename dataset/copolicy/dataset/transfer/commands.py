@@ -4,11 +4,11 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from ..command_line.commands import add_command
+from ..command_line.commands import Commands, add_command
 from ..command_line.extras import HUB, TABLES
 
 
-def add_publish_command(commands: argparse._SubParsersAction) -> None:
+def add_publish_command(commands: Commands) -> None:
     """Adds `publish`."""
     parser = add_command(
         commands,
@@ -27,7 +27,7 @@ def add_publish_command(commands: argparse._SubParsersAction) -> None:
     )
 
 
-def add_pull_command(commands: argparse._SubParsersAction) -> None:
+def add_pull_command(commands: Commands) -> None:
     """Adds `pull`."""
     parser = add_command(
         commands,

@@ -3,14 +3,14 @@
 import argparse
 from pathlib import Path
 
-from ..command_line.commands import add_command
+from ..command_line.commands import Commands, add_command
 from ..command_line.extras import TABLES
 from ..exceptions import CopolicyError, RunError
 
 _MAX_SHOWN = 20
 
 
-def add_release_command(commands: argparse._SubParsersAction) -> None:
+def add_release_command(commands: Commands) -> None:
     """Adds `release`."""
     parser = add_command(
         commands,
@@ -31,7 +31,7 @@ def add_release_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--notes", required=True, help="text of this release in the change log")
 
 
-def add_diff_command(commands: argparse._SubParsersAction) -> None:
+def add_diff_command(commands: Commands) -> None:
     """Adds `diff`."""
     parser = add_command(
         commands,
