@@ -29,7 +29,6 @@ def load_dataset(path: str | Path, revision: str | None = None) -> "PairDataset"
         FileFormatError: the folder does not exist or is not a LeRobot v3 data set of an installed task.
         InvalidValueError: `revision` is given for a folder.
         HubError: the Hub does not answer, or has no such data set or revision.
-        MissingExtraError: pyarrow, or the client of the Hub, is not installed.
     """
     folder = LeRobotFolder.open(local_copy(str(path), revision))
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))

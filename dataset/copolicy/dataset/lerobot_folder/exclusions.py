@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..command_line.commands import Commands, add_command
-from ..command_line.extras import TABLES
 from ..exceptions import InvalidValueError
 from .episode_rows import episode_tables, select_episodes, with_column, write_tables
 
@@ -115,7 +114,6 @@ def add_exclude_command(commands: Commands) -> None:
     parser = add_command(
         commands, "exclude", _exclude, "exclude episodes from training by a flag; no episode is removed",
         'copolicy-dataset exclude datasets/table --episode-ids 12 30-33 --reason "joystick of player 1 unplugged"',
-        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
     parser.add_argument(

@@ -6,16 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
 from ..arrays import Array
-from ..exceptions import FileFormatError, MissingExtraError
-
-try:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
+from ..exceptions import FileFormatError
 
 DAMAGED = (pa.ArrowException, OSError, ValueError)
 """Exceptions that pyarrow raises for an incomplete Parquet file."""
