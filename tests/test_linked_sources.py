@@ -143,7 +143,7 @@ def test_a_recording_whose_link_leads_nowhere_is_named(folders, linked, tmp_path
     assert message.startswith(str(lost))
     found = [(f.episode, f.message) for f in check_dataset(linked).findings if f.severity == "error"]
     assert found == [("a/lost.mcap", "a link that leads nowhere")]
-    with pytest.raises(CopolicyError, match=r"lost\.mcap: expected a recording, found a link that leads nowhere"):
+    with pytest.raises(CopolicyError, match=r"lost\.mcap: expected a recording, found a broken link"):
         find_raw_recordings(folders / "whole", linked)
     capsys.readouterr()
     assert collect(["recover", str(linked), "--damaged", "--json"]) == 1

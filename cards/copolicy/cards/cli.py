@@ -4,8 +4,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command, command_parser, run
-from copolicy.dataset.command_line.extras import FIGURES, HUB, TABLES
+from copolicy.dataset.command_line.commands import Commands, add_command, command_parser, run
+from copolicy.dataset.command_line.extras import FIGURES
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_text, require_new
 from copolicy.dataset.publication.licences import checked_licence
@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run(parser, argv)
 
 
-def add_dataset_command(commands: argparse._SubParsersAction) -> None:
+def add_dataset_command(commands: Commands) -> None:
     """Adds the command `dataset`."""
     dataset = add_command(
         commands,
@@ -32,7 +32,7 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
         _dataset,
         "write README.md with Hub metadata, a datasheet and figures into a data set folder",
         "copolicy-cards dataset outputs/dataset --repo-id my-lab/table",
-        lambda arguments: (*TABLES, *HUB, *(() if arguments.no_figures else FIGURES)),
+        lambda arguments: () if arguments.no_figures else FIGURES,
     )
     dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
@@ -46,7 +46,7 @@ def add_dataset_command(commands: argparse._SubParsersAction) -> None:
     dataset.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
 
 
-def add_model_command(commands: argparse._SubParsersAction) -> None:
+def add_model_command(commands: Commands) -> None:
     """Adds the command `model`."""
     model = add_command(
         commands,
@@ -54,7 +54,7 @@ def add_model_command(commands: argparse._SubParsersAction) -> None:
         _model,
         "write README.md with Hub metadata and results into a checkpoint folder",
         "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
-        (*TABLES, *HUB, *FIGURES),
+        FIGURES,
     )
     model.add_argument("checkpoint", type=Path, help="folder of a checkpoint or training run (last checkpoint)")
     model.add_argument(

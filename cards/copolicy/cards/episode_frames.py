@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from copolicy.dataset.task import PairTask
@@ -25,13 +26,13 @@ class EpisodeFrames:
     """
 
     index: int
-    states: np.ndarray
-    actions: np.ndarray
+    states: Array
+    actions: Array
     scenario: Any
     task: PairTask
 
     @property
-    def interaction(self) -> np.ndarray | None:
+    def interaction(self) -> Array | None:
         """The task's interaction measure `(T,)`, None if it has none.
 
         The measure uses the state after the step, here the state of the next frame; the last frame uses its own state.

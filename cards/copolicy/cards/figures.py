@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.files.staging import replacement
 from copolicy.dataset.outline import Outline, Shape
 from copolicy.dataset.outline_figure import (
@@ -46,7 +46,7 @@ class DrawnEpisode(NamedTuple):
     """
 
     row: dict[str, Any]
-    path: np.ndarray
+    path: Array
     fixed: tuple[Shape, ...]
 
 

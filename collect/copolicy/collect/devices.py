@@ -37,39 +37,39 @@ def open_gamepads(config_folder: Path | None = None) -> Gamepads:
     """
     mappings = MappingStore(config_folder or user_config_folder())
     init_events()
-    pads = Gamepads(mappings)
+    gamepads = Gamepads(mappings)
     # The events of connected gamepads may have been read by other code of this process.
     for index in range(pygame.joystick.get_count()):
-        pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
-    return pads
+        gamepads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
+    return gamepads
 
 
-def poll_gamepads(pads: Gamepads) -> list[Gamepad]:
+def poll_gamepads(gamepads: Gamepads) -> list[Gamepad]:
     """Handles the joystick events and returns the gamepads that were unplugged.
 
     Removes all joystick events from the queue, so that it does not fill up, and leaves those of the window.
     """
     unplugged = []
     for event in pygame.event.get(_JOYSTICK_EVENTS):
-        _, removed = pads.handle(event)
+        _, removed = gamepads.handle(event)
         if removed is not None:
             unplugged.append(removed)
     return unplugged
 
 
-def list_devices(pads: Gamepads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
+def list_devices(gamepads: Gamepads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
     """Facts about every gamepad, sorted by instance id, JSON-able."""
     return [
         {
-            "instance": pad.instance_id,
-            "name": pad.name,
-            "guid": pad.guid,
-            "axes": pad.axes,
-            "buttons": pad.buttons,
-            "hats": pad.hats,
-            "calibrated": pad.guid in calibrations,
+            "instance": gamepad.instance_id,
+            "name": gamepad.name,
+            "guid": gamepad.guid,
+            "axes": gamepad.axes,
+            "buttons": gamepad.buttons,
+            "hats": gamepad.hats,
+            "calibrated": gamepad.guid in calibrations,
         }
-        for pad in sorted(pads, key=lambda pad: pad.instance_id)
+        for gamepad in sorted(gamepads, key=lambda gamepad: gamepad.instance_id)
     ]
 
 
@@ -84,7 +84,7 @@ def table_lines(devices: list[dict[str, Any]]) -> list[str]:
 
 
 def show_input(
-    pads: Gamepads,
+    gamepads: Gamepads,
     calibrations: CalibrationStore,
     seconds: float,
     out: TextIO,
@@ -92,7 +92,7 @@ def show_input(
     """Shows the input of every gamepad live, and returns its range.
 
     Args:
-        pads: to show; gamepads that are connected meanwhile are added.
+        gamepads: to show; gamepads that are connected meanwhile are added.
         calibrations: for the force that is shown.
         seconds: duration.
         out: a terminal, which is updated in place; to another file only the last state is written.
@@ -106,19 +106,19 @@ def show_input(
     """
     if not seconds > 0:
         raise InvalidValueError("seconds", "a positive number", seconds)
-    if not len(pads):
+    if not len(gamepads):
         raise RunError("expected at least one gamepad, found none connected")
     summaries: dict[int, dict[str, Any]] = {}
     height, lines = 0, []
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        for pad in poll_gamepads(pads):
-            summaries[pad.instance_id]["unplugged"] = True
+        for gamepad in poll_gamepads(gamepads):
+            summaries[gamepad.instance_id]["unplugged"] = True
         lines = []
-        for pad in pads:
-            sample = pad.sample(time.monotonic_ns())
-            _add_sample(summaries, pad, sample)
-            lines += _pad_lines(pad, sample, calibrations.for_gamepad(pad))
+        for gamepad in gamepads:
+            sample = gamepad.sample(time.monotonic_ns())
+            _add_sample(summaries, gamepad, sample)
+            lines += _gamepad_lines(gamepad, sample, calibrations.for_gamepad(gamepad))
         if out.isatty():
             # Move the cursor up over the last lines and clear the screen below it.
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
@@ -132,20 +132,20 @@ def show_input(
 
 def devices_command(seconds: float | None, as_json: bool, config_folder: Path | None = None) -> dict[str, Any]:
     """Runs the command: prints the list or the live test, and returns the summary for `--json`."""
-    pads = open_gamepads(config_folder)
+    gamepads = open_gamepads(config_folder)
     calibrations = CalibrationStore(config_folder or user_config_folder())
-    devices = list_devices(pads, calibrations)
+    devices = list_devices(gamepads, calibrations)
     if not as_json:
         print("\n".join(table_lines(devices)))
     if seconds is None:
         return {"devices": devices} if as_json else {}
-    summaries = show_input(pads, calibrations, seconds, sys.stderr if as_json else sys.stdout)
+    summaries = show_input(gamepads, calibrations, seconds, sys.stderr if as_json else sys.stdout)
     return {"devices": devices, "test": summaries} if as_json else {}
 
 
-def _add_sample(summaries: dict[int, dict[str, Any]], pad: Gamepad, sample: InputSample) -> None:
-    new = {"name": pad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
-    summary = summaries.setdefault(pad.instance_id, new)
+def _add_sample(summaries: dict[int, dict[str, Any]], gamepad: Gamepad, sample: InputSample) -> None:
+    new = {"name": gamepad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
+    summary = summaries.setdefault(gamepad.instance_id, new)
     summary["readings"] += 1
     ranges = summary["axes"] or [[value, value] for value in sample.axes]
     summary["axes"] = [
@@ -156,24 +156,23 @@ def _add_sample(summaries: dict[int, dict[str, Any]], pad: Gamepad, sample: Inpu
     summary["buttons"] = sorted(pressed | set(summary["buttons"]))
 
 
-def _pad_lines(pad: Gamepad, sample: InputSample, calibration: StickCalibration) -> list[str]:
-    x, y = pad.force(sample, calibration)
-    lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}", f"  {_description(pad, calibration)}"]
+def _gamepad_lines(gamepad: Gamepad, sample: InputSample, calibration: StickCalibration) -> list[str]:
+    x, y = gamepad.force(sample, calibration)
+    header = f"{gamepad.instance_id}: {gamepad.name}   force {x:+.2f} {y:+.2f}"
+    lines = [header, f"  {_description(gamepad, calibration)}"]
     lines += [f"  axis {index:<3} {_bar(value)} {value:+.2f}" for index, value in enumerate(sample.axes)]
-    for hat in range(pad.hats):
+    for hat in range(gamepad.hats):
         right, down = sample.directions[2 * hat : 2 * hat + 2]
         lines.append(f"  hat {hat:<4} {right:+.0f} {down:+.0f}")
     pressed = " ".join(str(index) for index, down in enumerate(sample.buttons) if down)
     return [*lines, f"  buttons  {pressed or '-'}"]
 
 
-def _description(pad: Gamepad, calibration: StickCalibration) -> str:
-    buttons = "buttons known" if pad.mapping.is_known else "buttons unknown: set them up in the lobby of play"
-    steering = (
-        f"steers with: {pad.steering(calibration).label}"
-        if pad.steering_options
-        else "cannot steer: no stick, no d-pad"
-    )
+def _description(gamepad: Gamepad, calibration: StickCalibration) -> str:
+    buttons = "buttons known" if gamepad.mapping.is_known else "buttons unknown: set them up in the lobby of play"
+    steering = "cannot steer: no stick, no d-pad"
+    if gamepad.steering_options:
+        steering = f"steers with: {gamepad.steering(calibration).label}"
     return f"{steering}; {buttons}"
 
 

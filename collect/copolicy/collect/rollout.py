@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import RUNNING, Outcome, PairTask, World
 
@@ -21,7 +22,7 @@ class EpisodeStart(NamedTuple):
 
     scenario: Any
     seed: int
-    state: np.ndarray
+    state: Array
 
 
 class Agent(ABC):
@@ -44,10 +45,10 @@ class Agent(ABC):
         """Prepares for one episode in each world; seat 0 is the robot's."""
 
     @abstractmethod
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """Returns actions `(B, m)` in the states `(B, n)` of a step."""
 
-    def acted(self, actions: np.ndarray, worlds: np.ndarray) -> None:  # noqa: B027
+    def acted(self, actions: Array, worlds: Array) -> None:  # noqa: B027
         """Receives the joint actions `(B, 2 m)` of both players in this step."""
 
     def close(self) -> None:  # noqa: B027
@@ -57,7 +58,7 @@ class Agent(ABC):
 class Observer(Protocol):
     """Observes a rollout after each step, to record, measure, draw or keep time."""
 
-    def step(self, rollout: "Rollout", actions: np.ndarray, worlds: np.ndarray) -> None:
+    def step(self, rollout: "Rollout", actions: Array, worlds: Array) -> None:
         """Called after a step with the joint actions `(B, 2 m)` and the indices `(B,)` of their worlds."""
         ...
 
@@ -156,16 +157,16 @@ class Trace:
         self._actions = [[*prefix._actions[0]] if prefix else [] for _ in rollout.worlds]
         rollout.observers.append(self)
 
-    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+    def step(self, rollout: Rollout, actions: Array, worlds: Array) -> None:
         """See `Observer`."""
         for index, action in zip(worlds.tolist(), actions, strict=True):
             self._states[index].append(rollout.worlds[index].recorded)
             self._actions[index].append(action)
 
-    def states(self, world: int) -> np.ndarray:
+    def states(self, world: int) -> Array:
         """`(T + 1, k)` recorded states of a world, from before the first step."""
         return np.array(self._states[world])
 
-    def actions(self, world: int) -> np.ndarray:
+    def actions(self, world: int) -> Array:
         """`(T, 2 m)` joint actions of a world, clipped."""
         return np.array(self._actions[world])

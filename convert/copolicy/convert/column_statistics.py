@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 
-def episode_statistics(columns: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
+def episode_statistics(columns: dict[str, Array]) -> dict[str, dict[str, Array]]:
     """Computes min, max, mean, std and five quantiles of every column, each `(n,)`, and `count` `(1,)`.
 
     Computed in double precision: LeRobot's routine squares in single precision, which gives a constant position of

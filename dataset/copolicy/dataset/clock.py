@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError
 from .task_spec import RECORD_HZ
 
@@ -33,14 +34,12 @@ def frames(steps: int, fps: int, record_hz: int = RECORD_HZ) -> int:
     return -(-steps // stride(fps, record_hz))
 
 
-def frame_states(states: np.ndarray, fps: int, record_hz: int = RECORD_HZ) -> np.ndarray:
+def frame_states(states: Array, fps: int, record_hz: int = RECORD_HZ) -> Array:
     """States of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`."""
     return states[:: stride(fps, record_hz)]
 
 
-def frame_actions(
-    actions: np.ndarray, fps: int, downsampling: Downsampling = "mean", record_hz: int = RECORD_HZ
-) -> np.ndarray:
+def frame_actions(actions: Array, fps: int, downsampling: Downsampling = "mean", record_hz: int = RECORD_HZ) -> Array:
     """Actions of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`.
 
     The dynamics are linear in the force except for clipping, so the mean over a frame's steps reproduces the recorded
@@ -56,13 +55,13 @@ def frame_actions(
     return np.add.reduceat(actions, starts, axis=0) / counts[:, None]
 
 
-def previous_actions(actions: np.ndarray) -> np.ndarray:
+def previous_actions(actions: Array) -> Array:
     """The action of the previous frame, zero at the first: `(T, n)` to `(T, n)`."""
     previous = np.zeros_like(actions)
     previous[1:] = actions[:-1]
     return previous
 
 
-def zero_order_hold(actions: np.ndarray, fps: int) -> np.ndarray:
+def zero_order_hold(actions: Array, fps: int) -> Array:
     """Executed actions of an action chunk: `(T, n)` at `fps` to `(T * stride, n)` at the recording rate."""
     return np.repeat(actions, stride(fps), axis=0)

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError, ShapeError
 from .task import get_task
 from .task_spec import TaskSpec
@@ -58,7 +59,7 @@ class EpisodeMeta:
     map_set_digest: str = ""
     map_weight: int = 1  # relative frequency of the map in its set
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for column in fields(self):
             expected = {"str": str, "int": int, "float": float, "bool": bool}.get(str(_type_name(column)), str)
             value = getattr(self, column.name)
@@ -110,9 +111,9 @@ class Episode:
         UnknownNameError: the task is not installed.
     """
 
-    states: np.ndarray
-    actions: np.ndarray
-    final_state: np.ndarray
+    states: Array
+    actions: Array
+    final_state: Array
     meta: EpisodeMeta
     scenario: Any
     fps: int = 30
@@ -120,7 +121,7 @@ class Episode:
     notes: tuple[str, ...] = field(default=())
     task: str = "table"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         task = get_task(self.task)
         if self.settings is None:
             object.__setattr__(self, "settings", task.settings_type())
@@ -150,6 +151,6 @@ class Episode:
         return self.settings
 
     @property
-    def path(self) -> np.ndarray | None:
+    def path(self) -> Array | None:
         """`(T + 1, 2)` positions of the tracked point, from start to end; None if the task tracks none."""
         return get_task(self.task).path(np.vstack((self.states, self.final_state)))

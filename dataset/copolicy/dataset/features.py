@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .task_spec import TaskSpec, Vector
 
 STATE = "observation.state"
@@ -54,12 +55,12 @@ def features_of(spec: TaskSpec) -> dict[str, dict[str, Any]]:
     }
 
 
-def bounds_of(spec: TaskSpec) -> dict[str, np.ndarray]:
+def bounds_of(spec: TaskSpec) -> dict[str, Array]:
     """Lowest and highest values of each vector column, `(2, n)`."""
     return {column: vector.bounds for column, vector in _vectors(spec).items()}
 
 
-def scaling_of(spec: TaskSpec, columns: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def scaling_of(spec: TaskSpec, columns: Sequence[str]) -> tuple[Array, Array]:
     """Factor and offset, `(n,)` float32 each, that scale the concatenated columns from their bounds to [-1, 1]."""
     low, high = np.concatenate([bounds_of(spec)[column] for column in columns], axis=1)
     return (2 / (high - low)).astype(np.float32), (-(high + low) / (high - low)).astype(np.float32)

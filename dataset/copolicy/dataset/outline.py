@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
+from .arrays import Array
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -39,11 +39,11 @@ class Outline(Protocol):
         """Goal, start and obstacles of a scenario, in drawing order."""
         ...
 
-    def poses(self, states: np.ndarray) -> np.ndarray:
+    def poses(self, states: Array) -> Array:
         """`(T, 3)` poses of the body in states `(T, n)`."""
         ...
 
-    def forces(self, actions: np.ndarray) -> np.ndarray:
+    def forces(self, actions: Array) -> Array:
         """`(T, 4)` force arrows of joint actions `(T, 2 m)`: robot xy, human xy, of length 1 at full force."""
         ...
 

@@ -6,8 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
-import numpy as np
-
+from .arrays import Array
 from .exceptions import CopolicyError, FileFormatError
 from .features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
 from .hub.local_copy import local_copy
@@ -30,7 +29,6 @@ def load_dataset(path: str | Path, revision: str | None = None) -> "PairDataset"
         FileFormatError: the folder does not exist or is not a LeRobot v3 data set of an installed task.
         InvalidValueError: `revision` is given for a folder.
         HubError: the Hub does not answer, or has no such data set or revision.
-        MissingExtraError: pyarrow, or the client of the Hub, is not installed.
     """
     folder = LeRobotFolder.open(local_copy(str(path), revision))
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
@@ -56,10 +54,10 @@ class DatasetEpisode:
 
     index: int
     columns: Mapping[str, Any]
-    states: np.ndarray
-    actions: np.ndarray
-    past_human_actions: np.ndarray
-    rewards: np.ndarray
+    states: Array
+    actions: Array
+    past_human_actions: Array
+    rewards: Array
     fps: int
     task: PairTask
     scenario: Any
@@ -77,12 +75,12 @@ class DatasetEpisode:
         return parse_settings_text(self.columns["physics"], self.task)
 
     @property
-    def path(self) -> np.ndarray | None:
+    def path(self) -> Array | None:
         """`(T, 2)` positions of the tracked point; None if the task tracks none."""
         return self.task.path(self.states)
 
     @property
-    def interaction(self) -> np.ndarray | None:
+    def interaction(self) -> Array | None:
         """`(T,)` interaction measure, see `PairTask.interaction`; None if the task has none."""
         return self.task.interaction(self.states, self.actions)
 
@@ -163,7 +161,7 @@ class Episodes(Sequence[DatasetEpisode]):
     def _loaded(self) -> list[DatasetEpisode]:
         return [self._episode(index, columns) for index, columns in self._folder.frames(self._shapes)]
 
-    def _episode(self, index: int, columns: Mapping[str, np.ndarray]) -> DatasetEpisode:
+    def _episode(self, index: int, columns: Mapping[str, Array]) -> DatasetEpisode:
         row, task = self._rows[index], self._folder.task
         try:
             scenario = task.scenario_of_vector(columns[ENVIRONMENT_STATE][0].astype(float), row)

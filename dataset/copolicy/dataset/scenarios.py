@@ -80,7 +80,7 @@ class ScenarioSet:
     from_file: bool = False
     digest: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.digest:
             rows = [[scenario.to_json(), weight] for scenario, weight in zip(self.scenarios, self.weights, strict=True)]
             text = json.dumps([rows, {name: list(indices) for name, indices in self.splits.items()}], sort_keys=True)

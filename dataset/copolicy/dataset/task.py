@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 from .features import PAIR_GYM_ID
 from .outline import Outline
@@ -123,11 +124,11 @@ class PairTask(ABC):
         """
 
     @abstractmethod
-    def scenario_vector(self, scenario: Any) -> np.ndarray:
+    def scenario_vector(self, scenario: Any) -> Array:
         """The vector of a scenario, `(len(TaskSpec.scenario),)`."""
 
     @abstractmethod
-    def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> Any:
+    def scenario_of_vector(self, vector: Array, columns: Mapping[str, Any]) -> Any:
         """The scenario of a vector `(n,)` and the episode columns that complete it, see `columns_of`.
 
         Raises:
@@ -165,11 +166,11 @@ class PairTask(ABC):
         """The recorded state at the start of a scenario."""
         return self.make_world(scenario).recorded
 
-    def states_of(self, recorded: np.ndarray) -> np.ndarray:
+    def states_of(self, recorded: Array) -> Array:
         """States `(T, n)` of recorded states `(T, k)`, bit-identical to `World.observation`."""
         return recorded
 
-    def recorded_of(self, states: np.ndarray) -> np.ndarray:
+    def recorded_of(self, states: Array) -> Array:
         """Recorded states `(T, k)` of states `(T, n)`: the inverse of `states_of`, up to rounding."""
         return states
 
@@ -190,7 +191,7 @@ class PairTask(ABC):
             else ""
         )
 
-    def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def integrate(self, scenario: Any, settings: Any, state: Array, actions: Array) -> Array:
         """States `(T + 1, n)` under joint actions `(T, 2 m)` from a state `(n,)`, also after the end of the episode."""
         world = self.make_world(scenario, settings)
         world.restore(tuple(self.recorded_of(np.asarray(state, float)[None])[0].tolist()))
@@ -200,7 +201,7 @@ class PairTask(ABC):
             states.append(world.observation)
         return np.array(states)
 
-    def rewards(self, scenario: Any, states: np.ndarray) -> np.ndarray:
+    def rewards(self, scenario: Any, states: Array) -> Array:
         """`(T,)` rewards of states `(T, n)`."""
         world, rewards = self.make_world(scenario), []
         for recorded in self.recorded_of(np.asarray(states, float)).tolist():
@@ -213,15 +214,15 @@ class PairTask(ABC):
         """Message types of the task in recordings; None for the generic ones."""
         return None
 
-    def path(self, states: np.ndarray) -> np.ndarray | None:
+    def path(self, states: Array) -> Array | None:
         """`(T, 2)` positions of the tracked point, for figures and statistics; None if the task tracks none."""
         return None
 
-    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+    def interaction(self, states: Array, actions: Array) -> Array | None:
         """`(T,)` interaction measure in states `(T, n)` under joint actions `(T, 2 m)`; None if the task has none."""
         return None
 
-    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
+    def interaction_recorded(self, recorded: Array, actions: Array) -> Array | None:
         """`interaction` in recorded states `(T, k)`."""
         return self.interaction(self.states_of(recorded), actions)
 
@@ -229,7 +230,7 @@ class PairTask(ABC):
         """Sortable key, equal for scenarios that differ only in the start, or without `with_goal` in start and goal."""
         return scenario.digest
 
-    def strategy(self, scenario: Any, states: np.ndarray) -> str:
+    def strategy(self, scenario: Any, states: Array) -> str:
         """The strategy label of an episode with states `(T + 1, n)`; empty if the task has no labels."""
         return ""
 
@@ -244,7 +245,7 @@ class PairTask(ABC):
         """Phrases about the task for screens, cards, pages and figures."""
         return TaskWords.from_spec(self.spec)
 
-    def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
+    def images(self, scenario: Any, states: Array, size: tuple[int, int]) -> Iterator[Array] | None:
         """An image `(height, width, 3)` uint8 of each state, for a size (width, height) in px; None if not drawn."""
         return None
 
@@ -259,7 +260,7 @@ class PairTask(ABC):
         limits = 1e-5 * (np.array(vector.high) - np.array(vector.low))
         return dict(zip(vector.names, limits.tolist(), strict=True))
 
-    def drift(self, recorded: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    def drift(self, recorded: Array, reference: Array) -> Array:
         """`(T, len(drift_limits))` distances between the recorded states `(T, k)` of two motions at each step.
 
         A task with angles in its recorded state must override this, so that a full turn is no distance.

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from .arrays import Array
 from .outline import Point, Pose
 
 
@@ -60,7 +61,7 @@ class World(Protocol):
         ...
 
     @property
-    def observation(self) -> np.ndarray:
+    def observation(self) -> Array:
         """The state that data sets store and agents observe (`TaskSpec.state`), `(n,)`."""
         ...
 
@@ -68,7 +69,7 @@ class World(Protocol):
         """Sets the world to a recorded state and the step count to zero."""
         ...
 
-    def step(self, action: np.ndarray) -> Outcome:
+    def step(self, action: Array) -> Outcome:
         """Advances one step under a joint action, clipped to its bounds; also after the end of an episode."""
         ...
 
@@ -85,7 +86,7 @@ class Player(Protocol):
         """Number of changes of strategy so far, as the task defines them."""
         ...
 
-    def act(self, state: np.ndarray) -> np.ndarray:
+    def act(self, state: Array) -> Array:
         """The action `(m,)` in a state `(n,)`; called once per step."""
         ...
 
@@ -155,7 +156,7 @@ class Studies:
         """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""
         return {}
 
-    def at_rest(self, recorded: np.ndarray) -> np.ndarray | None:
+    def at_rest(self, recorded: Array) -> Array | None:
         """`(T,)` whether the body is at rest in recorded states `(T, k)`; None if not measured."""
         return None
 
@@ -171,11 +172,11 @@ class SeatExchange(Protocol):
         """A scenario with the seats exchanged."""
         ...
 
-    def states(self, states: np.ndarray) -> np.ndarray:
+    def states(self, states: Array) -> Array:
         """States `(..., n)` with the seats exchanged."""
         ...
 
-    def actions(self, actions: np.ndarray) -> np.ndarray:
+    def actions(self, actions: Array) -> Array:
         """Joint actions `(..., 2 m)` with the seats exchanged."""
         ...
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError
 
 RECORD_HZ = 30
@@ -32,7 +33,7 @@ class Vector:
     low: tuple[float, ...]
     high: tuple[float, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         sizes = {name: len(getattr(self, name)) for name in ("names", "units", "low", "high")}
         if len(set(sizes.values())) != 1:
             raise InvalidValueError("Vector", "as many units, low and high values as names", sizes)
@@ -43,7 +44,7 @@ class Vector:
         return len(self.names)
 
     @property
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> Array:
         """Lowest and highest values, `(2, n)`."""
         return np.array((self.low, self.high), float)
 
@@ -84,7 +85,7 @@ class TaskSpec:
     title: str = ""
     successes: tuple[str, ...] = ("goal",)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "title", self.title or self.name)
         if not set(self.successes) <= set(self.reasons):
             raise InvalidValueError(f"TaskSpec.successes of {self.name!r}", f"some of {self.reasons}", self.successes)
@@ -100,6 +101,6 @@ class TaskSpec:
         names = tuple(f"{player}_{name}" for player in self.players for name in single.names)
         return Vector(names, single.units * 2, single.low * 2, single.high * 2)
 
-    def full_forces(self, actions: np.ndarray) -> np.ndarray:
+    def full_forces(self, actions: Array) -> Array:
         """Joint actions `(N, 2 m)` in units of a player's full force, which is the larger absolute bound of an axis."""
         return actions / np.abs(self.joint_action.bounds).max(axis=0).astype(actions.dtype)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import binomtest
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def not_measured(task: PairTask, summary: Mapping[str, Any]) -> dict[str, Any]:
     return {"not_measured": {name: task.missing(_REQUIRED_PARTS[name]) for name in null}} if null else {}
 
 
-def _mean_and_p95(values: np.ndarray) -> dict[str, float]:
+def _mean_and_p95(values: Array) -> dict[str, float]:
     return {"mean": float(values.mean()), "p95": float(np.quantile(values, 0.95))}
 
 

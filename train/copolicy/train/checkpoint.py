@@ -21,6 +21,7 @@ from lerobot.utils.import_utils import register_third_party_plugins
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
@@ -106,7 +107,7 @@ class Checkpoint:
             self.policy.reset()
         self._noise = {device: torch.Generator(device).manual_seed(seed).get_state() for device in self._devices}
 
-    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+    def predict_action_chunk(self, observations: dict[str, Array]) -> Array:
         """Predicts the action chunks of a batch of worlds.
 
         Args:
@@ -137,7 +138,7 @@ class Checkpoint:
             **({"planned_with": list(backends)} if (backends := getattr(self.policy, "planned_with", ())) else {}),
         }
 
-    def _chunk(self, observations: dict[str, np.ndarray]) -> torch.Tensor:
+    def _chunk(self, observations: dict[str, Array]) -> torch.Tensor:
         first_error = None
         if not self.keeps_history:
             executed = self._config.n_action_steps
@@ -164,7 +165,7 @@ class Checkpoint:
         self.keeps_history = self._succeeded = True
         return actions
 
-    def _batch(self, observations: dict[str, np.ndarray], indices: list[int] | None) -> dict[str, torch.Tensor]:
+    def _batch(self, observations: dict[str, Array], indices: list[int] | None) -> dict[str, torch.Tensor]:
         frames = -1 if indices is None else indices
         keys = self._config.input_features
         return self._preprocess(

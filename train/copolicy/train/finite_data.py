@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.lerobot_folder.folder import data_files
 from copolicy.dataset.lerobot_folder.info import episode_files
@@ -119,7 +120,7 @@ def replacement_statistics(
     )
 
 
-def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str, dict[str, np.ndarray]]]:
+def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str, dict[str, Array]]]:
     """The statistics of each given episode, for the columns that training reads.
 
     They are read from `meta/episodes`, since LeRobot's reader skips them.
@@ -131,7 +132,7 @@ def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str,
     for path in episode_files(root):
         for row in read_parquet(path).to_pylist():
             if row[_EPISODE] in episodes:
-                entry: dict[str, dict[str, np.ndarray]] = {}
+                entry: dict[str, dict[str, Array]] = {}
                 for name in (name for name in row if name.startswith("stats/")):
                     _, column, statistic = name.split("/", 2)
                     if not column.startswith(_TRAINED_COLUMNS):
@@ -141,7 +142,7 @@ def _episode_statistics(root: Path, episodes: Collection[int]) -> list[dict[str,
     return statistics
 
 
-def non_finite_rows(column: pa.Array) -> np.ndarray:
+def non_finite_rows(column: pa.Array) -> Array:
     """`(N,)` whether a row of a column, lists included, has an empty value or one that is not finite as float32."""
     array = column.storage if isinstance(column, pa.ExtensionArray) else column
     invalid = np.zeros(len(array), bool)
@@ -175,7 +176,7 @@ def _row_groups(root: Path, columns: list[str]) -> Iterator[pa.Table]:
             raise damaged(path, error) from None
 
 
-def _collect(table: pa.Table, chosen: np.ndarray | None, start: int, non_finite: _NonFinite) -> None:
+def _collect(table: pa.Table, chosen: Array | None, start: int, non_finite: _NonFinite) -> None:
     """Adds the values that cannot be trained on, of a row group whose first row is row `start` of the data set."""
     episode = pc.fill_null(table.column(_EPISODE), -1).to_numpy()
     trained = np.ones(len(table), bool) if chosen is None else np.isin(episode, chosen)

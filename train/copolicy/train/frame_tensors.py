@@ -8,6 +8,7 @@ import pyarrow as pa
 import torch
 from torch import Tensor
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import RunError
 
 
@@ -72,9 +73,7 @@ class FrameTensors:
         return positions.clamp(first, last), (positions < first) | (positions > last)
 
 
-def episode_bounds(
-    index: np.ndarray, episode: np.ndarray, starts: np.ndarray, stops: np.ndarray, root: object
-) -> tuple[Tensor, Tensor]:
+def episode_bounds(index: Array, episode: Array, starts: Array, stops: Array, root: object) -> tuple[Tensor, Tensor]:
     """Positions of the first and the last frame of each frame's episode, `(N,)` each.
 
     Args:

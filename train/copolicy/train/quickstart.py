@@ -11,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 
 from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
-from copolicy.dataset.command_line.extras import FIGURES, HUB, TRAINING
+from copolicy.dataset.command_line.extras import FIGURES, TRAINING
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, seed, workers
 from copolicy.dataset.files.staging import replace_json
 
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
-    return (*TRAINING, *FIGURES, *HUB, *(("zarr",) if arguments.upstream else ()))
+    return (*TRAINING, *FIGURES, *(("zarr",) if arguments.upstream else ()))
 
 
 def _quickstart(arguments: argparse.Namespace) -> dict:

@@ -101,7 +101,7 @@ class CopolicyConfig(PreTrainedConfig):
 
     normalization_mapping: dict[str, NormalizationMode] = field(default_factory=_identity)  # fixed, see above
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.preset not in PRESETS:
             raise UnknownNameError("preset", self.preset, PRESETS)

@@ -64,7 +64,7 @@ class PairTaskEnvConfig(EnvConfig):
     features: dict[str, PolicyFeature] = field(default_factory=dict)  # fixed by the task
     features_map: dict[str, str] = field(default_factory=FEATURES_MAP.copy)  # fixed by the task
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         task, kinds = self.pair_task, {ENVIRONMENT_STATE: FeatureType.ENV, ACTION: FeatureType.ACTION}
         stride(self.fps, task.spec.record_hz)
         self.scenarios  # noqa: B018 (checks the set)

@@ -24,7 +24,7 @@ class TableCarryingEnvConfig(PairTaskEnvConfig):
     partner: str = ""  # simulated pair whose human acts, e.g. "S01"; the policy then acts for the robot only
     angular_acceleration_limit: float = math.pi / 2  # rad/s^2; the paper's training-time rollouts used pi/8
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.settings:
             expected = "none (--env.type=pair_task --env.task=table takes them)"
             raise InvalidValueError("settings", expected, self.settings)

@@ -9,6 +9,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from copolicy.collect.agents import ConstantAgent, ScriptedAgent
 from copolicy.collect.rollout import Rollout, Trace
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import frames, stride
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.features import OBSERVATION_KEYS, bounds_of
@@ -117,7 +118,7 @@ class PairEnv(gymnasium.Env):
         self._action = np.zeros(2 * self._size)
         return self._observation(), self._info("", False, self._interaction(None))
 
-    def step(self, action: np.ndarray) -> tuple[dict, float, bool, bool, dict]:
+    def step(self, action: Array) -> tuple[dict, float, bool, bool, dict]:
         """Holds a joint action, or the robot's half with a partner, for one frame.
 
         Raises:
@@ -142,7 +143,7 @@ class PairEnv(gymnasium.Env):
         info = self._info(outcome.reason, outcome.success, self._interaction(trace))
         return self._observation(), self.world.reward(), outcome.done and not truncated, truncated, info
 
-    def render(self) -> np.ndarray | None:
+    def render(self) -> Array | None:
         """Draws the world, `(height, 600, 3)` uint8 (height 300 for the table); None without a render mode.
 
         Raises:
@@ -191,7 +192,7 @@ class PairEnv(gymnasium.Env):
         }
 
 
-def _box(bounds: np.ndarray) -> gymnasium.spaces.Box:
+def _box(bounds: Array) -> gymnasium.spaces.Box:
     """Twice the range of the task's bounds, since a world may slightly exceed them in its last step."""
     low, high = bounds
     margin = (high - low) / 2

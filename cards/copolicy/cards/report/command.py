@@ -9,8 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
-from copolicy.dataset.command_line.extras import TABLES
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.meta_files import CHECK_FILE
 from copolicy.dataset.files.staging import replace_text, require_new
@@ -32,7 +31,7 @@ _PALETTE = " ".join(
 )
 
 
-def add_report_command(commands: argparse._SubParsersAction) -> None:
+def add_report_command(commands: Commands) -> None:
     """Adds the command `report`."""
     report = add_command(
         commands,
@@ -40,7 +39,6 @@ def add_report_command(commands: argparse._SubParsersAction) -> None:
         _report,
         "write one HTML page about a data set: paths, heat maps, pairs, findings, and a player for every episode",
         "copolicy-cards report outputs/dataset",
-        TABLES,
     )
     report.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
     report.add_argument("--out", type=Path, help=f"file of the page (default: {REPORT_NAME} in the data set's folder)")

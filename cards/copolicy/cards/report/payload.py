@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.outline import Outline, Shape
 from copolicy.dataset.outline_figure import (
@@ -67,7 +68,7 @@ def build_payload(
     missing = {} if outline else {"outline": missing_part_note(facts.task, "outline")}
     if not facts.task.offers("strategy"):
         missing["labels"] = missing_part_note(facts.task, "strategy labels")
-    blocks: list[np.ndarray] = []
+    blocks: list[Array] = []
     rows: list[dict[str, Any]] = []
     scenes: dict[tuple[Shape, ...], int] = {}
     start = 0
@@ -156,7 +157,7 @@ def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[
     return entries
 
 
-def _block(frames: EpisodeFrames, outline: Outline | None, interaction: np.ndarray | None) -> np.ndarray:
+def _block(frames: EpisodeFrames, outline: Outline | None, interaction: Array | None) -> Array:
     """The columns `(T, n)` that the task offers, in the order of `FRAME_SCALES`."""
     columns = [] if interaction is None else [interaction[:, None]]
     if outline is not None:
@@ -166,7 +167,7 @@ def _block(frames: EpisodeFrames, outline: Outline | None, interaction: np.ndarr
     return np.hstack(columns) if columns else np.empty((len(frames.states), 0))
 
 
-def _quantised(block: np.ndarray, outline: Outline | None, measured: bool) -> tuple[dict[str, float], np.ndarray]:
+def _quantised(block: Array, outline: Outline | None, measured: bool) -> tuple[dict[str, float], Array]:
     """Integers per unit of each existing column, and the columns `(T, n)` as such integers."""
     scales: dict[str, float] = {}
     if outline is not None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task_spec import Vector
@@ -45,7 +46,7 @@ class PersonAgent(Agent):
         self._bounds = action.bounds
         self._device: Gamepad | KeyboardHalf | None = None
         self._calibration = StickCalibration()
-        self._rest = RestOffsetDetector()
+        self._rest_detector = RestOffsetDetector()
         self._clock = clock
 
     @property
@@ -55,7 +56,7 @@ class PersonAgent(Agent):
 
     @device.setter
     def device(self, device: Gamepad | KeyboardHalf | None) -> None:
-        self._device, self._rest = device, RestOffsetDetector()
+        self._device, self._rest_detector = device, RestOffsetDetector()
 
     @property
     def calibration(self) -> StickCalibration:
@@ -64,18 +65,18 @@ class PersonAgent(Agent):
 
     @calibration.setter
     def calibration(self, calibration: StickCalibration) -> None:
-        self._calibration, self._rest = calibration, RestOffsetDetector()
+        self._calibration, self._rest_detector = calibration, RestOffsetDetector()
 
     @property
     def push_at_rest(self) -> float:
         """Force of the stick at rest, as a proportion of the full force; 0 for a centred stick."""
-        return self._rest.force
+        return self._rest_detector.force
 
     def watch_rest(self) -> None:
         """Measures the stick between episodes; called once a tick."""
         if self._has_stick:
             still = RestOffsetDetector.MEASURED if self.calibration.measured else RestOffsetDetector.UNMEASURED
-            self._rest.add(self.force(self.sample()), still)
+            self._rest_detector.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
         """Reads the device.
@@ -92,12 +93,12 @@ class PersonAgent(Agent):
         device = self.device
         return device.force(sample, self.calibration) if isinstance(device, Gamepad) else keyboard_force(sample)
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """Reads the device; the event queue must have been pumped just before."""
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
-            self._rest.add(force, RestOffsetDetector.IN_EPISODE)
+            self._rest_detector.add(force, RestOffsetDetector.IN_EPISODE)
         age = self._clock() - sample.time_ns
         self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
         low, high = self._bounds

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import frame_actions, stride
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
@@ -40,15 +41,15 @@ class Policy(Protocol):
         """Clears the history and seeds the random numbers, before episodes begin."""
         ...
 
-    def predict_action_chunk(self, observations: dict[str, np.ndarray], /) -> np.ndarray:
+    def predict_action_chunk(self, observations: dict[str, Array], /) -> Array:
         """Joint actions `(B, actions, 2 m)` from the newest frame on, for observations `(B, n_obs_steps, n)`."""
         ...
 
 
 class _Chunk(NamedTuple):
     frame: int  # of its first action
-    worlds: np.ndarray  # for which it was predicted
-    actions: np.ndarray  # (worlds, actions, 2 m)
+    worlds: Array  # for which it was predicted
+    actions: Array  # (worlds, actions, 2 m)
     observed_ns: int
     seconds: float  # of inference
 
@@ -131,7 +132,7 @@ class PolicyAgent(Agent):
         # The first observation is repeated before the start, like the padding in training.
         self._states = np.repeat(states[:, None], frames, axis=1)  # (worlds, n_obs_steps, n)
         self._partner_actions = np.zeros((count, frames, size))
-        self._step_actions: list[np.ndarray] = []  # joint actions (worlds, 2 m) of the steps of this frame
+        self._step_actions: list[Array] = []  # joint actions (worlds, 2 m) of the steps of this frame
         self._bounds = spec.joint_action.bounds
         self._joint = np.zeros((count, 2 * size))  # of the present frame
         self._observed_ns = 0  # of the present chunk; 0 without one
@@ -144,7 +145,7 @@ class PolicyAgent(Agent):
             self._worker.submit(self._policy.reset, seed)  # after the inference that still runs
             self._request_chunk(0, np.arange(count))
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """Its half of the joint actions of the present frame."""
         frame, step_in_frame = divmod(self._step, self._stride)
         if step_in_frame == 0:
@@ -157,11 +158,11 @@ class PolicyAgent(Agent):
             self.input = PlayerInput(axes=actions[0].tolist(), age_ns=age)
         return actions
 
-    def half(self, seat: int, worlds: np.ndarray) -> np.ndarray:
+    def half(self, seat: int, worlds: Array) -> Array:
         """A seat's half `(B, m)` of the joint actions of the present frame."""
         return self._joint[worlds, seat * self._size : (seat + 1) * self._size]
 
-    def acted(self, actions: np.ndarray, worlds: np.ndarray) -> None:
+    def acted(self, actions: Array, worlds: Array) -> None:
         """Adds the joint actions to the history."""
         joint = np.zeros_like(self._joint)
         joint[worlds] = actions
@@ -182,7 +183,7 @@ class PolicyAgent(Agent):
         return branch
 
     @property
-    def predicted(self) -> np.ndarray:
+    def predicted(self) -> Array:
         """`(worlds, actions, 2 m)` the present chunks."""
         assert self._chunk is not None, "a chunk before the first step"
         return self._chunk.actions
@@ -197,7 +198,7 @@ class PolicyAgent(Agent):
         if self._worker is not None:
             self._worker.shutdown(cancel_futures=True)
 
-    def _observe(self, states: np.ndarray, worlds: np.ndarray) -> None:
+    def _observe(self, states: Array, worlds: Array) -> None:
         steps = np.array(self._step_actions)  # (stride, worlds, 2 m)
         joint = frame_actions(steps.reshape(len(steps), -1), self._rate, record_hz=self.task.spec.record_hz)[0]
         mean = joint.reshape(steps.shape[1:])[worlds]
@@ -207,7 +208,7 @@ class PolicyAgent(Agent):
         for history, newest in ((self._states, states), (self._partner_actions, mean[:, self._size :])):
             history[worlds] = np.concatenate((history[worlds, 1:], newest[:, None]), axis=1)
 
-    def _next_action(self, frame: int, worlds: np.ndarray) -> None:
+    def _next_action(self, frame: int, worlds: Array) -> None:
         if self._pending is not None and self._pending.done():
             self._accept_chunk(self._pending.result())
         ahead = int(self._worker is not None)
@@ -224,7 +225,7 @@ class PolicyAgent(Agent):
         self._joint = joint if self._exchange is None else self._exchange.actions(joint)
         self._observed_ns = chunk.observed_ns
 
-    def _request_chunk(self, frame: int, worlds: np.ndarray) -> None:
+    def _request_chunk(self, frame: int, worlds: Array) -> None:
         if self._policy.keeps_history:
             worlds = np.arange(len(self._states))
         observations = {
@@ -238,7 +239,7 @@ class PolicyAgent(Agent):
         else:
             self._pending = self._worker.submit(self._predict, *request)
 
-    def _predict(self, frame: int, worlds: np.ndarray, observations: dict[str, np.ndarray], observed_ns: int) -> _Chunk:
+    def _predict(self, frame: int, worlds: Array, observations: dict[str, Array], observed_ns: int) -> _Chunk:
         started = time.perf_counter()
         predicted = self._policy.predict_action_chunk(observations)
         seconds = time.perf_counter() - started
@@ -257,5 +258,5 @@ class _HumanHalf(Agent):
         self.name = agent.name
         self._agent = agent
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         return self._agent.half(1, worlds)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import PairTask, get_task
@@ -15,7 +16,7 @@ from ..rollout import Agent, EpisodeStart
 class RecordedAgent(Agent):
     """Repeats its seat's half of recorded joint actions without feedback; zero after their end."""
 
-    def __init__(self, actions: Sequence[np.ndarray], name: str = "recorded"):
+    def __init__(self, actions: Sequence[Array], name: str = "recorded"):
         """
         Args:
             actions: `(T, 2 m)` of each world.
@@ -30,7 +31,7 @@ class RecordedAgent(Agent):
         self._own_actions = [actions[:, seat * size : (seat + 1) * size] for actions in self._actions]
         self._zero = np.zeros(size)
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """The actions of this step."""
         step, self._step = self._step, self._step + 1
         own_actions = [self._own_actions[index] for index in worlds]
@@ -68,10 +69,10 @@ class ConstantAgent(Agent):
         action: `(m,)`.
     """
 
-    def __init__(self, action: np.ndarray, name: str = "held"):
+    def __init__(self, action: Array, name: str = "held"):
         self.name = name
         self.action = action
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """The action."""
         return np.tile(self.action, (len(worlds), 1))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask, Player, get_task
 
 from ..rollout import Agent, EpisodeStart
@@ -48,6 +49,6 @@ class ScriptedAgent(Agent):
         """Makes new players."""
         self.players = [self._make(seat, index, start) for index, start in enumerate(starts)]
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """The actions of the players."""
         return np.array([self.players[index].act(state) for index, state in zip(worlds, states, strict=True)])

@@ -5,7 +5,7 @@ import itertools
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command, progress
+from copolicy.dataset.command_line.commands import Commands, add_command, progress
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
@@ -15,7 +15,7 @@ from copolicy.dataset.task import get_task
 from ..agents.checkpoint_folder import PRETRAINED
 
 
-def add_demo_command(commands: argparse._SubParsersAction) -> None:
+def add_demo_command(commands: Commands) -> None:
     """Adds `demo` to the commands of `copolicy-collect`."""
     command = add_command(
         commands,

@@ -59,9 +59,8 @@ def demonstrate(
             rollout.step()
     finally:
         robot.close()
-    return track_from_episode(
-        Path(task.name_of(scenario).scenario), episode_from_trace(rollout, trace, 0, scenario, seed, settings)
-    )
+    episode = episode_from_trace(rollout, trace, 0, scenario, seed, settings)
+    return track_from_episode(Path(task.name_of(scenario).scenario), episode)
 
 
 def draw_images(track: Track, size: tuple[int, int], images_per_second: int, speed: float) -> Iterator[pygame.Surface]:

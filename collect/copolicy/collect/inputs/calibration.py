@@ -36,7 +36,7 @@ class StickCalibration:
     invert: tuple[bool, bool] = (False, False)
     measured: bool = field(default=True, compare=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("axes", "centre", "low", "high", "invert"):
             values = tuple(getattr(self, name))
             if len(values) != 2 or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command, add_group
+from copolicy.dataset.command_line.commands import Commands, add_command, add_group
 from copolicy.dataset.command_line.flag_numbers import seed, whole_number
 from copolicy.dataset.command_line.maps_flag import add_task_flag
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
@@ -18,7 +18,7 @@ from copolicy.dataset.task import PairTask, get_task
 _MOST_MAPS = 10_000
 
 
-def add_maps_command(commands: argparse._SubParsersAction) -> None:
+def add_maps_command(commands: Commands) -> None:
     """Adds `maps` with its steps to the commands of `copolicy-collect`."""
     steps = add_group(
         commands,

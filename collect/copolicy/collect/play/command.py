@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
@@ -22,7 +22,7 @@ _COPIED_FLAGS = (
 )  # fmt: skip
 
 
-def add_play_command(commands: argparse._SubParsersAction) -> None:
+def add_play_command(commands: Commands) -> None:
     """Adds `play` to the commands of `copolicy-collect`."""
     command = add_command(
         commands,

@@ -98,7 +98,7 @@ class PlaySettings:
     countdown_s: float = 3.0
     task: str = TABLE
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         ids = {"pair": self.pair, **{f"consent-{k}": text for k, text in enumerate(self.consents) if text}}
         for name, text in ids.items():
             if not _NAME.fullmatch(text):

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from ..sdl import pygame
 
 _RATE = 22050
@@ -48,7 +50,7 @@ class Sounds:
             pygame.mixer.quit()
 
 
-def _tone(frequency: float, seconds: float) -> np.ndarray:
+def _tone(frequency: float, seconds: float) -> Array:
     time = np.arange(int(_RATE * seconds)) / _RATE
     wave = np.sin(2 * np.pi * frequency * time) + 0.25 * np.sin(4 * np.pi * frequency * time)
     envelope = np.minimum(1.0, np.minimum(time, seconds - time) / 0.012)  # avoids a click at both ends

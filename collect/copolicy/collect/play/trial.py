@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.outline import Pose
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
@@ -60,7 +61,7 @@ class Trial:
     practice: bool
     clock: Callable[[], int] = time.monotonic_ns
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         task = self.task
         self._rollout = Rollout(task, [self.scenario], self.agents, seeds=[self.meta.seed], settings=self.settings)
         self.world: Any = self._rollout.worlds[0]
@@ -155,7 +156,7 @@ class Trial:
         x, y, theta = self._outline.poses(self.world.observation[None])[0].tolist()
         return x, y, theta
 
-    def _update_display(self, action: np.ndarray) -> None:
+    def _update_display(self, action: Array) -> None:
         self.pose = self._world_pose()
         x0, y0, x1, y1 = self._outline.forces(action[None])[0].tolist()
         self.forces = (x0, y0, x1, y1)

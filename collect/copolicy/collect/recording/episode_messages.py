@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.recording import episode_records
@@ -46,7 +47,7 @@ def start_records(
     return records
 
 
-def checked_action(action: np.ndarray | Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
+def checked_action(action: Array | Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
     """A joint action `(m,)` as a tuple of floats.
 
     Raises:

@@ -14,6 +14,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
@@ -74,11 +75,11 @@ class IntactPart:
     loop: LoopStatistics = field(init=False)
     recorded: array = field(default_factory=lambda: array("d"), repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.loop = LoopStatistics(self.task.spec.record_hz)
 
     @property
-    def states(self) -> np.ndarray:
+    def states(self) -> Array:
         """`(steps + 1, n)` by `TaskSpec.state`."""
         recorded = np.asarray(self.recorded).reshape(-1, len(self.task.spec.recorded))
         return self.task.states_of(recorded[: self.steps + 1])

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta, termination_reasons
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import named_errors
@@ -145,7 +146,7 @@ class EpisodeRecorder:
 
     def step(
         self,
-        action: np.ndarray | Sequence[float],
+        action: Array | Sequence[float],
         state: Sequence[float],
         reward: float,
         *,

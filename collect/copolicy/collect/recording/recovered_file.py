@@ -13,6 +13,7 @@ import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
 from copolicy.dataset.files.staging import named_errors, sync_folder
@@ -101,7 +102,7 @@ class _RecordCopier:
         self._time_ns = 0  # of the final state
 
     @property
-    def actions(self) -> np.ndarray:
+    def actions(self) -> Array:
         """`(steps, m)` of both players in the complete steps."""
         size = len(self._task.spec.action)
         return np.hstack([np.reshape(np.array(actions, float), (-1, size)) for actions in self._player_actions])
@@ -154,7 +155,7 @@ class _RecordCopier:
                 self._writer.add_message(self._channels[channel], self._time_ns, payload, self._time_ns, self._steps)
 
 
-def _result(part: IntactPart, actions: np.ndarray) -> dict[str, str]:
+def _result(part: IntactPart, actions: Array) -> dict[str, str]:
     recorded = part.metadata.get(episode_records.RESULT)
     if recorded is not None and not part.stopped_by:
         flags = [flag for flag in recorded.get("quality_flags", "").split(",") if flag]

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.exceptions import InvalidValueError
 
@@ -13,7 +13,7 @@ from ..angular_limit import ANGULAR_LIMITS
 _FORMATS = {".mp4": "video", ".mkv": "video", ".gif": "gif", ".png": "png", ".rrd": "rerun"}  # by suffix
 
 
-def add_replay_command(commands: argparse._SubParsersAction) -> None:
+def add_replay_command(commands: Commands) -> None:
     """Adds `replay` to the commands of `copolicy-collect`."""
     command = add_command(
         commands,

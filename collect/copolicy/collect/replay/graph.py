@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask
 
 from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, VERMILION, Colour, mix
@@ -14,7 +15,7 @@ _MIN_RANGE = 0.5  # so that small values look small
 class ForceGraph:
     """Draws the curve, once per size, and a cursor on it."""
 
-    def __init__(self, interaction: np.ndarray | None, steps: int, task: PairTask):
+    def __init__(self, interaction: Array | None, steps: int, task: PairTask):
         """
         Args:
             interaction: `(steps,)`, in the task's unit; None if it is not measured.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.outline import Pose, interpolate_pose
@@ -40,8 +41,8 @@ class Track:
     task: PairTask
     episode: Episode
     poses: tuple[Pose, ...]
-    forces: np.ndarray
-    interaction: np.ndarray | None
+    forces: Array
+    interaction: Array | None
     events: tuple[TrackEvent, ...] = ()
 
     @property

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import Outcome
 from copolicy.dataset.task_spec import TIMEOUT
@@ -70,7 +71,7 @@ def verify(
     }
 
 
-def _simulate(track: Track, settings: Any) -> tuple[np.ndarray, Outcome, int]:
+def _simulate(track: Track, settings: Any) -> tuple[Array, Outcome, int]:
     """Returns the drift `(T + 1, n)` of each state, and the first outcome that ends an episode with its step."""
     task, episode = track.task, track.episode
     recorded = task.recorded_of(np.vstack((episode.states, episode.final_state)))

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.task import TABLE, get_task
 
@@ -79,6 +78,6 @@ def record_episode(
 class _Recording:
     recorder: EpisodeRecorder
 
-    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+    def step(self, rollout: Rollout, actions: Array, worlds: Array) -> None:
         world = rollout.worlds[0]
         self.recorder.step(actions[0], world.recorded, world.reward())

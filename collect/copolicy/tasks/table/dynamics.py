@@ -9,20 +9,20 @@ import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from .physics import Physics
 
 _FIXED_POINT_STEPS = 20  # the iteration contracts by at least 8 a step
 
 
-def torque(theta: np.ndarray, actions: np.ndarray, physics: Physics) -> np.ndarray:
+def torque(theta: Array, actions: Array, physics: Physics) -> Array:
     """Torque of both players `(...)` at orientations `(...)` under actions `(..., 4)`."""
     difference = physics.force_scale * (actions[..., 2:] - actions[..., :2])
     return physics.lever / 2 * (np.sin(theta) * difference[..., 0] + np.cos(theta) * difference[..., 1])
 
 
-def step_angular(
-    theta: np.ndarray, omega: np.ndarray, actions: np.ndarray, physics: Physics
-) -> tuple[np.ndarray, np.ndarray]:
+def step_angular(theta: Array, omega: Array, actions: Array, physics: Physics) -> tuple[Array, Array]:
     """Orientation (not wrapped) and angular velocity after one step, `(...)` each."""
     limit = physics.angular_acceleration_limit
     alpha = (torque(theta, actions, physics) - physics.angular_damping * omega) / physics.inertia
@@ -30,18 +30,14 @@ def step_angular(
     return theta + (omega + after) * physics.dt / 2, after
 
 
-def step_linear(
-    position: np.ndarray, velocity: np.ndarray, actions: np.ndarray, physics: Physics
-) -> tuple[np.ndarray, np.ndarray]:
+def step_linear(position: Array, velocity: Array, actions: Array, physics: Physics) -> tuple[Array, Array]:
     """Position and velocity `(..., 2)` after one step."""
     acceleration = _push(actions, physics) - physics.linear_damping / physics.mass * velocity
     after = velocity + acceleration * physics.dt
     return position + (velocity + after) * physics.dt / 2, after
 
 
-def undo_linear(
-    position: np.ndarray, velocity: np.ndarray, actions: np.ndarray, physics: Physics
-) -> tuple[np.ndarray, np.ndarray]:
+def undo_linear(position: Array, velocity: Array, actions: Array, physics: Physics) -> tuple[Array, Array]:
     """Position and velocity `(..., 2)` before the step that ended in these; exact."""
     before = (velocity - _push(actions, physics) * physics.dt) / (
         1 - physics.linear_damping / physics.mass * physics.dt
@@ -49,9 +45,7 @@ def undo_linear(
     return position - (before + velocity) * physics.dt / 2, before
 
 
-def undo_angular(
-    theta: np.ndarray, omega: np.ndarray, actions: np.ndarray, physics: Physics
-) -> tuple[np.ndarray, np.ndarray]:
+def undo_angular(theta: Array, omega: Array, actions: Array, physics: Physics) -> tuple[Array, Array]:
     """All orientations and angular velocities before a step that could have ended in these.
 
     Without the clip, damping multiplies omega by 1 - 40/30 < 0, so that up to three predecessors exist.
@@ -73,8 +67,8 @@ def undo_angular(
 
 
 def integrate(
-    pose: tuple[float, float, float], velocity: tuple[float, float, float], actions: np.ndarray, physics: Physics
-) -> np.ndarray:
+    pose: tuple[float, float, float], velocity: tuple[float, float, float], actions: Array, physics: Physics
+) -> Array:
     """`(T + 1, 6)` x, y, theta (not wrapped), vx, vy, omega under actions `(T, 4)`."""
     dt, limit = physics.dt, physics.angular_acceleration_limit
     arm = physics.lever / 2 * physics.force_scale / physics.inertia
@@ -95,5 +89,5 @@ def integrate(
     return np.array(states)
 
 
-def _push(actions: np.ndarray, physics: Physics) -> np.ndarray:
+def _push(actions: Array, physics: Physics) -> Array:
     return physics.force_scale / physics.mass * (actions[..., :2] + actions[..., 2:])

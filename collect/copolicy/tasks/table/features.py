@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import bounds_of, features_of
 
@@ -15,24 +16,24 @@ FEATURES, BOUNDS = features_of(SPEC), bounds_of(SPEC)
 TASK = SPEC.sentence
 
 
-def state_vector(pose: tuple[float, float, float], velocity: tuple[float, float, float]) -> np.ndarray:
+def state_vector(pose: tuple[float, float, float], velocity: tuple[float, float, float]) -> Array:
     """`(7,)` observation of the table from its pose (px, px, rad) and velocity (px/s, px/s, rad/s)."""
     x, y, theta = pose
     return np.array((x, y, math.cos(theta), math.sin(theta), *velocity))
 
 
-def theta_of(states: np.ndarray) -> np.ndarray:
+def theta_of(states: Array) -> Array:
     """Orientation in [0, 2 pi) of states `(..., 7)`, rad."""
     return np.arctan2(states[..., 3], states[..., 2]) % (2 * math.pi)
 
 
-def states_7(states: np.ndarray) -> np.ndarray:
+def states_7(states: Array) -> Array:
     """States `(..., 6)` with theta as `(..., 7)` with cosine and sine; their last bit may differ from `math.cos`."""
     cosine, sine = np.cos(states[..., 2]), np.sin(states[..., 2])
     return np.concatenate((states[..., :2], cosine[..., None], sine[..., None], states[..., 3:]), axis=-1)
 
 
-def environment_state(config: MapConfig) -> np.ndarray:
+def environment_state(config: MapConfig) -> Array:
     """`(11,)` observation of a map: start pose, goal, and the centres of the obstacles padded with zeros."""
     vector = np.zeros(len(ENVIRONMENT_NAMES))
     values = (*config.start, *config.goal, *(value for centre in config.obstacles for value in centre))
@@ -40,7 +41,7 @@ def environment_state(config: MapConfig) -> np.ndarray:
     return vector
 
 
-def map_from_vector(vector: np.ndarray, obstacle_size: int, obstacle_sizes: str = "") -> MapConfig:
+def map_from_vector(vector: Array, obstacle_size: int, obstacle_sizes: str = "") -> MapConfig:
     """The map of an `environment_state` vector `(11,)`; the zero padding gives the number of obstacles.
 
     Args:

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 
-def interaction_force(theta: np.ndarray | float, actions: np.ndarray, legacy_axis: bool = False) -> np.ndarray:
+
+def interaction_force(theta: Array | float, actions: Array, legacy_axis: bool = False) -> Array:
     """Half the difference of the two forces along the table, in units of a player's full force.
 
     f = (u_robot - u_human) . e / 2, with e = (cos theta, -sin theta) the axis from the human's end to the robot's

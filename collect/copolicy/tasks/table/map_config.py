@@ -40,7 +40,7 @@ class MapConfig:
     obstacle_sizes: tuple[int, ...] = ()
     named: ScenarioName | None = field(default=None, compare=False, repr=False)  # the field's name is in plan digests
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "start", tuple(float(value) for value in self.start))
         object.__setattr__(self, "goal", tuple(float(value) for value in self.goal))
         object.__setattr__(self, "obstacles", tuple(tuple(float(v) for v in centre) for centre in self.obstacles))

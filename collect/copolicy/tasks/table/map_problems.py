@@ -8,6 +8,8 @@ from scipy.ndimage import label
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from copolicy.dataset.arrays import Array
+
 from .agents import grid
 from .agents.clearance import square_clearance, wall_clearance
 from .map_config import WINDOW, MapConfig
@@ -86,7 +88,7 @@ def _reachable(config: MapConfig) -> bool:
 
 
 @functools.lru_cache(maxsize=64)
-def _parts(squares: _Squares) -> np.ndarray:
+def _parts(squares: _Squares) -> Array:
     """`(COUNT,)` number of the connected component of each cell of the grid, -1 where the table is in contact."""
     x, y, theta = grid.poses()
     free = np.broadcast_to(wall_clearance(x, y, theta) > 0, grid.SHAPE)

@@ -33,7 +33,7 @@ class Physics:
     lever: float = 1.0
     force_scale: float = 50.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.angular_acceleration_limit > 0:
             raise InvalidValueError("angular_acceleration_limit", "a positive number", self.angular_acceleration_limit)
         if self.step_limit < 1:

@@ -4,16 +4,18 @@ import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from .map_config import MapConfig
 
 
-def winding(path: np.ndarray, point: tuple[float, float]) -> float:
+def winding(path: Array, point: tuple[float, float]) -> float:
     """Turns of a path `(T, 2)` around a point, positive clockwise on screen (y down)."""
     angles = np.unwrap(np.arctan2(path[:, 1] - point[1], path[:, 0] - point[0]))
     return float(angles[-1] - angles[0]) / (2 * math.pi)
 
 
-def route_class(path: np.ndarray, config: MapConfig) -> str:
+def route_class(path: Array, config: MapConfig) -> str:
     """The route class of a path `(T, 2)` of the table's centre, px: one letter an obstacle, empty without obstacles.
 
     L: the table passed below the obstacle on screen when carried to the right, R: above it; this is the sign of the

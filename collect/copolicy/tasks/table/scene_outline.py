@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.outline import Point, Shape, circle, square
 
 from .features import theta_of
@@ -49,10 +50,10 @@ class TableOutline:
             *(Shape("obstacle", square(centre, side)) for centre, side in scenario.squares),
         )
 
-    def poses(self, states: np.ndarray) -> np.ndarray:
+    def poses(self, states: Array) -> Array:
         """`(T, 3)` centre of the table and its orientation in [0, 2 pi)."""
         return np.column_stack((states[:, :2], theta_of(states)))
 
-    def forces(self, actions: np.ndarray) -> np.ndarray:
+    def forces(self, actions: Array) -> Array:
         """The actions are forces."""
         return actions

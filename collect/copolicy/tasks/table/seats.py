@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from .map_config import MapConfig
 
 _HALF_TURN = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])  # of x, y, cos_theta, sin_theta, vx, vy, omega
@@ -22,10 +24,10 @@ class TableSeats:
         x, y, theta = scenario.start
         return replace(scenario, start=(x, y, (theta + math.pi) % (2 * math.pi)))
 
-    def states(self, states: np.ndarray) -> np.ndarray:
+    def states(self, states: Array) -> Array:
         """States `(..., 7)` turned by pi."""
         return states * _HALF_TURN
 
-    def actions(self, actions: np.ndarray) -> np.ndarray:
+    def actions(self, actions: Array) -> Array:
         """Joint actions `(..., 4)` with the players' halves exchanged."""
         return np.concatenate((actions[..., 2:], actions[..., :2]), axis=-1)

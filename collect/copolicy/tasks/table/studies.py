@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import Studies
 
 from .map_config import MapConfig
@@ -30,7 +31,7 @@ class TableStudies(Studies):
         """Start orientation (rad) and number of obstacles of a map."""
         return {"start_theta": scenario.start[2], "obstacles": len(scenario.obstacles)}
 
-    def at_rest(self, recorded: np.ndarray) -> np.ndarray:
+    def at_rest(self, recorded: Array) -> Array:
         """`(T,)` whether speed and spin of the table are below the limits."""
         vx, vy, omega = recorded[:, 3:].T
         return (vx * vx + vy * vy < _STILL_SPEED**2) & (np.abs(omega) < _STILL_SPIN)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
@@ -61,11 +62,11 @@ class TableTask(PairTask):
         """See `MapConfig.from_json`."""
         return MapConfig.from_json(text)
 
-    def scenario_vector(self, scenario: MapConfig) -> np.ndarray:
+    def scenario_vector(self, scenario: MapConfig) -> Array:
         """`(11,)` start pose, goal, and the centres of the obstacles padded with zeros."""
         return environment_state(scenario)
 
-    def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> MapConfig:
+    def scenario_of_vector(self, vector: Array, columns: Mapping[str, Any]) -> MapConfig:
         """The map of an `environment_state`, with the obstacle sizes of the episode columns.
 
         Data sets of earlier versions have no such columns: there the map's name decides, and the default is 50 px.
@@ -93,7 +94,7 @@ class TableTask(PairTask):
         """At rest at the start of the map, with the map's orientation."""
         return (*scenario.start, 0.0, 0.0, 0.0)
 
-    def states_of(self, recorded: np.ndarray) -> np.ndarray:
+    def states_of(self, recorded: Array) -> Array:
         """`(T, 6)` x, y, theta and velocity to `(T, 7)`, bit for bit as `TableWorld.observation`."""
         thetas = recorded[:, 2].tolist()
         states = np.empty((len(recorded), 7))
@@ -103,28 +104,28 @@ class TableTask(PairTask):
         states[:, 4:] = recorded[:, 3:]
         return states
 
-    def recorded_of(self, states: np.ndarray) -> np.ndarray:
+    def recorded_of(self, states: Array) -> Array:
         """`(T, 7)` to `(T, 6)` x, y, theta and velocity."""
         return np.column_stack((states[:, :2], theta_of(states), states[:, 4:]))
 
-    def rewards(self, scenario: MapConfig, states: np.ndarray) -> np.ndarray:
+    def rewards(self, scenario: MapConfig, states: Array) -> Array:
         """See `reward`; the position alone matters."""
         return np.array([reward(x, y, scenario) for x, y in states[:, :2].tolist()])
 
-    def integrate(self, scenario: MapConfig, settings: Physics, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def integrate(self, scenario: MapConfig, settings: Physics, state: Array, actions: Array) -> Array:
         """By `dynamics.integrate`, which is much faster than `TableWorld`, since it does not check contacts."""
         x, y, _, _, vx, vy, omega = state.astype(float).tolist()
         return states_7(integrate((x, y, float(theta_of(state))), (vx, vy, omega), actions, settings))
 
-    def path(self, states: np.ndarray) -> np.ndarray:
+    def path(self, states: Array) -> Array:
         """`(T, 2)` the table's centre, px."""
         return states[:, :2]
 
-    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def interaction(self, states: Array, actions: Array) -> Array:
         """See `interaction_force`."""
         return interaction_force(theta_of(states), actions)
 
-    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def interaction_recorded(self, recorded: Array, actions: Array) -> Array:
         """By the recorded orientation, without the detour through its cosine and sine."""
         return interaction_force(recorded[:, 2], actions)
 
@@ -135,7 +136,7 @@ class TableTask(PairTask):
         obstacles = sorted((x, y, size) for (x, y), size in zip(scenario.obstacles, sizes, strict=True))
         return tuple(obstacles), scenario.goal if with_goal else ()
 
-    def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
+    def strategy(self, scenario: MapConfig, states: Array) -> str:
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
 
@@ -151,7 +152,7 @@ class TableTask(PairTask):
 
         return WORDS
 
-    def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+    def images(self, scenario: MapConfig, states: Array, size: tuple[int, int]) -> Iterator[Array]:
         """Images by `SceneImage`."""
         from .artist.scene_image import scene_image  # pygame
 
@@ -170,7 +171,7 @@ class TableTask(PairTask):
         """Limits of position and orientation; rounding of doubles stays below 1e-9."""
         return {"px": 0.01, "rad": 1e-4}
 
-    def drift(self, recorded: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    def drift(self, recorded: Array, reference: Array) -> Array:
         """Distance of the positions, px, and of the orientations, rad in [0, pi]."""
         turn = recorded[:, 2] - reference[:, 2]
         rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pymunk
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.task import RUNNING, Outcome
 
@@ -105,11 +106,11 @@ class TableWorld:
         self.reset(recorded[:3], recorded[3:])
 
     @property
-    def observation(self) -> np.ndarray:
+    def observation(self) -> Array:
         """`(7,)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s)."""
         return state_vector(self.pose, self.velocity)
 
-    def step(self, action: np.ndarray | Sequence[float]) -> Outcome:
+    def step(self, action: Array | Sequence[float]) -> Outcome:
         """Advances by 1/30 s under `action` `(4,)`: robot xy, human xy, each clipped to [-1, 1].
 
         Raises:
@@ -194,7 +195,7 @@ class TableWorld:
         return Contact(obstacle, goal, wall)
 
 
-def _forces(action: np.ndarray | Sequence[float]) -> list[float]:
+def _forces(action: Array | Sequence[float]) -> list[float]:
     try:
         array = np.asarray(action, dtype=float)
     except (TypeError, ValueError):

@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command
-from copolicy.dataset.command_line.extras import TABLES
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.flag_numbers import number, seed
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
@@ -18,12 +17,12 @@ FORMATS = {
 _WRITERS = {"zarr": "numcodecs", "robomimic": "h5py", "minari": "h5py"}
 
 
-def add_export_command(commands: argparse._SubParsersAction) -> None:
+def add_export_command(commands: Commands) -> None:
     """Adds `export`."""
     parser = add_command(
         commands, "export", _export, "write a LeRobot data set of this project in another project's format",
         "copolicy-convert export datasets/table --format zarr --out exports/table.zarr",
-        lambda arguments: (*TABLES, _WRITERS[arguments.format]),
+        lambda arguments: (_WRITERS[arguments.format],),
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
     formats = "; ".join(f"{name}: {description}" for name, description in FORMATS.items())

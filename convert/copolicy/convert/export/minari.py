@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import frames
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS, PAIR_GYM_ID, bounds_of
@@ -93,7 +94,7 @@ def _environment(source: ExportSource) -> dict[str, Any]:
     }
 
 
-def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
+def _widen(bounds: dict[str, Array], group: h5py.Group) -> None:
     # The task's bounds scale values for training and can be exceeded slightly; a space must contain all values.
     paths = {feature: f"observations/{name}" for name, feature in OBSERVATION_KEYS.items()} | {ACTION: "actions"}
     for feature, path in paths.items():
@@ -102,7 +103,7 @@ def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
         bounds[feature] = np.stack((np.minimum(low, values.min(axis=0)), np.maximum(high, values.max(axis=0))))
 
 
-def _box(bounds: np.ndarray) -> dict[str, Any]:
+def _box(bounds: Array) -> dict[str, Any]:
     low, high = bounds
     return {
         "type": "Box", "dtype": "float32", "shape": list(low.shape), "low": low.tolist(), "high": high.tolist(),

@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.files.staging import new_folder
@@ -80,7 +81,7 @@ def _exact(fps: int, alignment: Alignment) -> bool:
     return alignment == "upstream" and fps == RECORD_HZ
 
 
-def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[Array, Array, Array]:
     """obs `(T, n)`, action and past_action `(T, m)`."""
     states, actions = episode.states.astype(float), episode.actions.astype(float)
     past = previous_actions(actions)
@@ -102,7 +103,7 @@ def _write_group(folder: Path) -> None:
     (folder / ".zgroup").write_text(json.dumps({"zarr_format": 2}), encoding="utf-8")
 
 
-def _write_array(folder: Path, array: np.ndarray) -> None:
+def _write_array(folder: Path, array: Array) -> None:
     try:
         from numcodecs.blosc import Blosc
     except ImportError:

@@ -43,7 +43,7 @@ class Validation:
     by: By = "pairs"
     seed: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0 < self.proportion < 1:
             raise InvalidValueError("--valid", "a proportion between 0 and 1", self.proportion)
 

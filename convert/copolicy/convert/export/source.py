@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
@@ -37,11 +38,11 @@ class ExportEpisode:
     """
 
     index: int
-    states: np.ndarray
-    environment: np.ndarray
-    human_actions: np.ndarray
-    actions: np.ndarray
-    rewards: np.ndarray
+    states: Array
+    environment: Array
+    human_actions: Array
+    actions: Array
+    rewards: Array
     meta: dict[str, Any]
     fps: int
     settings: Any
@@ -50,7 +51,7 @@ class ExportEpisode:
     def __len__(self) -> int:
         return len(self.actions)
 
-    def final_state(self) -> np.ndarray:
+    def final_state(self) -> Array:
         """The state `(n,)` float32 after the last action.
 
         It is not stored: it is integrated from the last state, under the episode's settings, over the steps of the last
@@ -63,7 +64,7 @@ class ExportEpisode:
         scenario = self.task.scenario_of_vector(self.environment, self.meta)
         return self.task.integrate(scenario, self.settings, self.states[-1], actions)[-1].astype(np.float32)
 
-    def next_states(self) -> np.ndarray:
+    def next_states(self) -> Array:
         """The states `(T, n)` float32 of the next frames."""
         return np.vstack((self.states[1:], self.final_state()))
 

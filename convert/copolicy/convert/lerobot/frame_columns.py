@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import Downsampling, frame_actions, frame_states, previous_actions, stride
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import InvalidValueError
@@ -9,7 +10,7 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.task import get_task
 
 
-def frame_columns(episode: Episode, fps: int, downsampling: Downsampling = "mean") -> dict[str, np.ndarray]:
+def frame_columns(episode: Episode, fps: int, downsampling: Downsampling = "mean") -> dict[str, Array]:
     """Returns the columns of an episode (`features_of` its task) at `fps`, `(T', n)` float32 or `(T',)`.
 
     `next.reward` is the reward of the state after the frame's recorded steps; `next.done` marks the last frame,
@@ -39,7 +40,7 @@ def frame_columns(episode: Episode, fps: int, downsampling: Downsampling = "mean
     return columns
 
 
-def _at_rate(episode: Episode, record_hz: int, fps: int, downsampling: Downsampling) -> tuple[np.ndarray, np.ndarray]:
+def _at_rate(episode: Episode, record_hz: int, fps: int, downsampling: Downsampling) -> tuple[Array, Array]:
     if not len(episode.actions):
         raise InvalidValueError(f"steps of episode {episode.meta.episode_uuid}", "at least one", 0)
     if episode.fps == record_hz:

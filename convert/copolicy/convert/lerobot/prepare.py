@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
@@ -49,8 +50,8 @@ class PreparedEpisode:
         task: name of its task.
     """
 
-    columns: dict[str, np.ndarray]
-    statistics: dict[str, dict[str, np.ndarray]]
+    columns: dict[str, Array]
+    statistics: dict[str, dict[str, Array]]
     meta: EpisodeMeta
     notes: tuple[str, ...] = ()
     scene: "SceneClip | None" = None

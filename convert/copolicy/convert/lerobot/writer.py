@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
@@ -184,7 +185,7 @@ def _write_data(
     return rows, statistics, notes
 
 
-def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, np.ndarray]:
+def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, Array]:
     order = np.arange(frames)
     return {
         "timestamp": (order / fps).astype(np.float32),

@@ -3,13 +3,13 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import DATASETS
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.publication.repo_id import checked_repo_id
 
 
-def add_merge_command(commands: argparse._SubParsersAction) -> None:
+def add_merge_command(commands: Commands) -> None:
     """Adds `merge`."""
     parser = add_command(
         commands, "merge", _merge, "merge LeRobot data sets of this project, such as those of two labs",

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
 from copolicy.dataset.settings_text import settings_text
@@ -64,9 +65,9 @@ class Trajectory:
         physics_known: the angular limit was given, or no other limit fits the rows equally well.
     """
 
-    states: np.ndarray
-    actions: np.ndarray
-    final_state: np.ndarray
+    states: Array
+    actions: Array
+    final_state: Array
     physics: Physics
     residual: float
     physics_known: bool = True
@@ -82,13 +83,13 @@ def best_fit(fit: Callable[[Physics], Trajectory], angular_limit: str) -> Trajec
     return replace(best, physics_known=all(residual > 2 * best.residual + _ROUNDING for residual in residuals))
 
 
-def start_pose(state: np.ndarray) -> tuple[float, float, float]:
+def start_pose(state: Array) -> tuple[float, float, float]:
     """Start pose of a map from a first state `(6,)`, rounded to remove the noise of single precision."""
     x, y, theta = (float(value) for value in state[:3])
     return round(x, 3), round(y, 3), round(theta % (2 * math.pi), 5)
 
 
-def outcome(config: MapConfig, physics: Physics, final_state: np.ndarray, last_action: np.ndarray) -> str | None:
+def outcome(config: MapConfig, physics: Physics, final_state: Array, last_action: Array) -> str | None:
     """Termination reason of an episode: contact at the last pose or, with the last action repeated, in the next two
     steps. None without contact.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import ORIGINAL_MAPS
 from copolicy.tasks.table.physics import Physics
@@ -37,15 +38,13 @@ def rounded(config: MapConfig) -> MapConfig:
     return replace(config, start=start, goal=(round(goal[0], 3), round(goal[1], 3)), obstacles=obstacles)
 
 
-def start_differs(config: MapConfig, first_state: np.ndarray) -> str:
+def start_differs(config: MapConfig, first_state: Array) -> str:
     """Describes the distance of the map's start from the first state `(6,)`; empty if within tolerance."""
     distance = float(np.hypot(*(np.asarray(config.start[:2]) - first_state[:2])))
     return f"its start is {distance:.0f} px from the path's" if distance > _START_TOLERANCE else ""
 
 
-def check_by_rewards(
-    stored: MapConfig, first_state: np.ndarray, positions: np.ndarray, rewards: np.ndarray
-) -> MapFinding:
+def check_by_rewards(stored: MapConfig, first_state: Array, positions: Array, rewards: Array) -> MapFinding:
     """Compares the stored map with the rewards at the positions `(T, 2)` after each action; recovers the played one.
 
     The rewards were computed on the map that was played. Of the known maps that give these rewards, the one with the
@@ -77,7 +76,7 @@ def check_by_rewards(
 
 
 def check_by_path(
-    stored: MapConfig, states: np.ndarray, final_state: np.ndarray, last_action: np.ndarray, physics: Physics
+    stored: MapConfig, states: Array, final_state: Array, last_action: Array, physics: Physics
 ) -> MapFinding:
     """Compares the stored map with the path alone: start, contacts along the path, and contact at its end.
 
@@ -103,16 +102,14 @@ def check_by_path(
     return MapFinding(reached[0], ("map_mismatch", "goal_recovered"), (note,))
 
 
-def _other_goals(
-    config: MapConfig, physics: Physics, final_state: np.ndarray, last_action: np.ndarray
-) -> list[MapConfig]:
+def _other_goals(config: MapConfig, physics: Physics, final_state: Array, last_action: Array) -> list[MapConfig]:
     """The map with each other known goal that the table touches at its final pose."""
     goals = {original.goal for original in ORIGINAL_MAPS} - {config.goal}
     candidates = [replace(config, goal=goal) for goal in sorted(goals)]
     return [candidate for candidate in candidates if outcome(candidate, physics, final_state, last_action) == "goal"]
 
 
-def _reward_error(config: MapConfig, positions: np.ndarray, rewards: np.ndarray) -> float:
+def _reward_error(config: MapConfig, positions: Array, rewards: Array) -> float:
     expected = np.array([reward(x, y, config) for x, y in positions.tolist()])
     return float(np.abs(expected - rewards).max())
 
@@ -122,7 +119,7 @@ def _candidates(moved: MapConfig) -> list[MapConfig]:
     return [moved, *(replace(moved, goal=goal, obstacles=obstacles) for goal, obstacles in known_layouts)]
 
 
-def _rows_inside(config: MapConfig, states: np.ndarray) -> int:
+def _rows_inside(config: MapConfig, states: Array) -> int:
     world = TableWorld(config)
     contacts = (world.contact((s[0], s[1], np.arctan2(s[3], s[2]))) for s in states)
     return sum(contact.goal or contact.obstacle for contact in contacts)

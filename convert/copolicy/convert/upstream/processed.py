@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.task_spec import RECORD_HZ
@@ -49,7 +50,7 @@ def read_processed(path: Path, options: UpstreamOptions) -> Episode:
     return build_episode(trajectory, finding.config, content, RECORD_HZ, origin, finding.flags, finding.notes)
 
 
-def _parse(path: Path) -> dict[str, np.ndarray]:
+def _parse(path: Path) -> dict[str, Array]:
     fields = load_npz(path)
     missing = {*_WIDTHS, "table_init", "table_goal", "obstacles"} - set(fields)
     if missing:
@@ -67,7 +68,7 @@ def _parse(path: Path) -> dict[str, np.ndarray]:
     return fields
 
 
-def _stored_map(fields: dict[str, np.ndarray], path: Path, obstacle_size: int) -> MapConfig:
+def _stored_map(fields: dict[str, Array], path: Path, obstacle_size: int) -> MapConfig:
     try:
         x, y = fields["table_init"].reshape(2)
         (goal_x, goal_y), *obstacles = np.vstack((fields["table_goal"], fields["obstacles"].reshape(-1, 2)))
@@ -77,7 +78,7 @@ def _stored_map(fields: dict[str, np.ndarray], path: Path, obstacle_size: int) -
         raise FileFormatError(path, "table_init, table_goal and obstacles as positions", str(error)) from None
 
 
-def _reconstruct(next_poses: np.ndarray, actions: np.ndarray, physics: Physics) -> Trajectory:
+def _reconstruct(next_poses: Array, actions: Array, physics: Physics) -> Trajectory:
     """Reconstructs the states from the poses `(T, 3)` after the actions, starting at rest."""
     dt, limit = physics.dt, physics.angular_acceleration_limit
     damping = physics.angular_damping / physics.inertia

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.file_kinds import describe_path
@@ -105,7 +106,7 @@ def _map_file(path: Path, obstacle_size: int) -> MapConfig | None:
         raise FileFormatError(path, "a map file with table, goal and obstacles", repr(error)) from None
 
 
-def _shift(next_states: np.ndarray, actions: np.ndarray, start: tuple | None, physics: Physics) -> Trajectory:
+def _shift(next_states: Array, actions: Array, start: tuple | None, physics: Physics) -> Trajectory:
     first = _state_before(next_states[0], actions[0], physics)
     if start is not None:
         start_state = np.array((*start, 0.0, 0.0, 0.0))
@@ -115,7 +116,7 @@ def _shift(next_states: np.ndarray, actions: np.ndarray, start: tuple | None, ph
     return Trajectory(states, actions, next_states[-1], physics, _step_error(states, actions, next_states, physics))
 
 
-def _state_before(next_state: np.ndarray, action: np.ndarray, physics: Physics) -> np.ndarray:
+def _state_before(next_state: Array, action: Array, physics: Physics) -> Array:
     """The state `(6,)` before the first row; of the possible spins the slowest, since an episode starts at rest."""
     position, velocity = undo_linear(next_state[:2], next_state[3:5], action, physics)
     angles, spins = undo_angular(next_state[2], next_state[5], action, physics)
@@ -123,7 +124,7 @@ def _state_before(next_state: np.ndarray, action: np.ndarray, physics: Physics) 
     return np.array((*position, angles[slowest] % (2 * np.pi), *velocity, spins[slowest]))
 
 
-def _step_error(states: np.ndarray, actions: np.ndarray, next_states: np.ndarray, physics: Physics) -> float:
+def _step_error(states: Array, actions: Array, next_states: Array, physics: Physics) -> float:
     position, velocity = step_linear(states[:, :2], states[:, 3:5], actions, physics)
     theta, omega = step_angular(states[:, 2], states[:, 5], actions, physics)
     turn = (theta - next_states[:, 2] + np.pi) % (2 * np.pi) - np.pi
@@ -131,7 +132,7 @@ def _step_error(states: np.ndarray, actions: np.ndarray, next_states: np.ndarray
     return max(float(np.abs(difference).max()) for difference in differences)
 
 
-def _difference(file_map: MapConfig, config: MapConfig, first: np.ndarray) -> str:
+def _difference(file_map: MapConfig, config: MapConfig, first: Array) -> str:
     if file_map.goal != config.goal:
         return f"its goal is {file_map.goal}"
     if file_map.obstacles != config.obstacles:

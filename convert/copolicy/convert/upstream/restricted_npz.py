@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.file_kinds import describe_path
 
@@ -16,7 +17,7 @@ _LARGEST = 256 << 20  # bytes of all arrays of a file; an episode needs less tha
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
-def load_npz(path: Path) -> dict[str, np.ndarray]:
+def load_npz(path: Path) -> dict[str, Array]:
     """Reads the arrays of an .npz file; object arrays may hold plain Python values and NumPy arrays only.
 
     Raises:
@@ -42,7 +43,7 @@ def load_npz(path: Path) -> dict[str, np.ndarray]:
         raise FileFormatError(path, "an .npz file", description) from None
 
 
-def _load_npy(data: bytes, path: Path) -> np.ndarray:
+def _load_npy(data: bytes, path: Path) -> Array:
     stream = io.BytesIO(data)
     version = np.lib.format.read_magic(stream)
     if version not in _HEADERS:

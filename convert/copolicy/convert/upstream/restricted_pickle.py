@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError
 
 _NUMBERS = frozenset(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8)) | {"f2", "f4", "f8", "b1"}
@@ -67,7 +68,7 @@ class _Array:
     def __setstate__(self, state):
         self.state = state
 
-    def to_numpy(self) -> np.ndarray:
+    def to_numpy(self) -> Array:
         if self.state is None:
             raise pickle.UnpicklingError("an array without content")
         _, shape, dtype, by_column, content = self.state

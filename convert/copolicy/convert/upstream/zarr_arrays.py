@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.files.file_kinds import describe_path
 
@@ -62,7 +63,7 @@ class ZarrArrays:
                 raise FileFormatError(path, f"one zipped Zarr store with an array {array}", found)
             self._prefix = prefixes.pop()
 
-    def read(self, array: str) -> np.ndarray:
+    def read(self, array: str) -> Array:
         """Reads an array by its path in the store.
 
         Raises:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.tasks.table.dynamics import step_angular, step_linear, undo_angular, undo_linear
@@ -95,20 +96,20 @@ class ZarrStore:
         return build_episode(trajectory, finding.config, content, ZARR_HZ, origin, flags, notes)
 
 
-def advance_one_step(states: np.ndarray, actions: np.ndarray, physics: Physics) -> np.ndarray:
+def advance_one_step(states: Array, actions: Array, physics: Physics) -> Array:
     """States `(T, 7)` after one step of 1/30 s with `actions` from `states`, as in the rows of a store."""
     position, velocity = step_linear(states[:, :2], states[:, 4:6], actions, physics)
     theta, omega = step_angular(theta_of(states), states[:, 6], actions, physics)
     return states_7(np.column_stack((position, theta, velocity, omega)))
 
 
-def _whole_numbers(ends: np.ndarray, path: Path) -> np.ndarray:
+def _whole_numbers(ends: Array, path: Path) -> Array:
     if ends.dtype.kind == "f" and not (np.abs(ends) < 1 << 53).all():
         raise FileFormatError(path / "meta" / "episode_ends", "row numbers", "other values")
     return ends.astype(int).ravel()
 
 
-def _states_before(obs: np.ndarray, actions: np.ndarray, past: np.ndarray, physics: Physics) -> Trajectory:
+def _states_before(obs: Array, actions: Array, past: Array, physics: Physics) -> Trajectory:
     """Computes the states before each row's action from the rows `(T, 18)` after it."""
     theta, omega = np.arctan2(obs[:, 3], obs[:, 2]), obs[:, 6]
     position, velocity = undo_linear(obs[:, :2], obs[:, 4:6], actions, physics)

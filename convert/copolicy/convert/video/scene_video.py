@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.features import SCENE_IMAGE, SCENE_SIDES
 
@@ -51,7 +52,7 @@ class SceneClip:
 
     mp4: bytes
     size: VideoSize
-    statistics: dict[str, np.ndarray]
+    statistics: dict[str, Array]
 
 
 def parse_size(text: str) -> VideoSize:
@@ -82,7 +83,7 @@ def scene_feature(size: VideoSize) -> dict:
     return {"dtype": "video", "shape": (size[1], size[0], 3), "names": ["height", "width", "channels"]}
 
 
-def scene_clip(images: Iterable[np.ndarray], fps: int, size: VideoSize) -> SceneClip:
+def scene_clip(images: Iterable[Array], fps: int, size: VideoSize) -> SceneClip:
     """Encodes the images of an episode, `(height, width, 3)` uint8 each; one is in memory at a time.
 
     Raises:
@@ -113,7 +114,7 @@ def scene_clip(images: Iterable[np.ndarray], fps: int, size: VideoSize) -> Scene
     return SceneClip(buffer.getvalue(), size, _statistics(levels, count))
 
 
-def _yuv420(image: np.ndarray) -> np.ndarray:
+def _yuv420(image: Array) -> Array:
     """Converts an image to its YUV 4:2:0 planes by BT.601, `(height * 3 / 2, width)`: one chroma value per 2 x 2 px."""
     height, width, _ = image.shape
     colours = np.ascontiguousarray(image.transpose(2, 0, 1)).astype(np.int32)
@@ -124,13 +125,13 @@ def _yuv420(image: np.ndarray) -> np.ndarray:
     return np.concatenate([plane.ravel() for plane in planes]).astype(np.uint8).reshape(height * 3 // 2, width)
 
 
-def _weighted_sum(colours: np.ndarray, weights: tuple[int, int, int], bits: int) -> np.ndarray:
+def _weighted_sum(colours: Array, weights: tuple[int, int, int], bits: int) -> Array:
     """Weighted sum of red, green and blue `(3, h, w)`, divided by `2 ** bits` and rounded: `(h, w)`."""
     red, green, blue = (weight * colour for weight, colour in zip(weights, colours, strict=True))
     return (red + green + blue + (1 << bits - 1)) >> bits
 
 
-def _statistics(levels: np.ndarray, frames: int) -> dict[str, np.ndarray]:
+def _statistics(levels: Array, frames: int) -> dict[str, Array]:
     """Exact statistics of the sampled pixels from the histogram of their levels, `(3, 256)`."""
     values = np.arange(_LEVELS) / (_LEVELS - 1)
     proportion = levels / levels.sum(axis=1, keepdims=True)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.stats import chi2_contingency, chisquare
 
+from ..arrays import Array
 from ..scenarios import base_name
 from ..task import PairTask
 from ..task_parts import Rule
@@ -68,7 +69,7 @@ def _counts_by_set(data: EpisodeData) -> dict[str, Counter[str]]:
     return counts
 
 
-def _base_maps(data: EpisodeData) -> np.ndarray:
+def _base_maps(data: EpisodeData) -> Array:
     return np.array([base_name(name) for name in data.columns["map_id"].tolist()], str)
 
 

@@ -58,7 +58,6 @@ def read_data(root: Path) -> EpisodeData:
 
     Raises:
         FileFormatError: the folder is neither, or its task is not installed.
-        MissingExtraError: a LeRobot data set, and pyarrow is not installed.
     """
     if (root / INFO_FILE).is_file():
         from .read_lerobot import read_lerobot
@@ -80,7 +79,6 @@ def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
 
     Raises:
         FileFormatError: a folder is neither a data set nor recordings, or its task is not installed.
-        MissingExtraError: a LeRobot data set, and pyarrow is not installed.
     """
     result = check_data(read_data(root))
     return result if against is None else add_leaks(result, root, against)

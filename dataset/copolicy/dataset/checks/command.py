@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..exceptions import InvalidValueError
 from ..files.meta_files import CHECK_FILE
 from ..files.staging import replace_json
@@ -23,11 +22,10 @@ _EXAMPLE = """copolicy-dataset check recordings/session-1
 _SHOWN = ("kind", "episodes", "frames", "rules", "not_applied", "counts")
 
 
-def add_check_command(commands: argparse._SubParsersAction) -> None:
+def add_check_command(commands: Commands) -> None:
     """Adds `check`."""
     parser = add_command(
         commands, "check", _check, "check recordings or a data set against rules; changes no data", _EXAMPLE,
-        _needs,
     )  # fmt: skip
     parser.add_argument(
         "path", nargs="?", metavar="PATH", help="folder of recordings, data set, or USER/NAME on the Hub"
@@ -45,11 +43,6 @@ def add_check_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--task", default=TABLE, metavar="NAME", help="task whose rules --rules prints (default: %(default)s)"
     )
-
-
-def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
-    paths = [] if arguments.rules else [arguments.path, arguments.against]
-    return TABLES if any(path is not None and Path(path, "meta").is_dir() for path in paths) else ()
 
 
 def _check(arguments: argparse.Namespace) -> dict:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..features import ACTION
 from ..task import PairTask, get_task
 from .finding import Figure, Finding, Severity
@@ -41,11 +42,11 @@ class EpisodeData:
     kind: str
     fps: float
     labels: tuple[str, ...]
-    columns: dict[str, np.ndarray]
-    frames: dict[str, np.ndarray]
-    framed: np.ndarray
-    starts: np.ndarray
-    final_states: np.ndarray | None = None
+    columns: dict[str, Array]
+    frames: dict[str, Array]
+    framed: Array
+    starts: Array
+    final_states: Array | None = None
     info: dict[str, Any] = field(default_factory=dict)
     files: dict[str, tuple[str, int]] = field(default_factory=dict)
     damage: tuple[Finding, ...] = ()
@@ -59,36 +60,36 @@ class EpisodeData:
         return len(next(iter(self.frames.values()))) if self.frames else 0
 
     @property
-    def counts(self) -> np.ndarray:
+    def counts(self) -> Array:
         """`(F,)` number of frames of each episode."""
         return np.diff(np.append(self.starts, self.frame_count))
 
     @property
-    def ends(self) -> np.ndarray:
+    def ends(self) -> Array:
         """`(F,)` last frame of each episode."""
         return self.starts + self.counts - 1
 
-    def framed_column(self, column: str) -> np.ndarray:
+    def framed_column(self, column: str) -> Array:
         """`(F,)` an episode column, for the episodes with frames."""
         return self.columns[column][self.framed]
 
-    def proportion(self, marks: np.ndarray) -> np.ndarray:
+    def proportion(self, marks: Array) -> Array:
         """`(F,)` proportion of each episode's frames that a mask `(N,)` selects."""
         return np.add.reduceat(marks.astype(np.int64), self.starts) / self.counts
 
-    def count(self, marks: np.ndarray) -> np.ndarray:
+    def count(self, marks: Array) -> Array:
         """`(F,)` number of each episode's frames that a mask `(N,)` selects."""
         return np.add.reduceat(marks.astype(int), self.starts)
 
-    def maximum(self, values: np.ndarray) -> np.ndarray:
+    def maximum(self, values: Array) -> Array:
         """`(F,)` maximum of `(N,)` values in each episode."""
         return np.maximum.reduceat(values, self.starts)
 
-    def player_force(self, player: int) -> np.ndarray:
+    def player_force(self, player: int) -> Array:
         """`(N, m)` a player's action in units of its full force."""
         return np.split(self.task.spec.full_forces(self.frames[ACTION]), 2, axis=1)[player]
 
-    def longest_run(self, marks: np.ndarray) -> np.ndarray:
+    def longest_run(self, marks: Array) -> Array:
         """`(F,)` length of the longest run of a mask `(N,)` in each episode, frames."""
         order = np.arange(len(marks))
         # The last frame up to each frame that is not part of a run.
@@ -96,7 +97,7 @@ class EpisodeData:
         last_break[self.starts] = np.where(marks[self.starts], self.starts - 1, self.starts)
         return np.maximum.reduceat(order - np.maximum.accumulate(last_break), self.starts)
 
-    def changes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def changes(self, values: Array) -> tuple[Array, Array]:
         """Differences `(M, ...)` of successive frames of an episode, and the index of the later frame `(M,)`."""
         inside = np.ones(len(values), bool)
         inside[self.starts] = False
@@ -108,7 +109,7 @@ class EpisodeData:
         return limits_of(self.task)[name].value
 
     def findings(
-        self, rule: str, mask: np.ndarray, figures: np.ndarray, limit: Figure, message: str,
+        self, rule: str, mask: Array, figures: Array, limit: Figure, message: str,
         severity: Severity = "error",
     ) -> Iterator[Finding]:  # fmt: skip
         """A finding for every episode that a mask `(E,)` or `(F,)` selects, with its entry of `figures`."""
@@ -118,12 +119,12 @@ class EpisodeData:
             figure = value.item() if isinstance(value, np.generic) else value
             yield Finding(self.labels[indices[index]], rule, figure, limit, severity, message)
 
-    def over_limit(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
+    def over_limit(self, rule: str, figures: Array, message: str) -> Iterator[Finding]:
         """An error for every episode whose figure `(E,)` or `(F,)` is above the limit of the rule, or NaN."""
         limit = self.limit(rule)
         return self.findings(rule, ~(figures <= limit), figures, limit, message)
 
-    def graded(self, rule: str, figures: np.ndarray, message: str) -> Iterator[Finding]:
+    def graded(self, rule: str, figures: Array, message: str) -> Iterator[Finding]:
         """Errors for figures above the limit `RULE.error`, warnings for those above `RULE.warning`."""
         warning, error = self.limit(f"{rule}.warning"), self.limit(f"{rule}.error")
         yield from self.findings(rule, figures > error, figures, error, message)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import CopolicyError
 from ..features import ENVIRONMENT_STATE, STATE
 from ..scenarios import base_name
@@ -83,7 +84,7 @@ def _start(data: EpisodeData) -> Iterator[Finding]:
     yield from data.over_limit("map_start", distances, "the episode begins at this distance from its map's start")
 
 
-def _scenarios(data: EpisodeData) -> np.ndarray:
+def _scenarios(data: EpisodeData) -> Array:
     return data.frames[ENVIRONMENT_STATE][data.starts].astype(float)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import CopolicyError
 from ..features import features_of
 from ..task_parts import Rule
@@ -48,7 +49,7 @@ def _statistics(data: EpisodeData) -> Iterator[Finding]:
             yield from _compare(data, name, stored[name], rows)
 
 
-def _compare(data: EpisodeData, name: str, stored: Mapping[str, Any], rows: np.ndarray) -> Iterator[Finding]:
+def _compare(data: EpisodeData, name: str, stored: Mapping[str, Any], rows: Array) -> Iterator[Finding]:
     from ..lerobot_folder.loading import STATISTICS, number_array
 
     warning, error = (data.limit(f"frame_statistics.{grade}") for grade in ("warning", "error"))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, STATE, VECTORS, features_of
@@ -38,7 +39,7 @@ def read_lerobot(root: Path) -> EpisodeData:
     columns = {name: values[order] for name, values in columns.items()}
     labels = tuple(str(index) for index in columns["episode_index"])
     data, episodes_of_files = _concatenated(root, "data", damage)
-    frames: dict[str, np.ndarray] = {}
+    frames: dict[str, Array] = {}
     files: dict[str, tuple[str, int]] = {}
     if data is not None:
         files = {column.name: _type_and_width(column.type) for column in data.schema}
@@ -65,14 +66,14 @@ def _require_task(root: Path, info: dict[str, Any], files: dict[str, tuple[str, 
         raise FileFormatError(root / INFO_FILE, f"a data set of {spec.title} (copolicy-convert)", difference)
 
 
-def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dict[str, np.ndarray]:
+def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dict[str, Array]:
     """The valid columns of meta/episodes; problems of the others are added to `damage`.
 
     Raises:
         FileFormatError: `episode_index` or `length` is missing, or has an invalid value.
     """
     path = root / EPISODES_FOLDER
-    columns: dict[str, np.ndarray] = {}
+    columns: dict[str, Array] = {}
     for name in (*POSITIONS, *EPISODE_COLUMNS):
         if name not in meta.column_names:
             if name in POSITIONS[:2]:
@@ -105,9 +106,9 @@ def _episode_columns(root: Path, meta: "pa.Table", damage: list[Finding]) -> dic
     return columns
 
 
-def _frame_columns(data: "pa.Table", features: dict[str, dict], damage: list[Finding]) -> dict[str, np.ndarray]:
+def _frame_columns(data: "pa.Table", features: dict[str, dict], damage: list[Finding]) -> dict[str, Array]:
     """The frame columns with a number in every row; problems of the others are added to `damage`."""
-    frames: dict[str, np.ndarray] = {}
+    frames: dict[str, Array] = {}
     needed = (*features, *CLOCK)
     for name in data.column_names:
         try:
@@ -182,8 +183,8 @@ def _type_and_width(kind: "pa.DataType") -> tuple[str, int]:
 
 
 def _complete_episodes(
-    frames: dict[str, np.ndarray], columns: dict[str, np.ndarray], labels: tuple[str, ...], damage: list[Finding]
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    frames: dict[str, Array], columns: dict[str, Array], labels: tuple[str, ...], damage: list[Finding]
+) -> tuple[dict[str, Array], Array, Array]:
     """The frames of the episodes with the right number of rows, in episode order; other episodes become findings."""
     empty = np.array([], np.int64)
     numbers = frames.get("episode_index")

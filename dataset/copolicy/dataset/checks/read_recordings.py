@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Array
 from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, ForeignRecordingError
@@ -72,7 +73,7 @@ def data_of_recordings(
         name: np.array([getattr(episode.meta, name) for episode in episodes], COLUMN_TYPES[type_name])
         for name, type_name in EPISODE_COLUMNS.items()
     }
-    frames: dict[str, np.ndarray] = {}
+    frames: dict[str, Array] = {}
     final_states = None
     if episodes:
         scenarios = np.array([task.scenario_vector(episode.scenario) for episode in episodes])

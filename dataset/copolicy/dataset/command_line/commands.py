@@ -20,6 +20,9 @@ from .extras import missing_extra_error, require_packages
 DISTRIBUTION = "lerobot_policy_copolicy"
 """Name of the installed distribution."""
 
+type Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
+"""Where the commands of a script are added."""
+
 Handler = Callable[[argparse.Namespace], dict]
 """Runs a command: takes the parsed flags, returns a summary that JSON can store."""
 
@@ -27,7 +30,7 @@ Needs = Sequence[str] | Callable[[argparse.Namespace], Sequence[str]]
 """Packages of extras that a command imports (see `extras`), or a function that lists them for the parsed flags."""
 
 
-def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, Commands]:
     """Returns the parser of a room's script and the object that its commands are added to."""
     parser = argparse.ArgumentParser(prog=prog, description=description)
     add_version_flag(parser)
@@ -40,8 +43,8 @@ def add_version_flag(parser: argparse.ArgumentParser) -> None:
 
 
 def add_command(
-    commands: argparse._SubParsersAction, name: str, handler: Handler, help: str, example: str, needs: Needs = ()
-):
+    commands: Commands, name: str, handler: Handler, help: str, example: str, needs: Needs = ()
+) -> argparse.ArgumentParser:
     """Adds a command with `--json`, `--debug` and an example at the end of its `--help`.
 
     Args:
@@ -59,9 +62,7 @@ def add_command(
     return parser
 
 
-def add_group(
-    commands: argparse._SubParsersAction, name: str, help: str, description: str, examples: Sequence[str]
-) -> argparse._SubParsersAction:
+def add_group(commands: Commands, name: str, help: str, description: str, examples: Sequence[str]) -> Commands:
     """Adds a command with sub-commands; `add_command` adds them to the returned object."""
     parser = commands.add_parser(
         name,
@@ -150,7 +151,7 @@ def progress[Item](items: Iterable[Item], total: int | None, label: str) -> Iter
             bar.update()
 
 
-def progress_bar(total: int | None, label: str) -> tqdm:
+def progress_bar(total: int | None, label: str) -> "tqdm[Any]":
     """A progress bar on stderr, shown if stderr is a terminal or `COPOLICY_PROGRESS=1`."""
     shown = sys.stderr.isatty() or os.environ.get("COPOLICY_PROGRESS") == "1"
     return tqdm(total=total, desc=label, disable=not shown, file=sys.stderr, mininterval=0.5)

@@ -5,8 +5,8 @@ from importlib.util import find_spec
 from ..exceptions import MissingExtraError
 
 _TRAIN = (
-    "accelerate", "av", "datasets", "diffusers", "diptest", "gymnasium", "h5py", "httpx", "huggingface_hub", "lerobot",
-    "matplotlib", "numcodecs", "pandas", "PIL", "pyarrow", "safetensors", "sklearn", "torch", "zarr",
+    "accelerate", "av", "datasets", "diffusers", "gymnasium", "h5py", "lerobot", "matplotlib", "numcodecs", "pandas",
+    "PIL", "safetensors", "torch", "zarr",
 )  # fmt: skip
 EXTRAS = {
     **dict.fromkeys(_TRAIN, "train"),
@@ -18,23 +18,19 @@ EXTRAS = {
 }
 """Name of the extra by import name of a package."""
 
-DISTRIBUTIONS = {"PIL": "Pillow", "sklearn": "scikit-learn"}
+DISTRIBUTIONS = {"PIL": "Pillow"}
 """Distribution name by import name, where they differ."""
 
-TABLES = ("pyarrow",)
-"""Packages to read and write LeRobot data sets."""
-DATASETS = ("pyarrow", "lerobot", "datasets")
+DATASETS = ("lerobot", "datasets")
 """Packages to create data sets through LeRobot."""
 POLICIES = ("torch", "lerobot", "diffusers")
 """Packages to load a policy."""
-TRAINING = ("lerobot", "torch", "accelerate", "diffusers", "datasets", "pyarrow")
+TRAINING = ("lerobot", "torch", "accelerate", "diffusers", "datasets")
 """Packages of LeRobot's trainer."""
 FIGURES = ("matplotlib",)
 """Packages to draw figures."""
 BACKEND_PACKAGES = {"onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}
 """Packages by inference backend, beside torch."""
-HUB = ("huggingface_hub", "httpx")
-"""Packages of the Hub's client."""
 
 
 def require_packages(*packages: str) -> None:

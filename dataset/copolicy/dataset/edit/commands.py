@@ -3,21 +3,19 @@
 import argparse
 from pathlib import Path
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..command_line.flag_numbers import seed
 from ..exceptions import InvalidValueError
 
 _ROOT = "folder of a LeRobot data set"
 
 
-def add_select_command(commands: argparse._SubParsersAction) -> None:
+def add_select_command(commands: Commands) -> None:
     """Adds `select`."""
     parser = add_command(
         commands, "select", _select, "copy selected episodes to a new data set",
         "copolicy-dataset select datasets/table --out datasets/short --pair-ids P03 P07 "
         "--where 'duration_s < 20 and source == \"human\"'",
-        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="new folder; must not exist")
@@ -25,13 +23,12 @@ def add_select_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--drop-excluded", action="store_true", help="leave out discarded and excluded episodes")
 
 
-def add_split_command(commands: argparse._SubParsersAction) -> None:
+def add_split_command(commands: Commands) -> None:
     """Adds `split`."""
     parser = add_command(
         commands, "split", _split, "split a data set into parts that share no person or no map",
         "copolicy-dataset split datasets/table --out datasets/parts --parts train=0.8 valid=0.1 test=0.1\n"
         "  copolicy-dataset split datasets/table --out datasets/parts --by pairs --parts test=P03,P07 train=rest",
-        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="new folder of parts; must not exist")
@@ -55,27 +52,25 @@ def add_split_command(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
 
 
-def add_withdraw_command(commands: argparse._SubParsersAction) -> None:
+def add_withdraw_command(commands: Commands) -> None:
     """Adds `withdraw`."""
     parser = add_command(
         commands, "withdraw", _withdraw, "delete all episodes of a consent id from recordings and data sets",
         "copolicy-dataset withdraw C-17 recordings datasets/table        (lists what would be deleted)\n"
         "  copolicy-dataset withdraw C-17 recordings datasets/table --yes",
-        lambda arguments: TABLES if any((path / "meta").is_dir() for path in arguments.paths) else (),
     )  # fmt: skip
     parser.add_argument("consent", metavar="CONSENT_ID", help="one consent id")
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="folders of recordings and data sets")
     parser.add_argument("--yes", action="store_true", help="delete; without this flag nothing is changed")
 
 
-def add_amend_command(commands: argparse._SubParsersAction) -> None:
+def add_amend_command(commands: Commands) -> None:
     """Adds `amend`."""
     parser = add_command(
         commands, "amend", _amend, "correct declared episode columns in place, or restore lost ones",
         "copolicy-dataset amend datasets/table --set license=cc-by-4.0\n"
         "  copolicy-dataset amend datasets/table --set consent_id=C-12 --episode-ids 3-5\n"
         "  copolicy-dataset amend datasets/table --restore-from recordings",
-        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
     mode = parser.add_mutually_exclusive_group(required=True)

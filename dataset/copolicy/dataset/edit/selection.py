@@ -38,7 +38,7 @@ class Selection:
     where: str = ""
     drop_excluded: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         reasons = (reason for name in installed_tasks() for reason in get_task(name).spec.reasons)
         results = ("success", "failure", *dict.fromkeys(reasons), *GENERIC_REASONS) if self.results else ()
         for name, values, choices in (

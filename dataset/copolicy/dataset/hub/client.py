@@ -4,21 +4,18 @@ import contextlib
 import logging
 from collections.abc import Iterator
 
-from ..exceptions import CopolicyError, MissingExtraError, RunError
-from ..files.staging import disk_error_number, error_chain
+import httpx
+from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi, get_token, snapshot_download
+from huggingface_hub.errors import (
+    HfHubHTTPError,
+    LocalTokenNotFoundError,
+    OfflineModeIsEnabled,
+    RemoteEntryNotFoundError,
+    RepositoryNotFoundError,
+)
 
-try:
-    import httpx
-    from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi, get_token, snapshot_download
-    from huggingface_hub.errors import (
-        HfHubHTTPError,
-        LocalTokenNotFoundError,
-        OfflineModeIsEnabled,
-        RemoteEntryNotFoundError,
-        RepositoryNotFoundError,
-    )
-except ModuleNotFoundError as error:
-    raise MissingExtraError((error.name or "huggingface_hub").split(".")[0]) from None
+from ..exceptions import CopolicyError, RunError
+from ..files.staging import disk_error_number, error_chain
 
 __all__ = [
     "CommitOperationAdd",

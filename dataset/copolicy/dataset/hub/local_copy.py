@@ -20,7 +20,6 @@ def local_copy(path: str, revision: str | None = None, names: tuple[str, str] = 
         FileFormatError: no such folder, and not a valid name on the Hub.
         InvalidValueError: a revision of a local folder, or of an invalid name.
         HubError: the Hub does not answer, or has no such data set or revision.
-        MissingExtraError: the Hub's client is not installed.
     """
     folder = Path(path)
     if folder.exists():

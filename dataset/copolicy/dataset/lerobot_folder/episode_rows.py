@@ -22,7 +22,6 @@ def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Tab
 
     Raises:
         FileFormatError: no LeRobot data set, a damaged file, or a missing column.
-        MissingExtraError: pyarrow is not installed.
     """
     from .folder import LeRobotFolder
     from .tables import read_parquet

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..exceptions import InvalidValueError
 from .episode_rows import episode_tables, select_episodes, with_column, write_tables
 
@@ -110,12 +109,11 @@ def include(root: Path, episodes: Sequence[str]) -> dict[str, list[int]]:
     return {"included": sorted(changed), "not_excluded": sorted(not_excluded)}
 
 
-def add_exclude_command(commands: argparse._SubParsersAction) -> None:
+def add_exclude_command(commands: Commands) -> None:
     """Adds `exclude`."""
     parser = add_command(
         commands, "exclude", _exclude, "exclude episodes from training by a flag; no episode is removed",
         'copolicy-dataset exclude datasets/table --episode-ids 12 30-33 --reason "joystick of player 1 unplugged"',
-        TABLES,
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
     parser.add_argument(

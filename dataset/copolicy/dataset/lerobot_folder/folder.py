@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, STATE, VECTORS, features_of
@@ -119,7 +120,7 @@ class LeRobotFolder:
                 values[name] = [UNKNOWN_VALUES[name]] * self.episodes.num_rows
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
-    def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, Array]]]:
         """Yields number and columns of each episode in order, `(T, n)` or `(T,)` each; reads one file at a time.
 
         Rows are sorted by their `index`, whatever their order in the files.
@@ -144,7 +145,7 @@ class LeRobotFolder:
         if missing := next(expected_entries, None):
             raise FileFormatError(self.root / "data", f"the frames of episode {missing[0]}", "none")
 
-    def _episode_runs(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, Path, dict[str, np.ndarray]]]:
+    def _episode_runs(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, Path, dict[str, Array]]]:
         """Yields number, file and columns of consecutive rows of one episode, sorted by `index`."""
         shapes = {"index": (1,), **shapes}
         for path in sorted(data_files(self.root), key=_first_index):
@@ -222,7 +223,7 @@ def task_mismatch(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION
     return ""
 
 
-def _numbering_error(numbers: np.ndarray) -> str:
+def _numbering_error(numbers: Array) -> str:
     repeated = numbers[1:][np.diff(numbers) == 0]
     if len(repeated):
         return f"episode {repeated[0]} twice"

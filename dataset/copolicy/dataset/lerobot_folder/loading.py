@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import CopolicyError, FileFormatError
 from ..files.json_file import read_json
 from ..files.listing import visible_files
@@ -229,7 +230,7 @@ def read_frame_statistics(root: Path) -> dict[str, dict[str, Any]]:
     return read_json(root / STATS_FILE, dict[str, dict[str, Any]], "statistics of the frames")
 
 
-def number_array(value: Any, width: int | None, finite: bool = True) -> np.ndarray | None:
+def number_array(value: Any, width: int | None, finite: bool = True) -> Array | None:
     """Converts a JSON value to a flat array of numbers; None if they are not finite or not `width` many."""
     if isinstance(value, str | bool) or value is None:
         return None
@@ -247,7 +248,7 @@ def _is_flat(column_type: pa.DataType) -> bool:
     return not (pa.types.is_list(column_type) and pa.types.is_nested(column_type.value_type))
 
 
-def _whole_numbers(table: pa.Table, name: str, path: Path) -> np.ndarray:
+def _whole_numbers(table: pa.Table, name: str, path: Path) -> Array:
     try:
         return scalars(table.column(name), "int")
     except ColumnError as error:

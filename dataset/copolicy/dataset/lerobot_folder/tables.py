@@ -6,15 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
-from ..exceptions import FileFormatError, MissingExtraError
-
-try:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
+from ..arrays import Array
+from ..exceptions import FileFormatError
 
 DAMAGED = (pa.ArrowException, OSError, ValueError)
 """Exceptions that pyarrow raises for an incomplete Parquet file."""
@@ -97,7 +94,7 @@ def is_list(column_type: pa.DataType) -> bool:
     return any(test(column_type) for test in _LISTS)
 
 
-def scalars(column: pa.ChunkedArray, type_name: str, unknown: Any = None) -> np.ndarray:
+def scalars(column: pa.ChunkedArray, type_name: str, unknown: Any = None) -> Array:
     """Converts a column of single values to an array `(N,)`.
 
     Args:
@@ -131,7 +128,7 @@ def scalars(column: pa.ChunkedArray, type_name: str, unknown: Any = None) -> np.
     return array.astype(_DTYPES[type_name])
 
 
-def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
+def vectors(column: pa.ChunkedArray, width: int | None = None) -> Array:
     """Converts a column of numbers to an array `(N,)`, or of equally long lists of numbers to `(N, n)`.
 
     Args:
@@ -170,7 +167,7 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
     return array.reshape(rows, found_width) if listed else array
 
 
-def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path) -> np.ndarray:
+def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path) -> Array:
     """Numbers of a feature, `(N, n)`, or `(N,)` for one number per frame.
 
     Args:
@@ -219,7 +216,7 @@ def type_mismatch(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> 
     return ""
 
 
-def episode_values(table: pa.Table, name: str, type_name: str, path: Path, unknown: Any = None) -> np.ndarray:
+def episode_values(table: pa.Table, name: str, type_name: str, path: Path, unknown: Any = None) -> Array:
     """Converts an episode column to an array `(E,)`, see `scalars`.
 
     Raises:
@@ -252,7 +249,7 @@ def _has_type(column_type: pa.DataType, type_name: str) -> bool:
     return pa.types.is_integer(column_type) or pa.types.is_floating(column_type)
 
 
-def _lengths(values: Any) -> np.ndarray:
+def _lengths(values: Any) -> Array:
     if pa.types.is_fixed_size_list(values.type):
         return np.full(len(values), values.type.list_size)
     return values.value_lengths().to_numpy(zero_copy_only=False)

@@ -12,6 +12,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
+from ..arrays import Array
 from ..episode import Episode
 from ..exceptions import FileFormatError, ForeignRecordingError
 from ..settings_text import settings_text
@@ -197,7 +198,7 @@ class EpisodeBuilder:
         final_state = states[-1]
         return Episode(states[:-1], actions, final_state, meta, scenario, spec.record_hz, settings, notes, spec.name)
 
-    def _motion(self, expected: str | None) -> tuple[np.ndarray, np.ndarray]:
+    def _motion(self, expected: str | None) -> tuple[Array, Array]:
         """States `(T + 1, n)` and joint actions `(T, 2 m)`, sorted by step.
 
         Args:
@@ -225,7 +226,7 @@ class EpisodeBuilder:
         return self.task.states_of(recorded), joint
 
 
-def _first_gap(steps: np.ndarray, count: int) -> str:
+def _first_gap(steps: Array, count: int) -> str:
     if len(steps) != count:
         return f"{len(steps)} messages"
     index = int(np.flatnonzero(steps != np.arange(count))[0])

@@ -9,6 +9,7 @@ the neighbours: the variance is computed for several numbers of neighbours and e
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..arrays import Array
 from .estimate import Estimate
 from .resampling import Bootstrap, interval
 from .trajectories import Trajectories
@@ -60,7 +61,7 @@ def variance_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random
     }
 
 
-def _nearest_frames(scaled: np.ndarray, episode: np.ndarray, frames: np.ndarray, queries: np.ndarray) -> np.ndarray:
+def _nearest_frames(scaled: Array, episode: Array, frames: Array, queries: Array) -> Array:
     """`(Q, k)` nearest frame of each of the k nearest other episodes, for each query `(Q,)`; -1 if there are fewer."""
     count = NEIGHBOUR_COUNTS[-1]
     result = np.full((len(queries), count), -1)
@@ -82,7 +83,7 @@ def _nearest_frames(scaled: np.ndarray, episode: np.ndarray, frames: np.ndarray,
     return result
 
 
-def _first_per_episode(episodes: np.ndarray, own_episodes: np.ndarray) -> np.ndarray:
+def _first_per_episode(episodes: Array, own_episodes: Array) -> Array:
     """`(Q, k)` columns of `episodes` `(Q, k)` where an episode other than the own `(Q,)` comes first, padded with k."""
     order = np.argsort(episodes, axis=1, kind="stable")
     ordered = np.take_along_axis(episodes, order, axis=1)
@@ -91,13 +92,13 @@ def _first_per_episode(episodes: np.ndarray, own_episodes: np.ndarray) -> np.nda
     return np.sort(np.where(first, order, episodes.shape[1]), axis=1)
 
 
-def _variance(values: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+def _variance(values: Array, neighbours: Array) -> Array:
     """`(Q, n)` variance of each column of `(N, n)` among the neighbours `(Q, k)` of each query."""
     # Column by column, to save the memory of Q k n numbers.
     return np.column_stack([values[:, axis][neighbours].var(axis=1, ddof=1) for axis in range(values.shape[1])])
 
 
-def _at_zero_spread(variances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+def _at_zero_spread(variances: Array, spreads: Array) -> Array:
     """`(B,)` intercepts of linear fits of `(K, B)` variances over `(K, B)` spreads, at least 0."""
     deviations = spreads - spreads.mean(axis=0)
     squares = (deviations**2).sum(axis=0)
@@ -123,7 +124,7 @@ def _ratio(data: Trajectories, bootstrap: Bootstrap, variances, spreads, queries
     squares = data.per_episode((actions.astype(float) ** 2).sum(axis=1))
     sums_within = variances[:, :, columns].sum(axis=2)
 
-    def ratios(weights: np.ndarray) -> np.ndarray:
+    def ratios(weights: Array) -> Array:
         """`(1 + K, B)` ratio extrapolated to zero spread, and the ratio for each number of neighbours."""
         frames = weights @ data.lengths
         total = (weights @ squares) / frames - (((weights @ sums) / frames[:, None]) ** 2).sum(axis=1)

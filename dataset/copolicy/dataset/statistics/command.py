@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..command_line.flag_numbers import seed
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
@@ -13,11 +12,10 @@ from ..files.meta_files import STATISTICS_FILE
 from ..files.staging import replace_json
 
 
-def add_stats_command(commands: argparse._SubParsersAction) -> None:
+def add_stats_command(commands: Commands) -> None:
     """Adds `stats`."""
     summary_text = "compute statistics with intervals and null distributions, into meta/copolicy_stats.json"
-    needed = (*TABLES, "sklearn", "diptest")
-    parser = add_command(commands, "stats", _stats, summary_text, "copolicy-dataset stats datasets/table", needed)
+    parser = add_command(commands, "stats", _stats, summary_text, "copolicy-dataset stats datasets/table")
     parser.add_argument("path", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write to this file instead of into the data set")
     parser.add_argument("--seed", type=seed(), default=0, help="seed of all random draws (default: %(default)s)")

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.stats import false_discovery_control
 
+from ..arrays import Array
 from .estimate import Estimate, Null
 from .resampling import exchangeable, interval, permuted_within
 from .trajectories import Trajectories
@@ -42,7 +43,7 @@ def energy_statistics(data: Trajectories, rng: np.random.Generator) -> dict[str,
     }
 
 
-def episode_distances(data: Trajectories, chosen: np.ndarray) -> np.ndarray:
+def episode_distances(data: Trajectories, chosen: Array) -> Array:
     """`(E, E)` mean distances between the frames of two episodes, for evenly spaced frames of each episode.
 
     Frames of an episode are not independent; with these distances permutations and resamples draw whole episodes.
@@ -65,7 +66,7 @@ def episode_distances(data: Trajectories, chosen: np.ndarray) -> np.ndarray:
     return result
 
 
-def energy_coefficient(distances: np.ndarray, labels: np.ndarray, weights: np.ndarray | None = None) -> float:
+def energy_coefficient(distances: Array, labels: Array, weights: Array | None = None) -> float:
     """Energy coefficient of two groups; for several groups the mean over all two, weighted by their sizes' product.
 
     Args:
@@ -90,9 +91,7 @@ def energy_coefficient(distances: np.ndarray, labels: np.ndarray, weights: np.nd
     return float((energy * products)[upper].sum() / between) if between > 0 else 0.0
 
 
-def _estimate(
-    distances: np.ndarray, labels: np.ndarray, blocks: np.ndarray, description: str, rng: np.random.Generator
-) -> Estimate:
+def _estimate(distances: Array, labels: Array, blocks: Array, description: str, rng: np.random.Generator) -> Estimate:
     definition = f"{_DISTANCE} Between {description}."
     episodes = len(labels)
     if len(np.unique(labels)) < 2:
@@ -109,7 +108,7 @@ def _estimate(
 
 
 def _between_pairs(
-    distances: np.ndarray, pairs: np.ndarray, data: Trajectories, chosen: np.ndarray, rng: np.random.Generator
+    distances: Array, pairs: Array, data: Trajectories, chosen: Array, rng: np.random.Generator
 ) -> Estimate:
     strata = data.strata[chosen]
     estimate = _estimate(distances, pairs, strata, "pairs, the mean over each two by their episodes", rng)
@@ -136,7 +135,7 @@ def _between_pairs(
     return estimate
 
 
-def _earlier_later(pairs: np.ndarray) -> np.ndarray:
+def _earlier_later(pairs: Array) -> Array:
     """0 for the earlier half of each pair's episodes, 1 for the later."""
     labels = np.zeros(len(pairs), dtype=int)
     for pair in np.unique(pairs):
@@ -145,7 +144,7 @@ def _earlier_later(pairs: np.ndarray) -> np.ndarray:
     return labels
 
 
-def _bootstrap_weights(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _bootstrap_weights(labels: Array, rng: np.random.Generator) -> Array:
     weights = np.zeros(len(labels))
     for label in np.unique(labels):
         members = np.flatnonzero(labels == label)

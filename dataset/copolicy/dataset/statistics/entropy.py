@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from ..arrays import Array
 
-def entropy(counts: np.ndarray) -> np.ndarray:
+
+def entropy(counts: Array) -> Array:
     """Plug-in entropy of counts `(..., K)`, bits; 0 if all counts are 0."""
     counts = np.asarray(counts, dtype=float)
     total = counts.sum(axis=-1, keepdims=True)
@@ -12,7 +14,7 @@ def entropy(counts: np.ndarray) -> np.ndarray:
     return np.maximum(0.0, -(proportions * logs).sum(axis=-1))
 
 
-def miller_madow(counts: np.ndarray) -> np.ndarray:
+def miller_madow(counts: Array) -> Array:
     """Entropy of counts `(..., K)` plus Miller's correction (K_observed - 1) / (2 n ln 2), bits (Miller 1955)."""
     counts = np.asarray(counts, dtype=float)
     total = np.maximum(counts.sum(axis=-1), 1.0)
@@ -20,14 +22,14 @@ def miller_madow(counts: np.ndarray) -> np.ndarray:
     return entropy(counts) + (observed - 1) / (2 * total * np.log(2))
 
 
-def simpson(counts: np.ndarray) -> np.ndarray:
+def simpson(counts: Array) -> Array:
     """Probability that two draws differ, 1 - sum n (n - 1) / (N (N - 1)), of counts `(..., K)` (Simpson 1949)."""
     counts = np.asarray(counts, dtype=float)
     total = counts.sum(axis=-1)
     return 1 - (counts * (counts - 1)).sum(axis=-1) / np.maximum(total * (total - 1), 1.0)
 
 
-def jensen_shannon(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def jensen_shannon(first: Array, second: Array) -> Array:
     """Jensen-Shannon divergence of two distributions given as counts `(..., K)`, 0 to 1 bit (Lin 1991)."""
     p, q = (np.asarray(counts, dtype=float) for counts in (first, second))
     p = p / p.sum(axis=-1, keepdims=True)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
+
 _DIGITS = 6  # more would differ between machines
 
 
@@ -26,7 +28,7 @@ class Null:
     p: float
 
     @classmethod
-    def from_draws(cls, method: str, value: float, draws: np.ndarray, two_sided: bool = False) -> "Null":
+    def from_draws(cls, method: str, value: float, draws: Array, two_sided: bool = False) -> "Null":
         """From draws `(n,)` of the statistic under the null hypothesis; a one-sided test is for larger values."""
         centre = float(np.mean(draws))
         distance = np.abs(draws - centre) if two_sided else draws

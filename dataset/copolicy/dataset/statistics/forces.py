@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..arrays import Array
 from .estimate import Estimate, Null, left_out
 from .resampling import Bootstrap, circular_shift, interval
 from .trajectories import Trajectories
@@ -51,9 +52,7 @@ def _interaction(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate
     return {names[0]: mean, names[1]: Estimate(p95, unit, p95_definition, episodes, p95_bounds, bootstrap.resampled)}
 
 
-def opposed_work(
-    velocity: np.ndarray, forces: tuple[np.ndarray, np.ndarray], min_speed: float
-) -> tuple[np.ndarray, np.ndarray]:
+def opposed_work(velocity: Array, forces: tuple[Array, Array], min_speed: float) -> tuple[Array, Array]:
     """Frames in which one player's force has positive power and the other's negative power.
 
     Args:
@@ -97,7 +96,7 @@ def _conflict(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator
     return {name: Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null)}
 
 
-def _percentile_95(data: Trajectories, size: np.ndarray, bootstrap: Bootstrap) -> tuple[float, tuple[float, float]]:
+def _percentile_95(data: Trajectories, size: Array, bootstrap: Bootstrap) -> tuple[float, tuple[float, float]]:
     value = float(np.percentile(size, 95))
     # Bins of _BIN up to sqrt(2) full forces, or as many bins up to the maximum.
     bins = round(np.sqrt(2) / _BIN) + 1
@@ -133,7 +132,7 @@ def activity_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, E
     return estimates
 
 
-def longest_runs(flags: np.ndarray, starts: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def longest_runs(flags: Array, starts: Array, lengths: Array) -> Array:
     """`(E,)` length of the longest run of true flags `(N,)` in each episode, frames."""
     longest = np.zeros(len(starts), dtype=int)
     for index, (start, length) in enumerate(zip(starts.tolist(), lengths.tolist(), strict=True)):

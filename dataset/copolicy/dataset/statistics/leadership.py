@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Array
 from .estimate import Estimate, Null
 from .resampling import Bootstrap, circular_shift
 from .trajectories import Trajectories
@@ -22,7 +23,7 @@ _LEAD = (
 _NULL = f"player 1's actions circularly shifted in time within each episode by at least {MIN_SHIFT_S:g} s"
 
 
-def leaders(data: Trajectories, order: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def leaders(data: Trajectories, order: Array | None = None) -> tuple[Array, Array]:
     """Leader and episode of each window.
 
     Args:
@@ -91,7 +92,7 @@ def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     }
 
 
-def _per_episode(data: Trajectories, leader: np.ndarray, episode: np.ndarray) -> tuple[np.ndarray, ...]:
+def _per_episode(data: Trajectories, leader: Array, episode: Array) -> tuple[Array, ...]:
     """For each episode: windows that player 0 leads, windows with a leader, changes of leader, minutes of windows."""
     count = len(data.rows)
     leading = np.bincount(episode[leader > 0], minlength=count).astype(float)
@@ -104,13 +105,13 @@ def _per_episode(data: Trajectories, leader: np.ndarray, episode: np.ndarray) ->
     return leading, decided, switches, minutes
 
 
-def _centred(data: Trajectories, actions: np.ndarray) -> np.ndarray:
+def _centred(data: Trajectories, actions: Array) -> Array:
     """Actions `(N, m)` minus their mean over each episode."""
     sums = np.column_stack([data.per_episode(column) for column in actions.T])
     return actions - (sums / data.lengths[:, None])[data.episode].astype(actions.dtype)
 
 
-def _sum_rows(rows: np.ndarray) -> np.ndarray:
+def _sum_rows(rows: Array) -> Array:
     """Sum `(N,)` over the rows of `(m, N)`; faster than `sum` for few rows."""
     total = rows[0]
     for row in rows[1:]:
@@ -118,7 +119,7 @@ def _sum_rows(rows: np.ndarray) -> np.ndarray:
     return total
 
 
-def _window_sums(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
+def _window_sums(values: Array, starts: Array, window: int) -> Array:
     """Sums of `values` over the windows that begin at the frames `starts`."""
     total = np.concatenate(([0.0], np.cumsum(values, dtype=float)))
     return total[starts + window] - total[starts]

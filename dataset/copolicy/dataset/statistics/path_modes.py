@@ -9,6 +9,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.metrics import adjusted_rand_score
 from sklearn.mixture import GaussianMixture
 
+from ..arrays import Array
 from .estimate import Estimate, left_out
 from .trajectories import Trajectories
 
@@ -28,14 +29,14 @@ _SUBSAMPLE_FRACTION = 0.8
 _REPLICATES = 1000
 
 
-def resample_path(path: np.ndarray, points: int = POINTS) -> np.ndarray:
+def resample_path(path: Array, points: int = POINTS) -> Array:
     """`(points, 2)` points of a path `(T, 2)`, evenly spaced in arc length."""
     arc_length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))))
     positions = np.linspace(0, arc_length[-1], points)
     return np.column_stack([np.interp(positions, arc_length, path[:, axis]) for axis in range(2)])
 
 
-def count_modes(paths: np.ndarray, seed: int, resolution: float) -> tuple[int, np.ndarray]:
+def count_modes(paths: Array, seed: int, resolution: float) -> tuple[int, Array]:
     """Number of modes of the Gaussian mixture with the lowest BIC, and the mode of each path.
 
     Args:
@@ -62,7 +63,7 @@ def count_modes(paths: np.ndarray, seed: int, resolution: float) -> tuple[int, n
     return best[1], best[2]
 
 
-def _mixture_from(scores: np.ndarray, label: np.ndarray, seed: int, resolution: float) -> GaussianMixture:
+def _mixture_from(scores: Array, label: Array, seed: int, resolution: float) -> GaussianMixture:
     """A mixture initialised from clusters: with few episodes, random starts often end in a poor fit."""
     clusters = [scores[label == number] for number in np.unique(label)]
     variance = np.array([cluster.var(axis=0) for cluster in clusters]) + resolution**2

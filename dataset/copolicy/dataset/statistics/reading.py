@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from ..arrays import Array
 from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
@@ -37,7 +36,7 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     rows = folder.rows(_EPISODE_COLUMNS)
     split_of = _splits(info.get("splits") or {}, len(rows))
     left_out = {"discarded": 0, "other_source": 0, "empty": 0}
-    motions: list[tuple[np.ndarray, np.ndarray]] = []
+    motions: list[tuple[Array, Array]] = []
     episode_rows: list[EpisodeRow] = []
     for index, frames in _frames(folder):
         row = rows[index]
@@ -59,7 +58,7 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     }
 
 
-def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, Array]]]:
     total, actual = sum(folder.lengths), sum(row_count(path) for path in folder.data_files)
     if actual != total:
         raise FileFormatError(folder.root / "data", f"{total} frames with index 0, 1, ..., each once", f"{actual}")
@@ -67,7 +66,7 @@ def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, np.ndarray]]
     return folder.frames({name: features[name]["shape"] for name in (STATE, ACTION, ENVIRONMENT_STATE)})
 
 
-def _row(folder: LeRobotFolder, row: dict[str, Any], vector: np.ndarray, split: str) -> EpisodeRow:
+def _row(folder: LeRobotFolder, row: dict[str, Any], vector: Array, split: str) -> EpisodeRow:
     try:
         scenario = folder.task.scenario_of_vector(vector, row)
     except CopolicyError as error:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from .estimate import Estimate
 
 MIN_CLUSTERS = 5
@@ -21,7 +22,7 @@ class Bootstrap:
         resampled: `pairs` or `episodes`.
     """
 
-    def __init__(self, pairs: np.ndarray, replicates: int, rng: np.random.Generator):
+    def __init__(self, pairs: Array, replicates: int, rng: np.random.Generator):
         names, cluster = np.unique(pairs, return_inverse=True)
         self.resampled = "pairs" if len(names) >= MIN_CLUSTERS else "episodes"
         if self.resampled == "pairs":
@@ -31,7 +32,7 @@ class Bootstrap:
             count = len(cluster)
             self.weights = rng.multinomial(count, np.full(count, 1 / count), size=replicates).astype(np.float32)
 
-    def ratio(self, numerator: np.ndarray, denominator: np.ndarray) -> tuple[float | None, tuple[float, float] | None]:
+    def ratio(self, numerator: Array, denominator: Array) -> tuple[float | None, tuple[float, float] | None]:
         """Ratio of the sums of two values `(E,)` of the episodes, and its interval; None if the denominator is 0."""
         total = denominator.sum()
         if not total:
@@ -42,19 +43,19 @@ class Bootstrap:
         return value, interval(value, (self.weights[nonzero] @ numerator) / denominators[nonzero])
 
     def estimate(
-        self, numerator: np.ndarray, denominator: np.ndarray, unit: str, definition: str, episodes: int, **more: Any
+        self, numerator: Array, denominator: Array, unit: str, definition: str, episodes: int, **more: Any
     ) -> Estimate:
         """The ratio as an `Estimate`; `more` are further fields of `Estimate`."""
         value, bounds = self.ratio(numerator, denominator)
         return Estimate(value, unit, definition, episodes, bounds, self.resampled, **more)
 
-    def mean(self, values: np.ndarray) -> tuple[float | None, tuple[float, float] | None]:
+    def mean(self, values: Array) -> tuple[float | None, tuple[float, float] | None]:
         """Mean over the finite values `(E,)` of the episodes, and its interval."""
         finite = np.isfinite(values)
         return self.ratio(np.where(finite, values, 0.0), finite.astype(float))
 
 
-def interval(value: float, replicates: np.ndarray, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
+def interval(value: float, replicates: Array, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
     """95 percent interval from bootstrap replicates `(B,)`, shifted so that their mean equals the estimate.
 
     Entropies, divergences and explained variances of resamples are biased relative to those of the sample; without the
@@ -67,7 +68,7 @@ def interval(value: float, replicates: np.ndarray, low: float = -np.inf, high: f
     return float(min(lower, value)), float(max(upper, value))
 
 
-def permuted_within(labels: np.ndarray, strata: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def permuted_within(labels: Array, strata: Array, rng: np.random.Generator) -> Array:
     """`labels` `(E,)` shuffled among the episodes of each stratum."""
     order = np.argsort(strata, kind="stable")
     shuffled = np.lexsort((rng.random(len(labels)), strata))
@@ -76,7 +77,7 @@ def permuted_within(labels: np.ndarray, strata: np.ndarray, rng: np.random.Gener
     return result
 
 
-def drawn_within(groups: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def drawn_within(groups: Array, rng: np.random.Generator) -> Array:
     """`(E,)` multiplicity of each episode when the episodes of each group `(E,)` are resampled."""
     order = np.argsort(groups, kind="stable")
     sizes = np.bincount(groups)
@@ -85,13 +86,13 @@ def drawn_within(groups: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.bincount(order[draws], minlength=len(groups)).astype(float)
 
 
-def exchangeable(labels: np.ndarray, strata: np.ndarray) -> int:
+def exchangeable(labels: Array, strata: Array) -> int:
     """Number of episodes in strata with more than one label, whose labels `permuted_within` can exchange."""
     mixed = [stratum for stratum in np.unique(strata) if len(np.unique(labels[strata == stratum])) > 1]
     return int(np.isin(strata, mixed).sum())
 
 
-def circular_shift(starts: np.ndarray, lengths: np.ndarray, min_shift: int, rng: np.random.Generator) -> np.ndarray:
+def circular_shift(starts: Array, lengths: Array, min_shift: int, rng: np.random.Generator) -> Array:
     """Frame indices `(N,)` that shift each episode circularly in time by a random number of frames.
 
     Args:

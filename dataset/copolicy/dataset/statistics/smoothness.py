@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.signal import welch
 
+from ..arrays import Array
 from .estimate import Estimate, left_out
 from .resampling import Bootstrap
 from .trajectories import Trajectories
@@ -19,7 +20,7 @@ _SPARC_THRESHOLD = 0.05
 _SPARC_PADDING = 4
 
 
-def f95(action: np.ndarray, fps: float) -> float:
+def f95(action: Array, fps: float) -> float:
     """Frequency below which 95 percent of the power of an action `(T, m)` lies, Hz; NaN for a constant action.
 
     Welch's power spectral density (Hann window, mean removed, half overlap), summed over axes, interpolated.
@@ -34,7 +35,7 @@ def f95(action: np.ndarray, fps: float) -> float:
     return float(np.interp(_POWER_FRACTION * cumulative[-1], cumulative, edges))
 
 
-def sparc(speed: np.ndarray, fps: float) -> float:
+def sparc(speed: Array, fps: float) -> float:
     """Spectral arc length of a speed profile `(T,)`: 0 is smoothest; NaN without motion.
 
     Length of the normalised magnitude spectrum up to 10 Hz (or half the rate), between the first and last value of at
@@ -56,7 +57,7 @@ def sparc(speed: np.ndarray, fps: float) -> float:
     return -float(np.hypot(steps, np.diff(magnitude)).sum())
 
 
-def log_dimensionless_jerk(speed: np.ndarray, fps: float) -> float:
+def log_dimensionless_jerk(speed: Array, fps: float) -> float:
     """-ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2) of a speed profile `(T,)`; larger is smoother; NaN without motion.
 
     Source: see `sparc`. A minimum-jerk movement has -ln(204.8) = -5.32.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import RunError, ShapeError
 from ..task import PairTask, get_task
 
@@ -39,14 +40,14 @@ class Trajectories:
         task: task of the episodes.
     """
 
-    states: np.ndarray
-    actions: np.ndarray
-    lengths: np.ndarray
+    states: Array
+    actions: Array
+    lengths: Array
     rows: tuple[EpisodeRow, ...]
     fps: int
     task: PairTask = field(default_factory=get_task)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         frames, spec = int(self.lengths.sum()), self.task.spec
         for name, array, shape in (
             ("Trajectories.states", self.states, (frames, len(spec.state))),
@@ -59,7 +60,7 @@ class Trajectories:
     @classmethod
     def from_episodes(
         cls,
-        episodes: Sequence[tuple[np.ndarray, np.ndarray]],
+        episodes: Sequence[tuple[Array, Array]],
         rows: Sequence[EpisodeRow],
         fps: int,
         task: PairTask | None = None,
@@ -75,22 +76,22 @@ class Trajectories:
         )
 
     @cached_property
-    def ends(self) -> np.ndarray:
+    def ends(self) -> Array:
         """`(E,)` end (exclusive) of each episode's frames."""
         return np.cumsum(self.lengths)
 
     @cached_property
-    def starts(self) -> np.ndarray:
+    def starts(self) -> Array:
         """`(E,)` index of each episode's first frame."""
         return self.ends - self.lengths
 
     @cached_property
-    def episode(self) -> np.ndarray:
+    def episode(self) -> Array:
         """`(N,)` episode index of each frame."""
         return np.repeat(np.arange(len(self.rows)), self.lengths)
 
     @cached_property
-    def interaction(self) -> np.ndarray:
+    def interaction(self) -> Array:
         """`(N,)` interaction measure; for the table task in full forces, positive if the players pull apart.
 
         Raises:
@@ -107,12 +108,12 @@ class Trajectories:
         count = len(self.task.spec.action)
         return {1: "", 2: ", both axes"}.get(count, f", all {count} axes")
 
-    def player_force(self, player: int) -> np.ndarray:
+    def player_force(self, player: int) -> Array:
         """`(N, m)` a player's action in units of its full force."""
         return np.split(self.task.spec.full_forces(self.actions), 2, axis=1)[player].copy()
 
     @property
-    def velocity(self) -> np.ndarray:
+    def velocity(self) -> Array:
         """`(N, k)` velocity of the body; k is 0 if the task states none."""
         return self.states[:, list(self.task.statistics.velocity)]
 
@@ -126,12 +127,12 @@ class Trajectories:
         ]
 
     @cached_property
-    def pairs(self) -> np.ndarray:
+    def pairs(self) -> Array:
         """`(E,)` pair index of each episode; episodes without a `pair_id` form one pair."""
         return np.unique([row.pair_id for row in self.rows], return_inverse=True)[1]
 
     @cached_property
-    def configurations(self) -> np.ndarray:
+    def configurations(self) -> Array:
         """`(E,)` configuration of each episode: the name of its map, made unique if maps of one name differ."""
         names = [row.map_id or f"map-{row.scenario.digest}" for row in self.rows]
         layouts = [self.task.layout(row.scenario) for row in self.rows]
@@ -146,18 +147,18 @@ class Trajectories:
         )
 
     @cached_property
-    def strata(self) -> np.ndarray:
+    def strata(self) -> Array:
         """`(E,)` configuration index of each episode."""
         return np.unique(self.configurations, return_inverse=True)[1]
 
-    def groups(self, with_goal: bool) -> list[np.ndarray]:
+    def groups(self, with_goal: bool) -> list[Array]:
         """Episode indices of each group with the same layout, and with `with_goal` the same goal."""
         members: dict[Any, list[int]] = {}
         for index, row in enumerate(self.rows):
             members.setdefault(self.task.layout(row.scenario, with_goal), []).append(index)
         return [np.array(group) for _, group in sorted(members.items())]
 
-    def path(self, index: int) -> np.ndarray:
+    def path(self, index: int) -> Array:
         """`(T, 2)` positions of the tracked point in an episode; for the table task its centre, px."""
         path = self.task.path(self.states[self.starts[index] : self.ends[index]])
         if path is None:
@@ -165,7 +166,7 @@ class Trajectories:
         return path
 
     @cached_property
-    def points(self) -> np.ndarray:
+    def points(self) -> Array:
         """`(N, 2)` positions of the tracked point in all frames."""
         return np.concatenate([self.path(index) for index in range(len(self.rows))])
 
@@ -176,6 +177,6 @@ class Trajectories:
             return self.task.missing("tracked point")
         return "" if self.task.outline else self.task.missing("outline")
 
-    def per_episode(self, values: np.ndarray) -> np.ndarray:
+    def per_episode(self, values: Array) -> Array:
         """`(E,)` sums of frame values `(N,)` over each episode."""
         return np.add.reduceat(values.astype(float), self.starts)

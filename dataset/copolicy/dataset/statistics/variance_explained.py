@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..arrays import Array
 from .estimate import Estimate, Null, left_out
 from .resampling import Bootstrap, drawn_within, exchangeable, interval, permuted_within
 from .trajectories import Trajectories
@@ -30,7 +31,7 @@ def eta_squared_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.ran
     }
 
 
-def eta_squared(values: np.ndarray, labels: np.ndarray, strata: np.ndarray, weights: np.ndarray | None = None) -> float:
+def eta_squared(values: Array, labels: Array, strata: Array, weights: Array | None = None) -> float:
     """Proportion of the sum of squares within strata that lies between labels; NaN if the values do not vary.
 
     Args:
@@ -44,7 +45,7 @@ def eta_squared(values: np.ndarray, labels: np.ndarray, strata: np.ndarray, weig
     return 1 - inside / total if total > 1e-12 else float("nan")
 
 
-def _squares(values: np.ndarray, groups: np.ndarray, weights: np.ndarray) -> float:
+def _squares(values: Array, groups: Array, weights: Array) -> float:
     count = np.maximum(np.bincount(groups, weights), 1e-12)
     total = 0.0
     for column in values.T:
@@ -54,7 +55,7 @@ def _squares(values: np.ndarray, groups: np.ndarray, weights: np.ndarray) -> flo
 
 
 def _within_configurations(
-    data: Trajectories, episodes: np.ndarray, values: np.ndarray, description: str, rng: np.random.Generator
+    data: Trajectories, episodes: Array, values: Array, description: str, rng: np.random.Generator
 ) -> Estimate:
     definition = (
         f"Eta squared: the proportion of the variation of {description} within configurations that lies between pairs, "
@@ -82,7 +83,7 @@ def _within_configurations(
 
 
 def _by_configuration(
-    data: Trajectories, episodes: np.ndarray, values: np.ndarray, bootstrap: Bootstrap, rng: np.random.Generator
+    data: Trajectories, episodes: Array, values: Array, bootstrap: Bootstrap, rng: np.random.Generator
 ) -> Estimate:
     definition = (
         "Eta squared: the proportion of the variation of duration that lies between configurations, of episodes that "

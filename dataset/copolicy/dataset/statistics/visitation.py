@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ..arrays import Array
 from ..outline import Outline, Shape
 from .entropy import entropy, miller_madow
 from .estimate import Estimate, Null, left_out
@@ -52,7 +53,7 @@ class Grid:
         ones = np.ones(len(column), dtype=np.float32)
         return csr_matrix((ones, (data.episode, row * COLUMNS + column)), shape=(len(data.rows), self.cells))
 
-    def free(self, obstacles: Sequence[Shape]) -> np.ndarray:
+    def free(self, obstacles: Sequence[Shape]) -> Array:
         """`(cells,)` whether the centre of each cell is outside all obstacles (convex polygons)."""
         y, x = (np.mgrid[0 : self.rows, 0:COLUMNS] * self.side + self.side / 2).reshape(2, -1)
         free = np.ones(self.cells, dtype=bool)
@@ -131,7 +132,7 @@ def _between_pairs(data: Trajectories, grid: Grid, counts: csr_matrix, groups, r
         return Estimate(None, "bits", definition, episodes, note="one pair only")
     frames = float(data.lengths.sum())
 
-    def divergence(pairs: np.ndarray, weight: np.ndarray) -> float:
+    def divergence(pairs: Array, weight: Array) -> float:
         total = 0.0
         for group in groups:
             select = csr_matrix((weight[group], (pairs[group], np.arange(len(group)))))

@@ -4,11 +4,10 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from ..command_line.commands import add_command
-from ..command_line.extras import HUB, TABLES
+from ..command_line.commands import Commands, add_command
 
 
-def add_publish_command(commands: argparse._SubParsersAction) -> None:
+def add_publish_command(commands: Commands) -> None:
     """Adds `publish`."""
     parser = add_command(
         commands,
@@ -16,7 +15,6 @@ def add_publish_command(commands: argparse._SubParsersAction) -> None:
         _publish,
         "check a released data set, upload it in one commit and tag it; uses the token of `hf auth login` or HF_TOKEN",
         "copolicy-dataset publish outputs/dataset --repo-id my-lab/table --private",
-        (*TABLES, *HUB),
     )
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a released LeRobot v3 data set with a card")
     parser.add_argument("--repo-id", required=True, metavar="U/N", help="user/name on the Hub")
@@ -27,7 +25,7 @@ def add_publish_command(commands: argparse._SubParsersAction) -> None:
     )
 
 
-def add_pull_command(commands: argparse._SubParsersAction) -> None:
+def add_pull_command(commands: Commands) -> None:
     """Adds `pull`."""
     parser = add_command(
         commands,
@@ -35,7 +33,6 @@ def add_pull_command(commands: argparse._SubParsersAction) -> None:
         _pull,
         "download a data version and verify its files and content hash",
         "copolicy-dataset pull my-lab/table@data-1.0.0 --out outputs/table",
-        (*TABLES, *HUB),
     )
     parser.add_argument("name", metavar="U/N[@REVISION]", help="data set on the Hub (default: its newest data version)")
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="new folder")

@@ -3,14 +3,13 @@
 import argparse
 from pathlib import Path
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..exceptions import CopolicyError, RunError
 
 _MAX_SHOWN = 20
 
 
-def add_release_command(commands: argparse._SubParsersAction) -> None:
+def add_release_command(commands: Commands) -> None:
     """Adds `release`."""
     parser = add_command(
         commands,
@@ -18,7 +17,6 @@ def add_release_command(commands: argparse._SubParsersAction) -> None:
         _release,
         "release the next version of a data set: writes content hash, manifest and change log",
         'copolicy-dataset release outputs/dataset --bump minor --notes "Session of pair 3"',
-        TABLES,
     )
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument(
@@ -31,7 +29,7 @@ def add_release_command(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--notes", required=True, help="text of this release in the change log")
 
 
-def add_diff_command(commands: argparse._SubParsersAction) -> None:
+def add_diff_command(commands: Commands) -> None:
     """Adds `diff`."""
     parser = add_command(
         commands,
@@ -39,7 +37,6 @@ def add_diff_command(commands: argparse._SubParsersAction) -> None:
         _diff,
         "list the differences between two data sets; exit status 0: same, 1: different, 2: error",
         "copolicy-dataset diff outputs/dataset@1.0.0 outputs/dataset",
-        TABLES,
     )
     input_help = "folder, FOLDER@x.y.z (a release), or U/N[@REVISION] on the Hub, such as my-lab/table@data-1.0.0"
     parser.add_argument("a", metavar="A", help=input_help)

@@ -38,7 +38,6 @@ def read_content(root: Path) -> Content:
 
     Raises:
         FileFormatError: no such data set, one without `episode_uuid`, or an inconsistent one.
-        MissingExtraError: pyarrow is not installed.
     """
     folder = LeRobotFolder.open(root)
     info, rows = folder.info, _read_episodes(folder)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import FileFormatError, MissingExtraError
 from ..files.meta_files import INFO_FILE, TASKS_FILE
 from ..lerobot_folder.folder import LeRobotFolder
@@ -56,7 +57,7 @@ def frame_digests(folder: LeRobotFolder, tasks: dict[int, str]) -> list[dict[str
     return digests
 
 
-def _order(root: Path, files: list[Path], lengths: Sequence[int]) -> np.ndarray:
+def _order(root: Path, files: list[Path], lengths: Sequence[int]) -> Array:
     """Row numbers, over all files, of the frames with `index` 0, 1, 2, ..."""
     indices = _numbers(files, "index", "int64", [1])[:, 0]
     order = np.argsort(indices, kind="stable")
@@ -68,9 +69,7 @@ def _order(root: Path, files: list[Path], lengths: Sequence[int]) -> np.ndarray:
     return order
 
 
-def _encodable(
-    files: list[Path], name: str, feature: dict, tasks: dict[int, str], root: Path
-) -> np.ndarray | list[Any]:
+def _encodable(files: list[Path], name: str, feature: dict, tasks: dict[int, str], root: Path) -> Array | list[Any]:
     """The values of a feature in the order of the files."""
     if name == "task_index":
         numbers = _numbers(files, name, "int64", [1])[:, 0].tolist()
@@ -94,7 +93,7 @@ def _encodable(
     return numbers
 
 
-def _numbers(files: Sequence[Path], name: str, dtype: str, shape: Sequence[int]) -> np.ndarray:
+def _numbers(files: Sequence[Path], name: str, dtype: str, shape: Sequence[int]) -> Array:
     """A column of numbers over all files, `(rows, n)`, little-endian.
 
     Raises:

@@ -3,12 +3,12 @@
 import argparse
 from pathlib import Path
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_text, require_new
 
 
-def add_compare_command(commands: argparse._SubParsersAction) -> None:
+def add_compare_command(commands: Commands) -> None:
     """Adds `compare` to the commands of `copolicy-eval`."""
     command = add_command(
         commands,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.scenarios import base_name
 
 REPLICATES = 10_000
@@ -60,7 +61,7 @@ def paired_differences(
     return result
 
 
-def clustered_mean(values: np.ndarray, clusters: Sequence[Hashable], seed: int = 0) -> dict[str, Any]:
+def clustered_mean(values: Array, clusters: Sequence[Hashable], seed: int = 0) -> dict[str, Any]:
     """Mean of values `(n,)` with a 95 % interval from a bootstrap over clusters; nan values are left out."""
     finite = np.isfinite(values)
     if not finite.any():

@@ -13,6 +13,7 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.rollout import Rollout, Trace
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask, get_task
 
 
@@ -33,8 +34,8 @@ class EpisodeResult:
     success: bool
     reason: str
     chunks: int
-    path: np.ndarray | None
-    interaction: np.ndarray | None
+    path: Array | None
+    interaction: Array | None
     task: PairTask = field(default_factory=get_task, kw_only=True, repr=False)
     end: int | None = field(default=None, kw_only=True, repr=False)
 
@@ -59,7 +60,7 @@ class EpisodeResult:
         }
 
 
-def interaction_columns(interaction: np.ndarray | None) -> dict[str, float | None]:
+def interaction_columns(interaction: Array | None) -> dict[str, float | None]:
     """The interaction columns of an episode's row, from `(T,)` values; null where the task does not measure it."""
     magnitude = None if interaction is None else np.abs(interaction)
     return {
@@ -115,7 +116,7 @@ def run_traced(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:
 
 def episode_measures(
     rollout: Rollout, trace: Trace, agent: Any, index: int
-) -> tuple[bool, str, int, np.ndarray | None, np.ndarray | None]:
+) -> tuple[bool, str, int, Array | None, Array | None]:
     """The fields `success` to `interaction` of a world's `EpisodeResult`."""
     outcome, states = rollout.outcomes[index], trace.states(index)
     interaction = rollout.task.interaction_recorded(states[1:], trace.actions(index))
@@ -123,7 +124,7 @@ def episode_measures(
     return outcome.success, outcome.reason, chunks, _tracked_path(rollout.task, states), interaction
 
 
-def _tracked_path(task: PairTask, recorded: np.ndarray) -> np.ndarray | None:
+def _tracked_path(task: PairTask, recorded: Array) -> Array | None:
     """`(T, 2)` the task's tracked point in recorded states, or else the centre of its outline's body."""
     states = task.states_of(recorded)
     path = task.path(states)

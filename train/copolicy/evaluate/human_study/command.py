@@ -5,7 +5,7 @@ from pathlib import Path
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
-from copolicy.dataset.command_line.commands import add_command, add_group
+from copolicy.dataset.command_line.commands import Commands, add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
@@ -26,7 +26,7 @@ from ..study_flags import (
 )
 
 
-def add_human_command(commands: argparse._SubParsersAction) -> None:
+def add_human_command(commands: Commands) -> None:
     """Adds `human` with its three steps to the commands of `copolicy-eval`."""
     steps = add_group(
         commands,
@@ -44,7 +44,7 @@ def add_human_command(commands: argparse._SubParsersAction) -> None:
     _add_summarise(steps)
 
 
-def _add_plan(steps: argparse._SubParsersAction) -> None:
+def _add_plan(steps: Commands) -> None:
     command = add_command(
         steps,
         "plan",
@@ -74,7 +74,7 @@ def _add_plan(steps: argparse._SubParsersAction) -> None:
     add_protocol_flags(command, n_action_steps=1)
 
 
-def _add_run(steps: argparse._SubParsersAction) -> None:
+def _add_run(steps: Commands) -> None:
     command = add_command(
         steps,
         "run",
@@ -102,7 +102,7 @@ def _add_run(steps: argparse._SubParsersAction) -> None:
     command.add_argument("--mute", action="store_true", help="no sounds")
 
 
-def _add_summarise(steps: argparse._SubParsersAction) -> None:
+def _add_summarise(steps: Commands) -> None:
     command = add_command(
         steps,
         "summarise",

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from copolicy.dataset.arrays import Array
 
-def anova(values: np.ndarray) -> dict[str, Any] | None:
+
+def anova(values: Array) -> dict[str, Any] | None:
     """One-way repeated-measures ANOVA.
 
     Args:
@@ -38,7 +40,7 @@ def anova(values: np.ndarray) -> dict[str, Any] | None:
     }
 
 
-def tukey(values: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
+def tukey(values: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     """Tukey's honestly significant differences on the error term of `anova`, for every pair of conditions."""
     n, k = values.shape
     _, error = _sums_of_squares(values) if n > 1 and k > 1 else (0.0, 0.0)
@@ -58,7 +60,7 @@ def tukey(values: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
     return differences
 
 
-def rank_test(values: np.ndarray) -> dict[str, Any] | None:
+def rank_test(values: Array) -> dict[str, Any] | None:
     """Friedman's test of ratings `(n, k)`, or Wilcoxon's for two conditions; None if there is nothing to rank."""
     n, k = values.shape
     if n < 2 or k < 2 or not np.ptp(values, axis=1).any():
@@ -70,7 +72,7 @@ def rank_test(values: np.ndarray) -> dict[str, Any] | None:
     return {"test": "Friedman", "statistic": float(result.statistic), "p": float(result.pvalue)}
 
 
-def _sums_of_squares(values: np.ndarray) -> tuple[float, float]:
+def _sums_of_squares(values: Array) -> tuple[float, float]:
     n = len(values)
     grand = values.mean()
     conditions = n * float(((values.mean(axis=0) - grand) ** 2).sum())
@@ -78,7 +80,7 @@ def _sums_of_squares(values: np.ndarray) -> tuple[float, float]:
     return conditions, float((residual**2).sum())
 
 
-def _greenhouse_geisser(values: np.ndarray) -> float:
+def _greenhouse_geisser(values: Array) -> float:
     k = values.shape[1]
     covariance = np.cov(values, rowvar=False)
     centred = covariance - covariance.mean(axis=0) - covariance.mean(axis=1, keepdims=True) + covariance.mean()

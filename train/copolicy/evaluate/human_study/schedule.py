@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.play.settings import PlaySettings
 from copolicy.collect.session import BalancedSchedule, EpisodeCounts
+from copolicy.dataset.arrays import Array
 
 from .plan import PlannedTrial, StudyPlan
 
@@ -62,7 +61,7 @@ class BlindPolicy:
         with self._lock:
             self._current.reset(seed)
 
-    def predict_action_chunk(self, observations: dict[str, np.ndarray]) -> np.ndarray:
+    def predict_action_chunk(self, observations: dict[str, Array]) -> Array:
         """Predicts with the current policy."""
         with self._lock:
             return self._current.predict_action_chunk(observations)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import TABLE, get_task
 
@@ -107,7 +108,7 @@ def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str, robot: s
     return float(np.mean(values)) if values else float("nan")
 
 
-def _complete(people: Sequence[str], robots: Sequence[str], value: Callable[[str, str], float]) -> np.ndarray:
+def _complete(people: Sequence[str], robots: Sequence[str], value: Callable[[str, str], float]) -> Array:
     """Values `(n, k)` of the participants who have a value with every robot."""
     values = np.array([[value(person, robot) for robot in robots] for person in people]).reshape(-1, len(robots))
     return values[np.isfinite(values).all(axis=1)]

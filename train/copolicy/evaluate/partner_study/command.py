@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from copolicy.collect.agents.simulated_players import simulated_players
-from copolicy.dataset.command_line.commands import add_command, progress_bar
+from copolicy.dataset.command_line.commands import Commands, add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
@@ -25,7 +25,7 @@ _LABEL = "human-in-the-loop protocol with SIMULATED partners: "
 _PARTNERS = "scripted players sit at the human seat, no person took part"
 
 
-def add_partner_command(commands: argparse._SubParsersAction) -> None:
+def add_partner_command(commands: Commands) -> None:
     """Adds `partner` to the commands of `copolicy-eval`."""
     command = add_command(
         commands,

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from ..coplan.rollouts import EpisodeResult
 
 DEADLOCK_S = 1.0
@@ -24,12 +26,12 @@ class PartnerEpisodeResult(EpisodeResult):
     """
 
     partner: str
-    actions: np.ndarray
-    still: np.ndarray | None
+    actions: Array
+    still: Array | None
     partner_changes: int
 
     @cached_property
-    def forces(self) -> tuple[np.ndarray, np.ndarray] | None:
+    def forces(self) -> tuple[Array, Array] | None:
         """`(steps, 2)` forces of robot and of partner, in full forces; None if the task has no outline."""
         if self.task.outline is None:
             return None

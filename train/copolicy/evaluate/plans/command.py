@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from copolicy.collect.angular_limit import LIMIT_SETTING, angular_limit_of
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.flag_numbers import number, whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _DEFAULT_MAPS = "unseen"
 
 
-def add_plans_command(commands: argparse._SubParsersAction) -> None:
+def add_plans_command(commands: Commands) -> None:
     """Adds `plans` to the commands of `copolicy-eval`."""
     command = add_command(
         commands,

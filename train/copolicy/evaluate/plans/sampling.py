@@ -9,6 +9,7 @@ import numpy as np
 from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.outline import Outline, Pose
 from copolicy.dataset.task import PairTask, World, get_task
@@ -28,8 +29,8 @@ class ChunkSample:
             its label is undefined.
     """
 
-    chunk: np.ndarray
-    planned_path: np.ndarray
+    chunk: Array
+    planned_path: Array
     episode: EpisodeResult
     route: str | None
 
@@ -45,7 +46,7 @@ class BranchPoint:
 
     scenario: Any
     pose: Pose
-    approach: np.ndarray
+    approach: Array
     samples: tuple[ChunkSample, ...]
     task: PairTask
 
@@ -107,7 +108,7 @@ def sample_chunks(
     planned.run(len(actions[0]))
     branch.run()
 
-    def path(recorded: np.ndarray) -> np.ndarray:
+    def path(recorded: Array) -> Array:
         return outline.poses(task.states_of(recorded))[:, :2]
 
     chunk_samples = []

@@ -6,6 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from copolicy.dataset.arrays import Array
+
 from . import numba_kernels as kernels
 from .mlp import FastMlp
 from .packed_weights import Norm, PackedBlocks, PackedLayers, PackedLinear, pack
@@ -41,7 +43,7 @@ def _transformer(denoiser: FastTransformer) -> Any:
     position, norm = _array(denoiser.position), Norm(*map(_array, denoiser.norm))
     heads = denoiser.n_heads
 
-    def evaluate(noisy: np.ndarray, keys: np.ndarray, scores: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def evaluate(noisy: Array, keys: Array, scores: Array, values: Array) -> Array:
         return kernels.transformer(noisy, embedding, position, layers, norm, head, heads, keys, scores, values)
 
     return evaluate
@@ -57,7 +59,7 @@ def _perceptron(denoiser: FastMlp) -> Any:
     actions, head = pack(_array(denoiser.actions)), _single(denoiser.head)
     norm = Norm(_array(denoiser.norm.weight), _array(denoiser.norm.bias))
 
-    def evaluate(noisy: np.ndarray, history: np.ndarray, biases: np.ndarray) -> np.ndarray:
+    def evaluate(noisy: Array, history: Array, biases: Array) -> Array:
         return kernels.perceptron(noisy.reshape(len(noisy), -1), actions, packed, norm, head, history, biases).reshape(
             noisy.shape
         )
@@ -69,7 +71,7 @@ def _linear(layers: Any) -> PackedLinear:
     return PackedLinear(_packed([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
-def _packed(weights: list[Tensor]) -> np.ndarray:
+def _packed(weights: list[Tensor]) -> Array:
     return np.stack([pack(_array(weight)) for weight in weights])
 
 
@@ -81,9 +83,9 @@ def _norm(layers: Any) -> Norm:
     return Norm(_stacked([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
-def _stacked(tensors: Any) -> np.ndarray:
+def _stacked(tensors: Any) -> Array:
     return np.stack([_array(tensor) for tensor in tensors])
 
 
-def _array(tensor: Tensor) -> np.ndarray:
+def _array(tensor: Tensor) -> Array:
     return np.ascontiguousarray(tensor.detach().numpy())

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import binding
 
+from copolicy.dataset.arrays import Array
+
 # float32 values per vector register: 16 for AVX-512, else 8 (AVX2, or two registers of NEON).
 LANES = 16 if binding.get_host_cpu_features().get("avx512f") else 8
 OUTPUTS = 4  # outputs side by side in packed weights
@@ -18,15 +20,15 @@ class PackedLinear(NamedTuple):
         bias: `(blocks * OUTPUTS,)` float32.
     """
 
-    weight: np.ndarray
-    bias: np.ndarray
+    weight: Array
+    bias: Array
 
 
 class Norm(NamedTuple):
     """Weight and bias of a layer normalisation, `(size,)` float32 each."""
 
-    weight: np.ndarray
-    bias: np.ndarray
+    weight: Array
+    bias: Array
 
 
 class PackedLayers(NamedTuple):
@@ -36,7 +38,7 @@ class PackedLayers(NamedTuple):
     self_in: PackedLinear
     self_out: PackedLinear
     norm2: Norm
-    cross_bias: np.ndarray
+    cross_bias: Array
     norm3: Norm
     inner: PackedLinear
     outer: PackedLinear
@@ -46,11 +48,11 @@ class PackedBlocks(NamedTuple):
     """The stacked residual blocks of a `FastMlp`; the bias of `inner` depends on the step and is an input."""
 
     norm: Norm
-    inner: np.ndarray
+    inner: Array
     outer: PackedLinear
 
 
-def pack(weight: np.ndarray) -> np.ndarray:
+def pack(weight: Array) -> Array:
     """Packs a weight matrix `(outputs, inputs)`, padded with zeros.
 
     Returns:

@@ -69,7 +69,7 @@ class GamepadMapping:
     source: Literal["sdl", "user", "guess"] = "sdl"
     _buttons: dict[int, str] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         buttons = {binding.index: control for control, binding in self.bindings.items() if binding.kind == "b"}
         object.__setattr__(self, "_buttons", buttons)
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from ..geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_RADIUS, IMAGE_SIZE
 from ..map_config import WINDOW
 
@@ -15,9 +17,7 @@ DISCS = np.array(
 )
 
 
-def square_clearance(
-    x: np.ndarray, y: np.ndarray, theta: np.ndarray, centre: tuple[float, float], size: float
-) -> np.ndarray:
+def square_clearance(x: Array, y: Array, theta: Array, centre: tuple[float, float], size: float) -> Array:
     """Distance between the table at poses (x, y, theta) and a square, px; negative where they overlap."""
     cos, sin = np.cos(theta), np.sin(theta)
     nearest = np.full(np.broadcast_shapes(x.shape, y.shape, theta.shape), np.inf)
@@ -28,7 +28,7 @@ def square_clearance(
     return nearest
 
 
-def wall_clearance(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
+def wall_clearance(x: Array, y: Array, theta: Array) -> Array:
     """Distance between the box of the rotated table image and the edge of the window, px; negative outside."""
     width, height = IMAGE_SIZE
     cos, sin = np.abs(np.cos(theta)), np.abs(np.sin(theta))

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError
 
 from ..map_config import MapConfig
@@ -44,8 +45,8 @@ class Route(NamedTuple):
     """
 
     sides: str
-    cost: np.ndarray
-    ahead: np.ndarray
+    cost: Array
+    ahead: Array
 
 
 def routes(config: MapConfig, clearance: float) -> tuple[Route, ...]:
@@ -86,7 +87,7 @@ def _routes(goal, obstacles, clearance: float, axis: int, forward: int) -> tuple
     return tuple(all_routes)
 
 
-def _cost_per_px(obstacles, clearance: float) -> tuple[np.ndarray, np.ndarray]:
+def _cost_per_px(obstacles, clearance: float) -> tuple[Array, Array]:
     """Cost of a px of path in each cell `(COUNT,)`, and in which cells the table touches nothing `(COUNT,)`."""
     x, y, theta = grid.poses()
     tight = _TIGHT * clearance
@@ -100,13 +101,13 @@ def _cost_per_px(obstacles, clearance: float) -> tuple[np.ndarray, np.ndarray]:
     return (1.0 + extra).ravel(), free.ravel()
 
 
-def _extra_cost(space: np.ndarray, tight: float, wide: float) -> np.ndarray:
+def _extra_cost(space: Array, tight: float, wide: float) -> Array:
     near = np.clip((wide - space) / (wide - tight), 0.0, 1.0)
     return np.where(space < tight, _CLOSE_COST, _NEAR_COST * near**2)
 
 
 @functools.lru_cache(maxsize=64)
-def _fence(centre: tuple[float, float], axis: int, side: int) -> np.ndarray:
+def _fence(centre: tuple[float, float], axis: int, side: int) -> Array:
     """Moves that cross the line from an obstacle to the edge of the window, at a right angle to the path's axis."""
     moves = grid.moves()
     across = np.broadcast_to(grid.poses()[axis], grid.SHAPE).ravel()

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 from ..map_config import WINDOW
 
 CELL = 15.0
@@ -31,13 +33,13 @@ REACH = max(abs(cells) for _, *step in _OFFSETS for cells in step)
 class Moves(NamedTuple):
     """Directed moves in the order of a CSR matrix, each `(M,)`, and its row pointer `(COUNT + 1,)`."""
 
-    source: np.ndarray
-    target: np.ndarray
-    length: np.ndarray  # px
-    pointer: np.ndarray
+    source: Array
+    target: Array
+    length: Array  # px
+    pointer: Array
 
 
-def poses() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def poses() -> tuple[Array, Array, Array]:
     """Centres of the cells: x, y (px) and theta (rad), broadcastable to `SHAPE`."""
     angle = np.arange(ANGLES) * (math.pi / ANGLES)
     row, column = (np.arange(ROWS) + 0.5) * CELL, (np.arange(COLUMNS) + 0.5) * CELL

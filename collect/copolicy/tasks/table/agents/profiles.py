@@ -35,7 +35,7 @@ class PlayerProfile:
     clearance: float = 1.7
     """Factor on the distance it keeps from obstacles: 1 passes closely, people 1.6 to 1.8, 2.6 is wider than people."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in (field.name for field in fields(self)):
             value = getattr(self, name)
             if not math.isfinite(value) or (value < 0 and name != "left_bias"):

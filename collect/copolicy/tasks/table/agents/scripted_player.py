@@ -5,6 +5,7 @@ from collections import deque
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.task_spec import PLAYERS, RECORD_HZ
 
@@ -60,7 +61,7 @@ class ScriptedPlayer:
         """Number of changes of route so far."""
         return self.route_choice.changes
 
-    def act(self, state: np.ndarray) -> np.ndarray:
+    def act(self, state: Array) -> Array:
         """The own force `(2,)`, x and y in [-1, 1], for a state `(7,)` of the table; called once a step.
 
         Raises:

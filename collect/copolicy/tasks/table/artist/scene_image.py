@@ -6,6 +6,7 @@ import numpy as np
 
 from copolicy.collect.screen.canvas import new_surface
 from copolicy.collect.sdl import pygame
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.features import SCENE_SIZE
 from copolicy.dataset.outline import Pose
 
@@ -24,7 +25,7 @@ class SceneImage:
         self._surface = new_surface(size)
         self._view = TableView(map_config)
 
-    def draw(self, pose: Pose) -> np.ndarray:
+    def draw(self, pose: Pose) -> Array:
         """The image at a pose (px, px, rad): `(height, width, 3)` uint8."""
         self._view.draw(self._surface, self._surface.get_rect(), pose)
         return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

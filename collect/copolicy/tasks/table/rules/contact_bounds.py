@@ -6,6 +6,8 @@ did not touch what the outer one does not reach, and touched what the inner one 
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
+
 Rectangle = tuple[float, float, float]
 """Offset of the middle along the table, half length and half width, px."""
 
@@ -16,9 +18,7 @@ INNER: Rectangle = (-2.5, 54.0, 16.5)
 """The board without its rounded corners."""
 
 
-def separation(
-    positions: np.ndarray, thetas: np.ndarray, rectangle: Rectangle, centres: np.ndarray, half: np.ndarray | float
-) -> np.ndarray:
+def separation(positions: Array, thetas: Array, rectangle: Rectangle, centres: Array, half: Array | float) -> Array:
     """`(M,)` largest gap along the four axes of a rotated rectangle and an upright square, px; negative in an overlap.
 
     By the separating axis theorem two convex shapes are apart if and only if one of these gaps is positive.
@@ -43,7 +43,7 @@ def separation(
     return np.maximum.reduce(gaps)
 
 
-def final_poses(states: np.ndarray, fps: float, record_hz: int) -> tuple[np.ndarray, np.ndarray, float]:
+def final_poses(states: Array, fps: float, record_hz: int) -> tuple[Array, Array, float]:
     """Possible poses at the end of the last frame's action, which took one to `record_hz / fps` steps.
 
     Args:

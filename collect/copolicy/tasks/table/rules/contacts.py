@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.checks.finding import Finding
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
@@ -54,7 +55,7 @@ def _obstacles(table: EpisodeData) -> Iterator[Finding]:
     yield from table.findings("obstacle_contact", collided & ~(nearest <= bound), nearest, bound, message)
 
 
-def _obstacle_sides(table: EpisodeData) -> tuple[np.ndarray, np.ndarray]:
+def _obstacle_sides(table: EpisodeData) -> tuple[Array, Array]:
     """Smallest and largest possible side of each obstacle, `(F, 3)` px each."""
     shape = (len(table.starts), MAX_OBSTACLES)
     smallest, largest = (np.full(shape, float(size)) for size in _SIZES)
@@ -80,21 +81,21 @@ def _wall(table: EpisodeData) -> Iterator[Finding]:
     yield from table.findings("wall_contact", ended & ~(room <= bound), room, bound, message)
 
 
-def _deepest(table: EpisodeData, centres: np.ndarray, half: np.ndarray | float) -> np.ndarray:
+def _deepest(table: EpisodeData, centres: Array, half: Array | float) -> Array:
     """`(F,)` largest depth of the inner rectangle in a square over all frames, px."""
     states = table.frames[STATE].astype(float)
     thetas = np.arctan2(states[:, 3], states[:, 2])
     return table.maximum(-separation(states[:, :2], thetas, INNER, centres, half))
 
 
-def _final(table: EpisodeData) -> tuple[np.ndarray, np.ndarray, float]:
+def _final(table: EpisodeData) -> tuple[Array, Array, float]:
     if table.final_states is not None:
         final = table.final_states
         return final[None, :, :2], np.arctan2(final[:, 3], final[:, 2])[None], 0.0
     return final_poses(table.frames[STATE][table.ends].astype(float), table.fps, SPEC.record_hz)
 
 
-def _final_gap(table: EpisodeData, centres: np.ndarray, half: np.ndarray | float) -> tuple[np.ndarray, float]:
+def _final_gap(table: EpisodeData, centres: Array, half: Array | float) -> tuple[Array, float]:
     """`(F,)` smallest possible distance of the outer rectangle from a square at the end, px, and its error."""
     positions, thetas, error = _final(table)
     gaps = [separation(*pose, OUTER, centres, half) for pose in zip(positions, thetas, strict=True)]

@@ -5,6 +5,7 @@ from diptest import dipstat
 from diptest.consts import Consts
 from scipy.stats import false_discovery_control
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.statistics.estimate import Estimate, Null
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import Trajectories
@@ -24,7 +25,7 @@ _STEERING = (
 )
 
 
-def decision_zone(data: Trajectories) -> np.ndarray:
+def decision_zone(data: Trajectories) -> Array:
     """`(N,)` whether a frame is in the decision zone, that is, before the first obstacle's station.
 
     The station is the projection on the line from start to goal. An episode leaves the zone when the table first
@@ -42,7 +43,7 @@ def decision_zone(data: Trajectories) -> np.ndarray:
     return zone
 
 
-def steering(data: Trajectories) -> np.ndarray:
+def steering(data: Trajectories) -> Array:
     """`(N,)` joint force across the line from start to goal, positive to its right on screen, in full forces."""
     total = data.actions[:, :2] + data.actions[:, 2:]
     across = np.array([(-along[1], along[0]) for along in (_axis(row.scenario)[1] for row in data.rows)])
@@ -64,7 +65,7 @@ def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estima
         f"the same goal and obstacles, at their position nearest to it within {RADIUS_PX:g} px, one value an episode, "
         f"is not unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
-    per_query: list[tuple[int, np.ndarray]] = []
+    per_query: list[tuple[int, Array]] = []
     inside = np.flatnonzero(zone)
     proportion = min(1.0, MAX_QUERIES / max(len(inside), 1))
     for group in data.groups(with_goal=True):
@@ -124,7 +125,7 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     return Estimate(value, "1", definition, episodes, bounds, "configurations", null, details=details)
 
 
-def dip_tests(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def dip_tests(samples: list[Array]) -> tuple[Array, Array]:
     """Dips of the samples and p-values by Hartigan's table, as of `diptest.diptest`, which takes one sample.
 
     Args:
@@ -140,7 +141,7 @@ def dip_tests(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return dips, np.clip(p, 0.0, 1.0)
 
 
-def _critical(size: int) -> np.ndarray:
+def _critical(size: int) -> Array:
     """Hartigan's critical values of sqrt(n) times the dip of n = `size` values, interpolated between table rows."""
     sizes, values = Consts._SAMPLE_SIZE, Consts._CRIT_VALS
     above = min(int(sizes.searchsorted(size)), len(sizes) - 1)
@@ -152,11 +153,11 @@ def _critical(size: int) -> np.ndarray:
     return low + fraction * (np.sqrt(sizes[above]) * values[above] - low)
 
 
-def _rejected(samples: list[np.ndarray]) -> np.ndarray:
+def _rejected(samples: list[Array]) -> Array:
     return false_discovery_control(dip_tests(samples)[1]) < FALSE_DISCOVERY_RATE
 
 
-def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarray) -> np.ndarray:
+def _sample(data: Trajectories, frames: Array, query: int, ahead: Array) -> Array:
     """Steering of each other episode at its frame nearest to the query's position, within `RADIUS_PX`."""
     distance = np.linalg.norm(data.states[frames, :2] - data.states[query, :2], axis=1)
     near = (distance <= RADIUS_PX) & (data.episode[frames] != data.episode[query])
@@ -167,7 +168,7 @@ def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarra
     return ahead[frames[first]]
 
 
-def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
+def _ahead(data: Trajectories, values: Array) -> Array:
     """Mean of a value over the next `AHEAD_S` of each frame, within its episode."""
     window = max(1, round(AHEAD_S * data.fps))
     total = np.concatenate(([0.0], np.cumsum(values)))
@@ -176,7 +177,7 @@ def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
     return (total[end] - total[begin]) / (end - begin)
 
 
-def _axis(config) -> tuple[np.ndarray, np.ndarray]:
+def _axis(config) -> tuple[Array, Array]:
     origin = np.array(config.start[:2])
     line = np.array(config.goal) - origin
     return origin, line / max(float(np.linalg.norm(line)), 1e-9)

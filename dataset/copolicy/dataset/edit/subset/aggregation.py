@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...exceptions import FileFormatError
 from ...files.meta_files import EPISODES_FOLDER, STATS_FILE
 from ...files.staging import write_lerobot_json
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 _COLUMN_PREFIX = "stats/"
 
-Statistics = dict[str, dict[str, np.ndarray]]
+Statistics = dict[str, dict[str, Array]]
 """Arrays by feature and name of the statistic: `min`, `max`, `mean`, `std`, `count`, quantiles such as `q01`."""
 
 
@@ -53,7 +54,7 @@ def write_statistics(statistics: Statistics, folder: Path) -> None:
     write_lerobot_json(folder / STATS_FILE, nested)
 
 
-def _aggregate_feature(stacked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _aggregate_feature(stacked: dict[str, Array]) -> dict[str, Array]:
     """Aggregates the statistics of one feature, `(E, ...)` each, over the first axis."""
     means, counts = stacked["mean"], stacked["count"]
     total = counts.sum(axis=0)

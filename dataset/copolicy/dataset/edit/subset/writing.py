@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ...arrays import Array
 from ...exceptions import FileFormatError, RunError
 from ...files.meta_files import CARD_FILE, EPISODES_FOLDER, INFO_FILE, TASKS_FILE
 from ...files.staging import write_lerobot_json
@@ -86,7 +87,7 @@ def remaining_splits(info: Mapping[str, Any], numbers: Sequence[int]) -> dict[st
     return splits or {"train": f"0:{len(numbers)}"}
 
 
-def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray, folder: Path) -> list[FileIndex]:
+def _write_frames(source: StoredSet, numbers: Sequence[int], starts: Array, folder: Path) -> list[FileIndex]:
     """Writes the data files, one row group per episode; returns the file index of each episode."""
     size = source.info.get("data_files_size_in_mb")
     limit = (size if isinstance(size, int | float) and size > 0 else _DATA_MB) * 2**20
@@ -122,7 +123,7 @@ def _write_frames(source: StoredSet, numbers: Sequence[int], starts: np.ndarray,
 
 def _frames(source: StoredSet, numbers: Sequence[int]) -> Iterator[pa.Table]:
     """Yields the frames of each episode; one data file is in memory at a time."""
-    opened: tuple[Path, pa.Table, np.ndarray] | None = None
+    opened: tuple[Path, pa.Table, Array] | None = None
     keys = source.episodes.select(["data/chunk_index", "data/file_index"]).to_pylist()
     for number in numbers:
         path = data_file(source.root, source.info, keys[number])
@@ -137,7 +138,7 @@ def _frames(source: StoredSet, numbers: Sequence[int]) -> Iterator[pa.Table]:
         yield table.take(pa.array(rows[np.argsort(index, kind="stable")]))
 
 
-def _read_frames(path: Path, number: int) -> tuple[pa.Table, np.ndarray]:
+def _read_frames(path: Path, number: int) -> tuple[pa.Table, Array]:
     if not path.is_file():
         raise FileFormatError(path, f"the frames of episode {number}", "no file")
     table = read_parquet(path)
