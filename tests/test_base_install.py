@@ -111,7 +111,12 @@ def test_what_is_missing_is_one_line_before_any_work(sound_recordings, tmp_path)
 @pytest.mark.usefixtures("sound")  # which makes the data set of the recordings
 def test_a_data_set_is_read_without_extras(sound_recordings, tmp_path):
     shutil.copytree(sound_recordings.parent / "set", tmp_path / "data")
-    calls = ("dataset check data", "dataset stats data", "dataset release data --bump major --notes first", "cards report data")
+    calls = (
+        "dataset check data",
+        "dataset stats data",
+        "dataset release data --bump major --notes first",
+        "cards report data",
+    )
     for said in _walk(tmp_path, [*(f"copolicy-{call}" for call in calls), "copolicy-cards dataset data --no-figures"]):
         assert said["status"] == 0, said
     assert (tmp_path / "data" / "report.html").stat().st_size > 10_000

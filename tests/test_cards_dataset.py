@@ -9,7 +9,7 @@ from huggingface_hub import DatasetCard
 from report_page import route_document
 
 from copolicy.cards.cli import main
-from copolicy.cards.dataset_card import render
+from copolicy.cards.dataset_card import render_dataset_card
 from copolicy.cards.facts import DatasetFacts
 from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
@@ -87,12 +87,12 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
 
 def test_the_datasheet_names_the_command_that_withdraws(dataset):
     _set_column(dataset, "source", ["human"] * len(DatasetFacts.read(dataset).episodes))
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "copolicy-dataset withdraw CONSENT_ID PATH... --yes" in text
     assert "Withdrawn so far" not in text
     entries = [{"date": "2026-03-01", "episodes": 2}, {"date": "2026-04-01", "episodes": 1}]
     (dataset / WITHDRAWALS_FILE).write_text(withdrawals_text(entries), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "Withdrawn so far: 3 episodes, which are in no file of this version." in text
 
 
@@ -112,7 +112,7 @@ def test_names_of_numbers_may_be_anything(dataset):
 
 
 def test_statistics_come_with_their_interval_and_their_null(dataset):
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "Not computed: `copolicy-dataset stats` was not run on this data set." in text
     stored = {
         "version": 1,
@@ -128,7 +128,7 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
         },
     }  # fmt: skip
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(stored), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "| route entropy: one obstacle | 0.9877 | bits | 0.8 to 1 | 0.1 (0 to 0.25) | 6 |" in text
     assert "| route entropy: two | - | bits | - | - | 0 |" in text
     assert "- **route entropy: two**: of routes (too few)" in text
@@ -136,28 +136,28 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
     with pytest.raises(
         FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found invalid JSON"
     ):
-        render(DatasetFacts.read(dataset), "lab/table")
+        render_dataset_card(DatasetFacts.read(dataset), "lab/table")
 
 
 def test_findings_are_counted_and_dated(dataset):
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
     assert dataset_command(["check", str(dataset)]) == 0
     stored = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     counts = f"0 errors, {stored['counts']['warning']} warnings, {stored['counts']['info']} remarks."
     date = stored["date"][:10]
     assert f"Checked on {date} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}" in text
     assert "| severity | rule | findings | first finding |" in text
     assert "**Stale.**" not in text
     _set_column(dataset, "discarded", [True] * 6)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\n**Stale.** The content of the data set changed since it was checked.\n\nChecked on" in text
     # What `check --json > meta/copolicy_check.json` kept before it named the content.
     entry = {"episode": "2", "rule": "idle_run", "figure": 5.25, "limit": 5, "severity": "warning", "message": "a|b"}
     old = {"rules": 37, "findings": [entry, {**entry, "episode": "", "figure": None}]}
     (dataset / "meta" / "copolicy_check.json").write_text(json.dumps(old), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**Unknown.** They do not say which content was checked: the data may have changed since." in text
     assert "Checked (`meta/copolicy_check.json`): 0 errors, 2 warnings, 0 remarks." in text
     assert "| warning | idle run | 2 | episode 2: a\\|b (5.25; limit 5) |" in text
@@ -185,28 +185,28 @@ def test_routes_are_compared_with_human_routes(dataset):
     assert "**Stale.**" not in text.partition("## Multimodality")[2].partition("## Checks")[0]
     document["dataset"]["episodes"] = 7
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**Stale.** They were computed when the data set had 7 episodes; it has 6 now." in text
 
 
 def test_a_release_is_named(dataset):
     release = {"version": "1.2.0", "date": "2026-01-02", "content_hash": "abc"}
     (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert 'LeRobotDataset("lab/table", revision="data-1.2.0")' in text
     assert "- Version 1.2.0 of 2026-01-02; changes are in `CHANGELOG.md`." in text
 
 
 def test_simulated_episodes_are_called_that(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**No person took part.**" in text
     assert "simulated" in yaml.safe_load(text.split("---")[1])["tags"]
 
 
 def test_a_mixture_names_each_source(dataset):
     _set_column(dataset, "source", ["simulated"] * 2 + ["human"] * 4)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "human (4), simulated (2)" in text
     assert "Consent: 0 of 4 (0.0 %) episodes played by people state the identifier of a consent record" in text
 
@@ -217,14 +217,14 @@ def test_a_mixture_names_each_source(dataset):
 )
 def test_the_licence_follows_from_the_episodes(dataset, licences, expected):
     _set_column(dataset, "license", licences)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert yaml.safe_load(text.split("---")[1])["license"] == expected
 
 
 def test_what_is_no_licence_identifier_is_refused(dataset):
     _set_column(dataset, "license", ["free for all"] * 6)
     with pytest.raises(InvalidValueError, match=r"license: expected a licence identifier of the Hub such as "):
-        render(DatasetFacts.read(dataset), "lab/table")
+        render_dataset_card(DatasetFacts.read(dataset), "lab/table")
 
 
 def test_a_card_is_overwritten_on_request_only(dataset, capsys):
@@ -267,9 +267,9 @@ def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
 
 
 def test_excluded_episodes_are_listed(dataset):
-    assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
+    assert "## Excluded episodes" not in render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert dataset_command(["exclude", str(dataset), "--episode-ids", "1", "3", "--reason", "stick unplugged"]) == 0
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "2 of 6 episodes are stored but marked as excluded" in text
     assert "| 3 | stick unplugged |" in text
     assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text

@@ -77,7 +77,7 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     from copolicy.dataset.files.meta_files import CROISSANT_FILE
 
     from .croissant import croissant_text
-    from .dataset_card import render
+    from .dataset_card import render_dataset_card
     from .facts import DatasetFacts
 
     facts = DatasetFacts.read(arguments.root)
@@ -86,7 +86,9 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     if arguments.croissant and not arguments.repo_id:
         raise InvalidValueError("--repo-id", "user/name with --croissant, which states the data's location", None)
     repo_id = arguments.repo_id or local_repo_id(arguments.root)
-    render(facts, repo_id, arguments.pretty_name)  # raises errors in the arguments before figures are drawn
+    render_dataset_card(
+        facts, repo_id, arguments.pretty_name
+    )  # raises errors in the arguments before figures are drawn
     figures = []
     if not arguments.no_figures:
         from .figures import save_figures
@@ -96,7 +98,7 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     if arguments.croissant:
         replace_text(arguments.root / CROISSANT_FILE, croissant_text(facts, repo_id, arguments.pretty_name))
         summary["croissant"] = str(arguments.root / CROISSANT_FILE)
-    replace_text(path, render(facts, repo_id, arguments.pretty_name, figures))
+    replace_text(path, render_dataset_card(facts, repo_id, arguments.pretty_name, figures))
     return {**summary, "episodes": len(facts.episodes), "sources": facts.counts("source")}
 
 

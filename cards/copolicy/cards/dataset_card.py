@@ -49,7 +49,7 @@ def citation(words: TaskWords) -> list[str]:
     return [f"## Citation\n\n{words.citation}\n\n```bibtex\n{words.paper}\n```"] if words.paper else []
 
 
-def render(
+def render_dataset_card(
     facts: DatasetFacts, repo_id: str, pretty_name: str | None = None, figures: Iterable[tuple[str, str]] = ()
 ) -> str:
     """Renders `README.md` of a data set.
