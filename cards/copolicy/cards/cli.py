@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command, command_parser, run
 from copolicy.dataset.command_line.extras import FIGURES
@@ -71,7 +72,7 @@ def add_model_command(commands: Commands) -> None:
     model.add_argument("--overwrite", action="store_true", help="replace an existing README.md")
 
 
-def _dataset(arguments: argparse.Namespace) -> dict:
+def _dataset(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.repo_id is not None:
         checked_repo_id(arguments.repo_id)
     from copolicy.dataset.files.meta_files import CROISSANT_FILE
@@ -102,7 +103,7 @@ def _dataset(arguments: argparse.Namespace) -> dict:
     return {**summary, "episodes": len(facts.episodes), "sources": facts.counts("source")}
 
 
-def _model(arguments: argparse.Namespace) -> dict:
+def _model(arguments: argparse.Namespace) -> dict[str, Any]:
     checked_repo_id(arguments.repo_id)
     checked_licence(arguments.license or "")
     from .checkpoint_facts import CheckpointFacts

@@ -97,7 +97,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run(parser(), argv)
 
 
-def _simulate(arguments: argparse.Namespace) -> dict:
+def _simulate(arguments: argparse.Namespace) -> dict[str, Any]:
     # Commands import their modules themselves, so that `play` can open its window without delay.
     from .simulate.command import simulate
 
@@ -113,7 +113,7 @@ def _simulate(arguments: argparse.Namespace) -> dict:
     return simulate(arguments.out, workers=arguments.workers, **asdict(RECIPES[arguments.recipe]))
 
 
-def _recover(arguments: argparse.Namespace) -> dict:
+def _recover(arguments: argparse.Namespace) -> dict[str, Any]:
     from .recording.recover import recover, summary
 
     folder = arguments.folder
@@ -124,7 +124,7 @@ def _recover(arguments: argparse.Namespace) -> dict:
     return summary(folder, recoveries)
 
 
-def _devices(arguments: argparse.Namespace) -> dict:
+def _devices(arguments: argparse.Namespace) -> dict[str, Any]:
     from .devices import devices_command
 
     return devices_command(arguments.test, arguments.json, arguments.config_dir)

@@ -101,15 +101,15 @@ class Rollout:
             beyond_end: continue to step worlds after their end; the first end is the outcome.
         """
         self.task = task
-        self.worlds = list(worlds) or [task.make_world(scenario, settings) for scenario in scenarios]
+        self.worlds: list[World] = list(worlds) or [task.make_world(scenario, settings) for scenario in scenarios]
         self.agents = agents
         self.outcomes: list[Outcome] = [RUNNING] * len(self.worlds)
-        self.ends = [0] * len(self.worlds)
-        self.running = np.arange(len(self.worlds))
+        self.ends: list[int] = [0] * len(self.worlds)
+        self.running: Array = np.arange(len(self.worlds))
         self.observers: list[Observer] = []
         self._beyond_end = beyond_end
         self._bounds = task.spec.joint_action.bounds
-        self.actions = np.zeros((0, self._bounds.shape[1]))
+        self.actions: Array = np.zeros((0, self._bounds.shape[1]))
         if begin:
             seeds = seeds or [0] * len(self.worlds)
             starts = [

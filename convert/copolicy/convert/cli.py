@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
@@ -98,7 +98,7 @@ def _add_output_flags(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _mcap(arguments: argparse.Namespace) -> dict:
+def _mcap(arguments: argparse.Namespace) -> dict[str, Any]:
     repo_id, licence = checked_repo_id(arguments.repo_id), checked_licence(arguments.license)
     fps, downsampling = _DEFAULT_FPS if arguments.fps is None else arguments.fps, arguments.downsampling or "mean"
     convert = convert_recordings
@@ -138,7 +138,7 @@ def _video(arguments: argparse.Namespace) -> tuple[int, int] | None:
     return stored_video_size(arguments.out, arguments.video, size)
 
 
-def _upstream(arguments: argparse.Namespace) -> dict:
+def _upstream(arguments: argparse.Namespace) -> dict[str, Any]:
     return convert_upstream(
         arguments.path,
         arguments.out,

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.clock import stride
 from copolicy.dataset.command_line.commands import progress
@@ -28,7 +29,7 @@ def convert_recordings(
     conversion: Conversion,
     skip_damaged: bool = False,
     workers: int = 1,
-) -> dict:
+) -> dict[str, Any]:
     """Writes the episodes of all `*.mcap` files in `folders` as a data set at `root`, in the order of their paths.
 
     Args:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class CopolicyError(Exception):
@@ -13,7 +14,7 @@ class CopolicyError(Exception):
 
     exit_status = 2
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         # Subclasses build the message from their arguments; an error from a worker process already has its message.
         return _with_message, (type(self), self.args)
 

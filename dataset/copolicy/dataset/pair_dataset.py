@@ -98,11 +98,11 @@ class PairDataset:
 
     def __init__(self, folder: LeRobotFolder):
         self._folder = folder
-        self.root = folder.root
-        self.info = folder.info
-        self.task = folder.task
-        self.fps = int(folder.info["fps"])
-        self.episodes = Episodes(folder, self.fps)
+        self.root: Path = folder.root
+        self.info: dict[str, Any] = folder.info
+        self.task: PairTask = folder.task
+        self.fps: int = int(folder.info["fps"])
+        self.episodes: Episodes = Episodes(folder, self.fps)
 
     def __len__(self) -> int:
         return len(self.episodes)

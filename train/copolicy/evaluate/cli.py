@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
@@ -43,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run(parser, argv)
 
 
-def _coplan(arguments: argparse.Namespace) -> dict:
+def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
     figure = arguments.out.with_suffix(".png")
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)

@@ -20,7 +20,7 @@ from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.utils.import_utils import register_third_party_plugins
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
-from copolicy.collect.agents.training_conditions import training_conditions
+from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
@@ -68,12 +68,12 @@ class Checkpoint:
             FileFormatError: the policy cannot be loaded, does not act for both players from observations of the task,
                 or lacks one of the settings.
         """
-        self.folder = folder = checkpoint_folder(path)
-        self.conditions = training_conditions(folder)
-        self.fps = self.conditions.fps
+        self.folder: Path = (folder := checkpoint_folder(path))
+        self.conditions: TrainingConditions = training_conditions(folder)
+        self.fps: int = self.conditions.fps
         register_third_party_plugins()
         try:
-            self.policy, self._preprocess, self._postprocess = _load(
+            policy, self._preprocess, self._postprocess = _load(
                 folder, device, settings or {}, get_task(self.conditions.task)
             )
         except CopolicyError:
@@ -82,19 +82,20 @@ class Checkpoint:
             raise FileFormatError(
                 folder, "a policy that LeRobot can load", f"{type(error).__name__}: {error}"
             ) from error
-        self.weights_sha256 = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
+        self.policy: Any = policy
+        self.weights_sha256: str = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
         self._config: Any = self.policy.config
-        self.task = self.conditions.task
-        self.name = f"policy:{self._config.type}-{self.weights_sha256[:8]}"
+        self.task: str = self.conditions.task
+        self.name: str = f"policy:{self._config.type}-{self.weights_sha256[:8]}"
         indices = self._config.observation_delta_indices
         self._indices = None if indices is None else [index - 1 for index in indices if index <= 0]
-        self.n_obs_steps = -min(self._indices or [-1])
-        self.n_action_steps = int(getattr(self._config, "n_action_steps", 1))
+        self.n_obs_steps: int = -min(self._indices or [-1])
+        self.n_action_steps: int = int(getattr(self._config, "n_action_steps", 1))
         ahead = getattr(self._config, "horizon", 0) - self.n_obs_steps + 1
-        self.chunk_size = int(max(self.n_action_steps, ahead, getattr(self._config, "chunk_size", 0)))
+        self.chunk_size: int = int(max(self.n_action_steps, ahead, getattr(self._config, "chunk_size", 0)))
         self.n_predicted_actions: int | None = None
         # Only `select_action` computes a temporal ensemble over chunks.
-        self.keeps_history = getattr(self._config, "temporal_ensemble_coeff", None) is not None
+        self.keeps_history: bool = getattr(self._config, "temporal_ensemble_coeff", None) is not None
         self.inference_seconds: list[float] = []
         self.batch_sizes: list[int] = []
         self._devices = ["cpu", device] if torch.device(device).type == "cuda" else ["cpu"]

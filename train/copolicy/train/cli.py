@@ -9,6 +9,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
@@ -107,7 +108,7 @@ def _value(name: str, flags: Sequence[str]) -> str | None:
     return None
 
 
-def _print_help(arguments: argparse.Namespace) -> dict:
+def _print_help(arguments: argparse.Namespace) -> dict[str, Any]:
     print(_HELP)
     try:
         require_packages(*TRAINING)
@@ -122,7 +123,7 @@ def _print_help(arguments: argparse.Namespace) -> dict:
     return {}
 
 
-def _train(arguments: argparse.Namespace) -> dict:
+def _train(arguments: argparse.Namespace) -> dict[str, Any]:
     flags = [_with_newest_checkpoint(flag) for flag in _joined(with_defaults(arguments.flags))]
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))

@@ -52,7 +52,7 @@ default_collate_fn_map[WindowBatch] = _collate_complete
 default_collate_fn_map[DeferredBatch] = _collate_complete
 
 
-class MemoryDataset(Dataset):
+class MemoryDataset(Dataset[dict[str, Any]]):
     """The frames of a `LeRobotDataset` as tensors, with a window around each frame, without images and videos.
 
     Has the attributes that LeRobot's trainer reads from a data set. An index is a position among the frames of the
@@ -68,13 +68,13 @@ class MemoryDataset(Dataset):
         Raises:
             RunError: rows of an episode are missing or not in order, or a column has empty values.
         """
-        self.meta = dataset.meta
-        self.episodes = dataset.episodes
-        self.hf_dataset = dataset.hf_dataset
-        self.absolute_to_relative_idx = dataset.absolute_to_relative_idx
-        self.num_frames = dataset.num_frames
-        self.num_episodes = dataset.num_episodes
-        self.deferred = deferred
+        self.meta: Any = dataset.meta
+        self.episodes: list[int] | None = dataset.episodes
+        self.hf_dataset: Any = dataset.hf_dataset
+        self.absolute_to_relative_idx: dict[int, int] | None = dataset.absolute_to_relative_idx
+        self.num_frames: int = dataset.num_frames
+        self.num_episodes: int = dataset.num_episodes
+        self.deferred: bool = deferred
         table = self.hf_dataset.data
         columns = {
             name: column_values(name, table.column(name), self.meta.features[name]["shape"])

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.collect.agents.checkpoint_folder import pretrained_folder
 from copolicy.dataset.command_line.commands import add_command, command_parser
@@ -40,7 +41,7 @@ def policy_parser() -> tuple[argparse.ArgumentParser, set[str]]:
     return parser, set(commands.choices)
 
 
-def _export(arguments: argparse.Namespace) -> dict:
+def _export(arguments: argparse.Namespace) -> dict[str, Any]:
     from .export import export_checkpoint
 
     commands = []
@@ -59,6 +60,6 @@ def _export(arguments: argparse.Namespace) -> dict:
     )
 
 
-def _pretrained(_: argparse.Namespace) -> dict:
+def _pretrained(_: argparse.Namespace) -> dict[str, Any]:
     folder = pretrained_folder()
     return {"path": str(folder), "bytes": sum(file.stat().st_size for file in folder.iterdir())}

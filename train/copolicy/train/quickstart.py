@@ -9,6 +9,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
 from copolicy.dataset.command_line.extras import FIGURES, TRAINING
@@ -51,7 +52,7 @@ def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
     return (*TRAINING, *FIGURES, *(("zarr",) if arguments.upstream else ()))
 
 
-def _quickstart(arguments: argparse.Namespace) -> dict:
+def _quickstart(arguments: argparse.Namespace) -> dict[str, Any]:
     out: Path = arguments.out
     started = perf_counter()
     run_chain(out, _steps(arguments))
@@ -136,7 +137,7 @@ def _mixed_precision() -> tuple[tuple[str, str], ...]:
     return (("ACCELERATE_MIXED_PRECISION", "bf16"),) if "avx512_bf16" in flags or "amx_bf16" in flags else ()
 
 
-def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
+def _summary(arguments: argparse.Namespace, seconds: float) -> dict[str, Any]:
     out: Path = arguments.out
     training = out / "training" / "checkpoints" / "last" / "pretrained_model"
     source = "files of the original program" if arguments.upstream else "simulated pairs"

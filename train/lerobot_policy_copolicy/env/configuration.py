@@ -117,7 +117,7 @@ class PairTaskEnvConfig(EnvConfig):
         return PAIR_GYM_ID
 
     @property
-    def gym_kwargs(self) -> dict:
+    def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of `gymnasium.make`: all settings except LeRobot's."""
         inherited = {field.name for field in fields(EnvConfig)} - {"task", "fps"}
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in inherited}

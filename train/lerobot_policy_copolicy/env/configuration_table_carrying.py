@@ -47,7 +47,7 @@ class TableCarryingEnvConfig(PairTaskEnvConfig):
         return GYM_ID
 
     @property
-    def gym_kwargs(self) -> dict:
+    def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of `gymnasium.make`."""
         return {name: value for name, value in super().gym_kwargs.items() if name not in ("task", "settings")}
 

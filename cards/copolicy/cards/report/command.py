@@ -51,7 +51,7 @@ def add_report_command(commands: Commands) -> None:
     report.add_argument("--overwrite", action="store_true", help="replace an existing page")
 
 
-def _report(arguments: argparse.Namespace) -> dict:
+def _report(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..facts import DatasetFacts
     from .payload import build_payload
 

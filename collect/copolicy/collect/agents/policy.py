@@ -100,10 +100,10 @@ class PolicyAgent(Agent):
         Raises:
             InvalidValueError: the policy learned another task.
         """
-        self.name = policy.name
+        self.name: str = policy.name
         self.latencies: list[float] = []
         self._policy = policy
-        self.task = task or get_task()
+        self.task: PairTask = task or get_task()
         if policy.task != self.task.spec.name:
             expected = f"a policy that has learned the task {self.task.spec.name!r}"
             raise InvalidValueError(policy.name, expected, policy.task)
@@ -136,7 +136,7 @@ class PolicyAgent(Agent):
         self._bounds = spec.joint_action.bounds
         self._joint = np.zeros((count, 2 * size))  # of the present frame
         self._observed_ns = 0  # of the present chunk; 0 without one
-        self.chunks = np.zeros(count, int)
+        self.chunks: Array = np.zeros(count, int)
         self._step = 0
         seed = starts[0].seed if self._seed is None else self._seed
         if self._worker is None:
@@ -155,7 +155,7 @@ class PolicyAgent(Agent):
         actions = self.half(self._seat, worlds)
         if self._worker is not None:
             age = self._clock() - self._observed_ns if self._observed_ns else 0
-            self.input = PlayerInput(axes=actions[0].tolist(), age_ns=age)
+            self.input: PlayerInput | None = PlayerInput(axes=actions[0].tolist(), age_ns=age)
         return actions
 
     def half(self, seat: int, worlds: Array) -> Array:

@@ -1,6 +1,7 @@
 """The main loop of a session: one step per tick, and frames drawn in the time between ticks."""
 
 from collections import Counter, deque
+from typing import Any
 
 from ..inputs import Command, CommandReader, Press
 from ..screen import Canvas
@@ -85,7 +86,7 @@ class Application:
             game.abandon_trial(error)
             raise game.storage_error() from None
 
-    def summary(self) -> dict:
+    def summary(self) -> dict[str, Any]:
         """Returns what the command prints, JSON-able."""
         game = self.game
         verdicts = Counter(verdict for _, verdict in game.results)

@@ -5,6 +5,7 @@ import logging
 import math
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import POLICIES
@@ -152,7 +153,7 @@ def _angular_limit(specs: Iterable[PlayerSpec], flag: str | None, task: PairTask
     return flag_limit
 
 
-def _play(arguments: argparse.Namespace) -> dict:
+def _play(arguments: argparse.Namespace) -> dict[str, Any]:
     settings = settings_from_flags(arguments)
     # Imported here, since pygame is slow to import and `--help` does not need it.
     from .session_run import play

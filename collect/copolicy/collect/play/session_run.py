@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .game import Game
 
 
-def play(settings: PlaySettings) -> dict:
+def play(settings: PlaySettings) -> dict[str, Any]:
     """Runs a session until it is complete or ended by a player or a signal.
 
     Returns:

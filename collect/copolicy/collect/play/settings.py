@@ -138,7 +138,7 @@ class PlaySettings:
         """The scenarios to play."""
         return self.scenario_set.scenarios
 
-    def session_settings(self) -> dict:
+    def session_settings(self) -> dict[str, Any]:
         """Returns the settings that must not change within a session, JSON-able."""
         bound = angular_limit_of(self.world_settings)
         return {

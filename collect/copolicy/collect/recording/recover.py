@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError, OutputExistsError
@@ -115,7 +115,7 @@ def recover_file(source: Path | str) -> Recovery:
     return Recovery(source, "recovered", output, part.steps, detail)
 
 
-def summary(folder: Path, recoveries: Iterable[Recovery]) -> dict:
+def summary(folder: Path, recoveries: Iterable[Recovery]) -> dict[str, Any]:
     """The summary of the command: counts, one line a file, and exit status 1 where a file is damaged."""
     recoveries = list(recoveries)
     lines = {str(recovery.source.relative_to(folder)): _line(recovery, folder) for recovery in recoveries}

@@ -44,7 +44,7 @@ def simulate(
     start_noise: float = 0.0,
     clearance: float | None = None,
     task: str = TABLE,
-) -> dict:
+) -> dict[str, Any]:
     """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
 
     States and actions depend only on the seed, the set and the pairs, not on the number of workers or the load: each
@@ -195,7 +195,7 @@ def _refuse_recordings(out: Path) -> None:
             raise OutputExistsError(path)
 
 
-def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict:
+def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict[str, Any]:
     steps = sum(result.steps for result in results)
     size = sum(result.size for result in results)
     return {

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.flag_numbers import number, seed
@@ -48,7 +49,7 @@ def add_export_command(commands: Commands) -> None:
     )
 
 
-def _export(arguments: argparse.Namespace) -> dict:
+def _export(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.alignment and arguments.format != "zarr":
         raise InvalidValueError("--alignment", "--format zarr beside it", arguments.format)
     for flag, value in (("--valid", arguments.valid), ("--valid-by", arguments.valid_by), ("--seed", arguments.seed)):

@@ -83,7 +83,7 @@ def append_recordings(
     conversion: Conversion,
     skip_damaged: bool = False,
     workers: int = 1,
-) -> dict:
+) -> dict[str, Any]:
     """Appends the recordings in `folders` whose episodes are not yet in the data set at `root`.
 
     A folder beside `root` gets hard links to the existing files and the new files, and then replaces `root`. An

@@ -10,7 +10,6 @@ from ..numbered_files import NumberedFiles
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
-
     from lerobot.datasets.feature_utils import get_hf_features_from_features
     from lerobot.datasets.utils import DEFAULT_DATA_PATH
 except ImportError as error:

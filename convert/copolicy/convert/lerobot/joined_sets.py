@@ -16,7 +16,6 @@ from .shifted_tables import Shift
 
 try:
     from datasets import config
-
     from lerobot.datasets import io_utils
     from lerobot.datasets.aggregate import aggregate_datasets
     from lerobot.datasets.compute_stats import aggregate_stats

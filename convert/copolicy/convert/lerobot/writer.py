@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,6 @@ from .prepare import PreparedEpisode, RepeatedEpisodeError
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
-
     from lerobot.datasets.compute_stats import aggregate_stats
     from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
     from lerobot.datasets.io_utils import write_info, write_stats
@@ -61,7 +61,7 @@ class WrittenDataset:
     successes: int
     mixtures: Mixtures
 
-    def summary(self) -> dict:
+    def summary(self) -> dict[str, Any]:
         """Entries of a command's summary."""
         facts = {name: value for name, value in vars(self).items() if name != "mixtures"}
         return {**facts, "root": str(self.root), **self.mixtures.summary()}

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import DATASETS
@@ -30,7 +31,7 @@ def add_merge_command(commands: Commands) -> None:
     )  # fmt: skip
 
 
-def _merge(arguments: argparse.Namespace) -> dict:
+def _merge(arguments: argparse.Namespace) -> dict[str, Any]:
     from .merge_datasets import merge_datasets
 
     if len(arguments.roots) < 2:

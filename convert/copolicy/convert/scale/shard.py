@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import asdict
 from importlib.metadata import version
+from typing import Any
 
 from copolicy.dataset.checks.checking import check_data, judges_one_recording
 from copolicy.dataset.checks.read_recordings import data_of_recordings, unverified_findings
@@ -81,7 +82,7 @@ def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | 
         raise DamagedEpisodeError(damaged[0])
 
 
-def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[Episode]) -> dict:
+def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[Episode]) -> dict[str, Any]:
     """Findings in the recordings at their recording rate, labelled with the episode's index in the shard."""
     if not episodes:
         return {"applied": [], "findings": []}

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.clock import Downsampling, stride
 from copolicy.dataset.command_line.commands import progress
@@ -86,7 +87,7 @@ def convert_upstream(
     options: UpstreamOptions = UpstreamOptions(),  # noqa: B008 - frozen
     license: str = "",
     skip_damaged: bool = False,
-) -> dict:
+) -> dict[str, Any]:
     """Writes the episodes at `path` as a data set at `root`.
 
     Args:

@@ -78,7 +78,7 @@ def scene_encoder(fps: int) -> RGBEncoderConfig:
     return RGBEncoderConfig(vcodec="h264", g=fps, crf=23, preset="veryfast", extra_options=options)
 
 
-def scene_feature(size: VideoSize) -> dict:
+def scene_feature(size: VideoSize) -> dict[str, Any]:
     """Returns the entry of LeRobot's features."""
     return {"dtype": "video", "shape": (size[1], size[0], 3), "names": ["height", "width", "channels"]}
 

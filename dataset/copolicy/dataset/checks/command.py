@@ -45,7 +45,7 @@ def add_check_command(commands: Commands) -> None:
     )
 
 
-def _check(arguments: argparse.Namespace) -> dict:
+def _check(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.rules:
         return {
             name: f"{limit.value:g} {limit.unit}: {limit.reason}"

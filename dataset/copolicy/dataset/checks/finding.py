@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Severity = Literal["error", "warning", "info"]
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info")
@@ -28,7 +28,7 @@ class Finding:
     severity: Severity
     message: str
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """A JSON-compatible dictionary; NaN and infinity become None."""
         return {
             name: None if isinstance(value, float) and not math.isfinite(value) else value

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from ..command_line.commands import Commands, add_command
 from ..command_line.flag_numbers import seed
@@ -110,7 +111,7 @@ def _selection(arguments: argparse.Namespace):
     return Selection(**values, where=arguments.where, drop_excluded=getattr(arguments, "drop_excluded", False))
 
 
-def _select(arguments: argparse.Namespace) -> dict:
+def _select(arguments: argparse.Namespace) -> dict[str, Any]:
     from .select import select
 
     selection = _selection(arguments)
@@ -119,7 +120,7 @@ def _select(arguments: argparse.Namespace) -> dict:
     return select(arguments.root, arguments.out, selection)
 
 
-def _split(arguments: argparse.Namespace) -> dict:
+def _split(arguments: argparse.Namespace) -> dict[str, Any]:
     from .parts import parse_parts
     from .split import split
 
@@ -138,13 +139,13 @@ def _split(arguments: argparse.Namespace) -> dict:
     )
 
 
-def _withdraw(arguments: argparse.Namespace) -> dict:
+def _withdraw(arguments: argparse.Namespace) -> dict[str, Any]:
     from .withdrawal.withdraw import withdraw
 
     return withdraw(arguments.consent, arguments.paths, arguments.yes)
 
 
-def _amend(arguments: argparse.Namespace) -> dict:
+def _amend(arguments: argparse.Namespace) -> dict[str, Any]:
     selection = _selection(arguments)
     if arguments.restore_from is not None:
         if criteria := selection.criteria():

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..command_line.commands import Commands, add_command
 from ..exceptions import InvalidValueError
@@ -125,7 +125,7 @@ def add_exclude_command(commands: Commands) -> None:
     mode.add_argument("--list", action="store_true", help="list excluded episodes and their reasons; change nothing")
 
 
-def _exclude(arguments: argparse.Namespace) -> dict:
+def _exclude(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.list:
         if arguments.episodes or arguments.reason:
             raise InvalidValueError("--list", "neither --episode-ids nor --reason with it", "one")

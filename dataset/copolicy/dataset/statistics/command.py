@@ -24,7 +24,7 @@ def add_stats_command(commands: Commands) -> None:
     )
 
 
-def _stats(arguments: argparse.Namespace) -> dict:
+def _stats(arguments: argparse.Namespace) -> dict[str, Any]:
     from .compute import compute_statistics
     from .reading import read_trajectories
 

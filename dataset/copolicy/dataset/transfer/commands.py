@@ -3,6 +3,7 @@
 import argparse
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from ..command_line.commands import Commands, add_command
 
@@ -39,13 +40,13 @@ def add_pull_command(commands: Commands) -> None:
     parser.add_argument("--with-raw", action="store_true", help="also download the recordings, if published")
 
 
-def _publish(arguments: argparse.Namespace) -> dict:
+def _publish(arguments: argparse.Namespace) -> dict[str, Any]:
     from .publish import publish
 
     return asdict(publish(arguments.root, arguments.repo_id, arguments.private, arguments.raw, arguments.with_excluded))
 
 
-def _pull(arguments: argparse.Namespace) -> dict:
+def _pull(arguments: argparse.Namespace) -> dict[str, Any]:
     from .pull import pull
 
     name, _, revision = arguments.name.partition("@")

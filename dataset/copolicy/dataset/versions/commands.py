@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from ..command_line.commands import Commands, add_command
 from ..exceptions import CopolicyError, RunError
@@ -43,7 +44,7 @@ def add_diff_command(commands: Commands) -> None:
     parser.add_argument("b", metavar="B", help="data set to compare with A")
 
 
-def _release(arguments: argparse.Namespace) -> dict:
+def _release(arguments: argparse.Namespace) -> dict[str, Any]:
     from .release import release
 
     record = release(arguments.root, arguments.bump, arguments.notes)
@@ -56,7 +57,7 @@ def _release(arguments: argparse.Namespace) -> dict:
     }
 
 
-def _diff(arguments: argparse.Namespace) -> dict:
+def _diff(arguments: argparse.Namespace) -> dict[str, Any]:
     from .diff_inputs import compare_statistics, read_diff_input
     from .difference import compare
 

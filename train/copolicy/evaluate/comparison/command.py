@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.exceptions import InvalidValueError
@@ -31,7 +32,7 @@ def add_compare_command(commands: Commands) -> None:
     command.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
-def _compare(arguments: argparse.Namespace) -> dict:
+def _compare(arguments: argparse.Namespace) -> dict[str, Any]:
     # Imported here so that `--help` does not wait for scipy.
     from .compare import compare
     from .markdown import markdown

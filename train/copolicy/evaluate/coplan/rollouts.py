@@ -44,7 +44,7 @@ class EpisodeResult:
         """Number of steps of the world."""
         return len(self.interaction) if self.end is None and self.interaction is not None else int(self.end or 0)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The row of `eval.json`."""
         return {
             "map_index": self.map_index,

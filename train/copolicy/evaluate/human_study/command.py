@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
@@ -120,7 +121,7 @@ def _add_summarise(steps: Commands) -> None:
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 
 
-def _plan(arguments: argparse.Namespace) -> dict:
+def _plan(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partner_study.command import split_name
     from .plan import Robot, make_plan, williams_square
 
@@ -163,7 +164,7 @@ def _plan(arguments: argparse.Namespace) -> dict:
     }
 
 
-def _run(arguments: argparse.Namespace) -> dict:
+def _run(arguments: argparse.Namespace) -> dict[str, Any]:
     from copolicy.collect.play.settings import PlayerSpec
 
     from .plan import StudyPlan
@@ -192,7 +193,7 @@ def _run(arguments: argparse.Namespace) -> dict:
     )
 
 
-def _summarise(arguments: argparse.Namespace) -> dict:
+def _summarise(arguments: argparse.Namespace) -> dict[str, Any]:
     from .plan import StudyPlan
     from .questionnaire import read_ratings
     from .recordings import study_rows
@@ -230,7 +231,7 @@ def _summarise(arguments: argparse.Namespace) -> dict:
     return {"label": summary["label"], **counts, **_report(summary)}
 
 
-def _report(summary: dict) -> dict:
+def _report(summary: dict) -> dict[str, Any]:
     robots = {}
     for name, robot in summary["robots"].items():
         robots[name] = {"success": _value(robot["success"], 100, 1, " %"), "time": _value(robot["time_s"], 1, 2, " s")}

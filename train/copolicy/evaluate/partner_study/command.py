@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.dataset.command_line.commands import Commands, add_command, progress_bar
@@ -64,7 +64,7 @@ def add_partner_command(commands: Commands) -> None:
     add_study_flags(command, n_action_steps=1)
 
 
-def _partner(arguments: argparse.Namespace) -> dict:
+def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     figure = arguments.out.with_suffix(".png")
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
@@ -187,7 +187,7 @@ def split_name(text: str) -> tuple[str, str]:
     return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)
 
 
-def _report(summary: dict) -> dict:
+def _report(summary: dict) -> dict[str, Any]:
     time, force, deadlock = (summary[name] for name in ("time_to_completion_s", "interaction_force", "deadlock"))
     measures = {
         "interaction_force": None if force is None else round(force["mean"], 4),

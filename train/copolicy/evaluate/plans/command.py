@@ -4,7 +4,7 @@ import argparse
 import math
 from collections import Counter, defaultdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from copolicy.collect.angular_limit import LIMIT_SETTING, angular_limit_of
 from copolicy.dataset.command_line.commands import Commands, add_command
@@ -52,7 +52,7 @@ def add_plans_command(commands: Commands) -> None:
     add_study_flags(command, n_action_steps=8)
 
 
-def _plans(arguments: argparse.Namespace) -> dict:
+def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
     require_new(arguments.out, overwrite=arguments.overwrite)
@@ -100,7 +100,7 @@ def _plans(arguments: argparse.Namespace) -> dict:
     }
 
 
-def _counts(branch_point: "BranchPoint") -> dict:
+def _counts(branch_point: "BranchPoint") -> dict[str, Any]:
     """Counts chunks and averages the players' first forces by route; counts how the episodes ended."""
     groups: dict[str, list] = defaultdict(list)
     for sample in branch_point.samples:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -106,7 +106,7 @@ class FastSampler:
             prepared = self._prepared[tokens, backend] = _Prepared(weights, fast, denoiser)
         return prepared
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[str, Any]:
         """State without prepared networks: a session of ONNX Runtime can be neither copied nor pickled."""
         return {**self.__dict__, "_prepared": {}}
 
