@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from lerobot.datasets import LeRobotDataset
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from torch.utils.data import Dataset
 from torch.utils.data._utils.collate import default_collate_fn_map
 
@@ -59,10 +59,10 @@ class MemoryDataset(Dataset[dict[str, Any]]):
     selected episodes, as in `LeRobotDataset`. Video files are not opened.
     """
 
-    def __init__(self, dataset: LeRobotDataset, deferred: bool = False):
+    def __init__(self, dataset: Any, deferred: bool = False):
         """
         Args:
-            dataset: data set to load.
+            dataset: the `LeRobotDataset` to load (Any, because LeRobot's types are not exported).
             deferred: yield a `DeferredBatch` for each batch, which is gathered on the device that it is sent to.
 
         Raises:
