@@ -42,7 +42,7 @@ def add_demo_command(commands: Commands) -> None:
     command.add_argument("--partner", metavar="PAIR", help="simulated pair of the task (default: its first one)")
     command.add_argument("--seed", type=seed(), default=0, help="seed of the policy and the partner (default 0)")
     command.add_argument("--speed", type=number("--speed", 0), default=2.0, help="times real time (default 2)")
-    command.add_argument("--fps", type=whole_number("--fps", None), default=12, help="images a second (default 12)")
+    command.add_argument("--fps", type=whole_number("--fps", None), default=12, help="frames per second (default 12)")
     command.add_argument("--width", type=whole_number("--width", None), default=600, help="px (default 600)")
     command.add_argument("--overwrite", action="store_true", help="replace an existing file")
 

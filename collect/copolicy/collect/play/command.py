@@ -66,7 +66,9 @@ def add_play_command(commands: Commands) -> None:
         default=0,
         help="number of practice episodes before them, marked and discarded (default 0)",
     )
-    command.add_argument("--seed", type=seed(), default=0, help="of the schedule and of scripted players (default 0)")
+    command.add_argument(
+        "--seed", type=seed(), default=0, help="seed of the schedule and of scripted players (default 0)"
+    )
     command.add_argument(
         "--seats",
         choices=("swap", "fixed"),
