@@ -115,9 +115,9 @@ def sound_recordings(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def recorded(sound_recordings):
     """Six recordings as the rules of `check` see them."""
-    from copolicy.dataset.checks.checking import read_table
+    from copolicy.dataset.checks.checking import read_data
 
-    return read_table(sound_recordings)
+    return read_data(sound_recordings)
 
 
 @pytest.fixture(scope="session")
@@ -125,9 +125,9 @@ def sound(sound_recordings):
     """The data set of these recordings as the rules of `check` see it."""
     from checked_data import make_data_set
 
-    from copolicy.dataset.checks.checking import read_table
+    from copolicy.dataset.checks.checking import read_data
 
-    return read_table(make_data_set(sound_recordings, sound_recordings.parent / "set"))
+    return read_data(make_data_set(sound_recordings, sound_recordings.parent / "set"))
 
 
 @pytest.fixture(scope="session")

@@ -35,7 +35,7 @@ def trajectories(episodes, rows, fps: int = 10) -> Trajectories:
         states = still(length) if states is None else states
         filled.append((states, np.zeros((length, 4)) if actions is None else actions))
     numbered = [replace(entry, episode_uuid=f"e{index}") for index, entry in enumerate(rows)]
-    return Trajectories.of(filled, numbered, fps)
+    return Trajectories.from_episodes(filled, numbered, fps)
 
 
 def still(length: int, x: float = 300.0, y: float = 300.0) -> np.ndarray:
@@ -83,7 +83,7 @@ def write_folder(data: Trajectories, root: Path, **columns) -> Path:
         table.append({"episode_index": index, "length": length, **asdict(meta)})
         table[-1].update({name: values[index] for name, values in columns.items()})
     parquet.write_table(pa.Table.from_pylist(table), root / "meta/episodes/chunk-000/file-000.parquet")
-    environment = np.array([environment_state(entry.map_config) for entry in data.rows])[data.episode]
+    environment = np.array([environment_state(entry.scenario) for entry in data.rows])[data.episode]
     arrays = {
         "observation.state": data.states,
         "observation.environment_state": environment,

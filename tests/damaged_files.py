@@ -10,7 +10,7 @@ import numpy as np
 import upstream_files
 import zarr
 
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 
 STEPS = 12
 
@@ -64,13 +64,13 @@ def _recordings(recording: Path, name: str) -> Callable[[Path], Path]:
 
 def _raw(folder: Path) -> Path:
     folder.mkdir()
-    states, actions = upstream_files.play(upstream_files.held(STEPS))
+    states, actions = upstream_files.play(upstream_files.random_forces(STEPS))
     upstream_files.write_raw(folder, states, actions, map_config=upstream_files.CONFIG)
     return folder
 
 
 def _processed(folder: Path) -> Path:
-    states, actions = upstream_files.play(upstream_files.held(STEPS))
+    states, actions = upstream_files.play(upstream_files.random_forces(STEPS))
     pose = np.column_stack((states[1:, :2], np.cos(states[1:, 2]), np.sin(states[1:, 2])))
     config = upstream_files.CONFIG
     obstacles = np.zeros(3)
@@ -83,7 +83,7 @@ def _processed(folder: Path) -> Path:
 def _store(version: int, zipped: bool = False) -> Callable[[Path], Path]:
     def build(folder: Path) -> Path:
         folder.mkdir()
-        states, actions = upstream_files.play(upstream_files.held(STEPS))
+        states, actions = upstream_files.play(upstream_files.random_forces(STEPS))
         upstream_files.write_store(folder / "plain", states, actions)
         arrays = ZarrArrays(folder / "plain", "data/obs")
         group = zarr.open_group(folder / "table.zarr", mode="w", zarr_format=version)  # type: ignore[arg-type]

@@ -208,15 +208,15 @@ def look_before_training(root: Path) -> None:
         CopolicyError: the data set cannot be trained on.
     """
     from copolicy.dataset.lerobot_folder.info import read_info
-    from copolicy.dataset.lerobot_folder.loading import read_statistics
+    from copolicy.dataset.lerobot_folder.loading import read_frame_statistics
     from copolicy.train.episode_choice import check_local_dataset
-    from copolicy.train.finite_data import mended_statistics, require_finite_frames
+    from copolicy.train.finite_data import replacement_statistics, require_finite_frames
 
     check_local_dataset(root)
     info = read_info(root)
     require_finite_frames(root, None, info["features"])
     episodes = range(info["total_episodes"])
-    mended_statistics(root, read_statistics(root), episodes, len(episodes))
+    replacement_statistics(root, read_frame_statistics(root), episodes, len(episodes))
 
 
 _QUANTILES = ("q01", "q10", "q50", "q90", "q99")

@@ -7,7 +7,7 @@ from play_session import on_short_map, settings
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.screen import Canvas
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
 
 class Hands:
@@ -25,16 +25,16 @@ class Hands:
         for _ in range(count):
             assert self.application._tick(self.game.ticker.tick())
 
-    def press(self, button, *pads):
-        """Several pads at the same moment are one that is listed twice, or two people."""
+    def press(self, button, *gamepads):
+        """Several gamepads pressed at once are one that is listed twice, or two people."""
         for down in (True, False):
-            for pad in pads:
-                pad.button(button, down)
+            for gamepad in gamepads:
+                gamepad.button(button, down)
             self.ticks(4)
 
     def panel(self, player=0):
         players = self.game.seats()
-        seat = [one.index for one in players].index(player)
+        seat = [seated.index for seated in players].index(player)
         return self.application.phase._panel(seat, players[seat])
 
     def screen(self):
@@ -43,13 +43,13 @@ class Hands:
         self.application.phase.draw(canvas, 1.0)
         return canvas.surface
 
-    def start(self, *pads, button=0):
+    def start(self, *gamepads, button=0):
         """From the lobby, where all have joined, to the first step."""
-        for pad in pads:
-            self.press(button, pad)
+        for gamepad in gamepads:
+            self.press(button, gamepad)
         self.ticks(20)
         assert self.phase == "Ready"
-        self.press(button, pads[0])
+        self.press(button, gamepads[0])
         self.ticks(3)
         assert self.phase == "Running"
 
@@ -60,7 +60,7 @@ def lobby(tmp_path, **changes):
         on_short_map(application)
         application.phase.enter()
         yield Hands(application)
-        application.game.break_off("quit")
+        application.game.end_trial("quit")
 
 
 def flags(path):

@@ -10,8 +10,8 @@ from typing import Any
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.play.application import Application
-from copolicy.collect.play.settings import PilotSpec, PlaySettings
-from copolicy.collect.session import Balance
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
+from copolicy.collect.session import BalancedSchedule
 from copolicy.collect.ticker import MonotonicClock
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -19,7 +19,7 @@ SHORT_MAP = MapConfig(start=(760.0, 300.0, 3.14), goal=(960.0, 300.0))
 """Straight ahead, two and a half seconds away."""
 
 A, B, X, Y, START = 0, 1, 2, 3, 7
-"""Buttons of a game pad."""
+"""Buttons of a gamepad."""
 
 
 def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
@@ -27,7 +27,7 @@ def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
     values: dict[str, Any] = {
         "pair": "P01",
         "out": tmp_path / "recordings",
-        "pilots": (PilotSpec("joystick"), PilotSpec("joystick")),
+        "players": (PlayerSpec("joystick"), PlayerSpec("joystick")),
         "episodes": 4,
         "config_folder": tmp_path / "config",
         "window": (400, 320),
@@ -40,8 +40,10 @@ def settings(tmp_path: Path, **changes: Any) -> PlaySettings:
 def on_short_map(application: Application) -> None:
     """Puts every episode of a session on the short map."""
     game = application.game
-    game.maps = (SHORT_MAP,)
-    game.balance = Balance(game.maps, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False)
+    game.scenarios = (SHORT_MAP,)
+    game.schedule = BalancedSchedule(
+        game.scenarios, game.settings.episodes, game.settings.seed, game.settings.pair, swap=False
+    )
 
 
 class SimulatedClock(MonotonicClock):
@@ -137,15 +139,15 @@ class Players(threading.Thread):
         """Waits for a phase."""
         self.until(lambda: type(self.application.phase).__name__ == name, name)
 
-    def press(self, pad: VirtualJoystick, button: int) -> None:
+    def press(self, gamepad: VirtualJoystick, button: int) -> None:
         """Presses a button as a person does, and lets the program see it."""
-        self.until(lambda: pad.is_open, "an open joystick")
-        pad.button(button, True)
+        self.until(lambda: gamepad.is_open, "an open joystick")
+        gamepad.button(button, True)
         self.sleep(0.08)
-        pad.button(button, False)
+        gamepad.button(button, False)
         self.sleep(0.08)
 
-    def carry(self, *pads: VirtualJoystick, steps: int | None = None) -> None:
+    def carry(self, *gamepads: VirtualJoystick, steps: int | None = None) -> None:
         """Pushes with both sticks towards the goal, for a number of steps or until the episode ends."""
         game = self.application.game
         trial = game.trial
@@ -154,14 +156,14 @@ class Players(threading.Thread):
         limit = self.clock() + 40e9
         while trial.steps < last and not trial.outcome.done and self.clock() < limit:
             x, y, _ = trial.world.pose
-            dx, dy = trial.map_config.goal[0] - x, trial.map_config.goal[1] - y
-            for pad in pads:
-                pad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
+            dx, dy = trial.scenario.goal[0] - x, trial.scenario.goal[1] - y
+            for gamepad in gamepads:
+                gamepad.move(dx / math.hypot(dx, dy), dy / math.hypot(dx, dy))
             self.sleep(0.01)
-        for pad in pads:
-            pad.move(0.0, 0.0)
+        for gamepad in gamepads:
+            gamepad.move(0.0, 0.0)
 
     def result(self) -> None:
         """Waits for the result, and until it listens."""
-        self.phase("Result")
+        self.phase("ResultPhase")
         self.sleep(0.5)

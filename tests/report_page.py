@@ -1,4 +1,4 @@
-"""A data set of simulated pairs, its report, and a headless Chromium that looks at it."""
+"""A data set of simulated pairs, its report, and a headless Chromium that shows it."""
 
 import base64
 import contextlib
@@ -20,7 +20,7 @@ from copolicy.convert.cli import main as convert
 from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.route_entropy import route_statistics
-from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
+from copolicy.tasks.table.statistics.route_statistics import route_statistics as routes_of_tables
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REPORT = "report.html"
@@ -31,7 +31,7 @@ FINDINGS = {
         {"episode": "", "rule": "balance", "figure": 1, "limit": 5, "severity": "error", "message": "too few <b>"},
     ],
 }
-"""What `copolicy-dataset check --json` printed before it named the content that it checked."""
+"""Output of an earlier `copolicy-dataset check --json`, without a content hash."""
 
 STATISTICS = {
     "version": 1,
@@ -50,10 +50,10 @@ STATISTICS = {
 }  # fmt: skip
 
 
-def route_document(words: list[str], episodes: int) -> dict[str, Any]:
+def route_document(labels: list[str], episodes: int) -> dict[str, Any]:
     """Stored statistics of routes past two obstacles, as those of a data set with so many simulated episodes."""
     rng = np.random.default_rng(0)
-    data = carried_set(words, TWO, rng)
+    data = carried_set(labels, TWO, rng)
     bootstrap = Bootstrap(data.pairs, 200, rng)
     estimates = route_statistics(data, bootstrap, rng) | routes_of_tables(data, bootstrap, rng)
     return {
@@ -86,7 +86,7 @@ def make_report(root: Path) -> Path:
 
 @contextlib.contextmanager
 def chromium(profile: Path) -> Iterator[BrowserContext]:
-    """A headless Chromium with a profile of its own."""
+    """A headless Chromium with its own profile."""
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
     flags = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
@@ -117,7 +117,7 @@ class Visit:
 
 @contextlib.contextmanager
 def visiting(browser: BrowserContext) -> Iterator[Visit]:
-    """A visit that must ask for nothing but files and see no error."""
+    """A visit that may request files only and must see no error."""
     visit = Visit(browser)
     yield visit
     assert visit.errors == []
@@ -125,12 +125,12 @@ def visiting(browser: BrowserContext) -> Iterator[Visit]:
     visit.page.close()
 
 
-def picture(page: Page, selector: str) -> bytes:
+def canvas_pixels(page: Page, selector: str) -> bytes:
     """The pixels of a canvas."""
     url = page.eval_on_selector(selector, "canvas => canvas.toDataURL()")
     return base64.b64decode(url.partition(",")[2])
 
 
-def column(page: Page, place: int) -> list[str]:
+def column(page: Page, index: int) -> list[str]:
     """The texts of a column of the table of episodes, from 1."""
-    return page.locator(f"#episode-table tbody tr > :nth-child({place})").all_inner_texts()
+    return page.locator(f"#episode-table tbody tr > :nth-child({index})").all_inner_texts()

@@ -28,7 +28,7 @@ def times_of(shards: Path) -> dict[str, int]:
 
 
 def record_rest(path: Path) -> None:
-    """A recording of half a second in which nobody does anything."""
+    """A recording of half a second without any action."""
     config = MAP_SETS["training"][0]
     world = TableWorld(config)
     meta = EpisodeMeta("at-rest", map_id="training-00", map_set="training", pair_id="nobody")
@@ -40,5 +40,5 @@ def record_rest(path: Path) -> None:
 
 
 def damage(path: Path) -> None:
-    """Cuts the end off."""
+    """Truncates a file."""
     path.write_bytes(path.read_bytes()[:-2000])

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,9 +16,9 @@ from copolicy.dataset.exceptions import MissingExtraError
 WORKS = None
 # A call of every command, and the package that it lacks.
 CALLS: dict[str, tuple[str, str | None]] = {
-    "copolicy-cards dataset": ("set --repo-id lab/table", "pyarrow"),
-    "copolicy-cards model": ("pretrained", "pyarrow"),
-    "copolicy-cards report": ("set --out report.html", "pyarrow"),
+    "copolicy-cards dataset": ("set --repo-id lab/table", "matplotlib"),
+    "copolicy-cards model": ("pretrained", "matplotlib"),
+    "copolicy-cards report": ("set --out report.html", WORKS),
     "copolicy-collect demo": ("--out demo.gif", "torch"),
     "copolicy-collect devices": ("", WORKS),
     "copolicy-collect maps check": ("maps.yaml", WORKS),
@@ -28,21 +29,21 @@ CALLS: dict[str, tuple[str, str | None]] = {
     "copolicy-collect recover": ("recordings", WORKS),
     "copolicy-collect replay": ("recordings/episode_000000.mcap --verify --out film.gif", "Pillow"),
     "copolicy-collect simulate": ("--episodes 1 --workers 1 --out simulated", WORKS),
-    "copolicy-convert export": ("set --format minari --out table-v0", "pyarrow"),
-    "copolicy-convert mcap": ("recordings --out new --repo-id lab/table", "pyarrow"),
-    "copolicy-convert merge": ("set set --out new --repo-id lab/table", "pyarrow"),
-    "copolicy-convert upstream": ("recordings --out new --repo-id lab/table", "pyarrow"),
-    "copolicy-dataset amend": ("set --set license=cc0-1.0", "pyarrow"),
-    "copolicy-dataset check": ("set", "pyarrow"),
-    "copolicy-dataset diff": ("set set", "pyarrow"),
-    "copolicy-dataset exclude": ("set --list", "pyarrow"),
-    "copolicy-dataset publish": ("set --repo-id lab/table", "pyarrow"),
-    "copolicy-dataset pull": ("lab/table --out new", "pyarrow"),
-    "copolicy-dataset release": ("set --bump major --notes first", "pyarrow"),
-    "copolicy-dataset select": ("set --out new --where success", "pyarrow"),
-    "copolicy-dataset split": ("set --out new --parts a=0.5 b=0.5", "pyarrow"),
-    "copolicy-dataset stats": ("set", "pyarrow"),
-    "copolicy-dataset withdraw": ("C-1 set", "pyarrow"),
+    "copolicy-convert export": ("set --format minari --out table-v0", "h5py"),
+    "copolicy-convert mcap": ("recordings --out new --repo-id lab/table", "lerobot"),
+    "copolicy-convert merge": ("set set --out new --repo-id lab/table", "lerobot"),
+    "copolicy-convert upstream": ("recordings --out new --repo-id lab/table", "lerobot"),
+    "copolicy-dataset amend": ("set --set license=cc0-1.0", WORKS),
+    "copolicy-dataset check": ("set", WORKS),
+    "copolicy-dataset diff": ("set set", WORKS),
+    "copolicy-dataset exclude": ("set --list", WORKS),
+    "copolicy-dataset publish": ("set --repo-id lab/table", WORKS),
+    "copolicy-dataset pull": ("lab/table --out new", WORKS),
+    "copolicy-dataset release": ("set --bump major --notes first", WORKS),
+    "copolicy-dataset select": ("set --out new --where success", WORKS),
+    "copolicy-dataset split": ("set --out new --parts a=0.5 b=0.5", WORKS),
+    "copolicy-dataset stats": ("set", WORKS),
+    "copolicy-dataset withdraw": ("C-1 set", WORKS),
     "copolicy-eval compare": ("one.json other.json", WORKS),
     "copolicy-eval coplan": ("--policy pretrained --out eval/a.json", "torch"),
     "copolicy-eval human plan": ("A=pretrained B=pretrained --out study/plan.json", WORKS),
@@ -58,7 +59,7 @@ MORE: list[tuple[str, str | None]] = [
     ("copolicy-train --dataset.root=set --steps=1 --output_dir=trained", "lerobot"),
     ("copolicy-dataset check recordings", WORKS),
     ("copolicy-dataset check --rules", WORKS),
-    ("copolicy-convert mcap recordings --out new --repo-id lab/table --video", "pyarrow"),
+    ("copolicy-convert mcap recordings --out new --repo-id lab/table --video", "lerobot"),
     ("copolicy-quickstart --out quick --upstream recordings", "lerobot"),
 ]
 
@@ -105,6 +106,20 @@ def test_what_is_missing_is_one_line_before_any_work(sound_recordings, tmp_path)
         line = f"{said['words'][0]}: {lacks} is not installed: this command needs the extra, {extra}\n"
         assert (said["status"], said["out"], said["err"]) == (2, "", line), said
         assert said["left"] == [], said
+
+
+@pytest.mark.usefixtures("sound")  # which makes the data set of the recordings
+def test_a_data_set_is_read_without_extras(sound_recordings, tmp_path):
+    shutil.copytree(sound_recordings.parent / "set", tmp_path / "data")
+    calls = (
+        "dataset check data",
+        "dataset stats data",
+        "dataset release data --bump major --notes first",
+        "cards report data",
+    )
+    for said in _walk(tmp_path, [*(f"copolicy-{call}" for call in calls), "copolicy-cards dataset data --no-figures"]):
+        assert said["status"] == 0, said
+    assert (tmp_path / "data" / "report.html").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(("package", "extra"), [("numba", "numba"), ("onnx", "onnx"), ("datatrove", "scale")])

@@ -33,7 +33,7 @@ def dataset(tmp_path_factory, upstream) -> Path:
 
 @pytest.fixture
 def offline(monkeypatch):
-    """Whoever asks for the network fails at once."""
+    """Any use of the network fails."""
 
     def refuse(*arguments, **named):
         raise OSError("these tests have no network")
@@ -78,11 +78,11 @@ def test_its_frames_are_those_of_the_data(dataset, offline):
     records = list(loaded.records("frames"))
     table = parquet.read_table(dataset / "data" / "chunk-000" / "file-000.parquet")
     assert len(records) == table.num_rows
-    for place in (0, table.num_rows // 2, table.num_rows - 1):
-        row = table.slice(place, 1).to_pylist()[0]
-        assert set(records[place]) == {f"frames/{name}" for name in row}
+    for index in (0, table.num_rows // 2, table.num_rows - 1):
+        row = table.slice(index, 1).to_pylist()[0]
+        assert set(records[index]) == {f"frames/{name}" for name in row}
         for name, value in row.items():
-            np.testing.assert_array_equal(records[place][f"frames/{name}"], value, err_msg=name)
+            np.testing.assert_array_equal(records[index][f"frames/{name}"], value, err_msg=name)
 
 
 def test_its_episodes_are_those_of_the_data(dataset, offline):
@@ -93,10 +93,10 @@ def test_its_episodes_are_those_of_the_data(dataset, offline):
     for record, row in zip(loaded.records("episodes"), rows, strict=True):
         assert set(record) == {f"episodes/{name}" for name in ("episode_index", "length", *EPISODE_COLUMNS)}
         for name in EPISODE_COLUMNS:
-            found, value = record[f"episodes/{name}"], row[name]
+            stored, value = record[f"episodes/{name}"], row[name]
             if isinstance(value, float) and np.isnan(value):
                 value = None
-            assert (found.decode() if isinstance(found, bytes) else found) == value, name
+            assert (stored.decode() if isinstance(stored, bytes) else stored) == value, name
 
 
 def test_every_file_of_the_data_has_its_check_sum(dataset):
@@ -111,7 +111,7 @@ def test_every_file_of_the_data_has_its_check_sum(dataset):
         assert entry["sha256"] == hashlib.sha256((dataset / name).read_bytes()).hexdigest()
 
 
-def test_pictures_are_no_columns(dataset, tmp_path):
+def test_images_are_no_columns(dataset, tmp_path):
     from copolicy.cards.croissant import croissant_metadata
     from copolicy.cards.facts import DatasetFacts
 
@@ -124,7 +124,7 @@ def test_pictures_are_no_columns(dataset, tmp_path):
     ]
 
 
-def test_it_must_be_said_where_the_data_are(dataset, capsys):
+def test_croissant_needs_a_repo_id(dataset, capsys):
     assert main(["dataset", str(dataset), "--croissant", "--no-figures", "--overwrite"]) == 2
-    expected = "--repo-id: expected user/name with --croissant, which says where the data are, found None"
+    expected = "--repo-id: expected user/name with --croissant, which states the data's location, found None"
     assert capsys.readouterr().err == f"copolicy-cards: {expected}\n"

@@ -9,7 +9,7 @@ from huggingface_hub import DatasetCard
 from report_page import route_document
 
 from copolicy.cards.cli import main
-from copolicy.cards.dataset_card import render
+from copolicy.cards.dataset_card import render_dataset_card
 from copolicy.cards.facts import DatasetFacts
 from copolicy.collect.cli import main as collect
 from copolicy.convert.cli import main as convert
@@ -61,7 +61,7 @@ def test_a_card_states_what_the_metadata_holds(dataset):
     assert f"| frames | {info['total_frames']:,} |" in text
     assert "| reached the goal | 5 of 6 (83.3 %) |" in text
     assert "| collision_obstacle | 1 of 6 (16.7 %) |" in text
-    assert "Those files do not say who or what held the sticks." in text
+    assert "Those files do not state who or what played." in text
     assert "No person took part" not in text
     assert 'LeRobotDataset("lab/table")' in text
     assert "| `observation.human_action` | float32 | 2 | human_fx, human_fy |" in text
@@ -75,9 +75,9 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
         "Motivation", "Composition", "Collection: who played, and how it was recorded", "Preprocessing", "Uses",
         "Distribution and licence", "Maintenance", "Consent and withdrawal", "Citation",
     ]  # fmt: skip
-    assert "No episode is marked as played by people, so there is no consent to state." in text
+    assert "No episode is marked as played by people, so no consent is stated." in text
     assert "- Converted by `copolicy-convert upstream` " in text
-    assert "- The action of a frame is the mean of the recorded actions until the next frame" in text
+    assert "- Downsampling: the mean of the recorded actions until the next frame" in text
     assert "eprint  = {2305.12171}" in text
     for name in ("trajectories", "routes"):
         assert f"](figures/{name}.png)" in text
@@ -87,12 +87,12 @@ def test_a_card_is_a_datasheet_with_figures(dataset):
 
 def test_the_datasheet_names_the_command_that_withdraws(dataset):
     _set_column(dataset, "source", ["human"] * len(DatasetFacts.read(dataset).episodes))
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "copolicy-dataset withdraw CONSENT_ID PATH... --yes" in text
     assert "Withdrawn so far" not in text
     entries = [{"date": "2026-03-01", "episodes": 2}, {"date": "2026-04-01", "episodes": 1}]
     (dataset / WITHDRAWALS_FILE).write_text(withdrawals_text(entries), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "Withdrawn so far: 3 episodes, which are in no file of this version." in text
 
 
@@ -112,7 +112,7 @@ def test_names_of_numbers_may_be_anything(dataset):
 
 
 def test_statistics_come_with_their_interval_and_their_null(dataset):
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "Not computed: `copolicy-dataset stats` was not run on this data set." in text
     stored = {
         "version": 1,
@@ -128,44 +128,42 @@ def test_statistics_come_with_their_interval_and_their_null(dataset):
         },
     }  # fmt: skip
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(stored), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "| route entropy: one obstacle | 0.9877 | bits | 0.8 to 1 | 0.1 (0 to 0.25) | 6 |" in text
     assert "| route entropy: two | - | bits | - | - | 0 |" in text
     assert "- **route entropy: two**: of routes (too few)" in text
     (dataset / "meta" / "copolicy_stats.json").write_text("{", encoding="utf-8")
     with pytest.raises(
-        FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found no JSON"
+        FileFormatError, match=r"copolicy_stats.json: expected statistics of copolicy-dataset stats, found invalid JSON"
     ):
-        render(DatasetFacts.read(dataset), "lab/table")
+        render_dataset_card(DatasetFacts.read(dataset), "lab/table")
 
 
-def test_findings_are_counted_and_their_age_is_told(dataset):
-    text = render(DatasetFacts.read(dataset), "lab/table")
+def test_findings_are_counted_and_dated(dataset):
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\nNot checked: `copolicy-dataset check` was not run on this data set." in text
     assert dataset_command(["check", str(dataset)]) == 0
-    kept = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
-    text = render(DatasetFacts.read(dataset), "lab/table")
-    counts = f"0 errors, {kept['counts']['warning']} warnings, {kept['counts']['info']} remarks."
-    assert (
-        f"Checked on {kept['date'][:10]} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}"
-        in text
-    )
-    assert "| severity | rule | findings | the first |" in text
+    stored = json.loads((dataset / "meta" / "copolicy_check.json").read_text(encoding="utf-8"))
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
+    counts = f"0 errors, {stored['counts']['warning']} warnings, {stored['counts']['info']} remarks."
+    date = stored["date"][:10]
+    assert f"Checked on {date} by version {RULES_VERSION} of the rules (`meta/copolicy_check.json`): {counts}" in text
+    assert "| severity | rule | findings | first finding |" in text
     assert "**Stale.**" not in text
     _set_column(dataset, "discarded", [True] * 6)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "## Checks\n\n**Stale.** The content of the data set changed since it was checked.\n\nChecked on" in text
     # What `check --json > meta/copolicy_check.json` kept before it named the content.
     entry = {"episode": "2", "rule": "idle_run", "figure": 5.25, "limit": 5, "severity": "warning", "message": "a|b"}
     old = {"rules": 37, "findings": [entry, {**entry, "episode": "", "figure": None}]}
     (dataset / "meta" / "copolicy_check.json").write_text(json.dumps(old), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**Unknown.** They do not say which content was checked: the data may have changed since." in text
     assert "Checked (`meta/copolicy_check.json`): 0 errors, 2 warnings, 0 remarks." in text
     assert "| warning | idle run | 2 | episode 2: a\\|b (5.25; limit 5) |" in text
 
 
-def test_routes_are_set_beside_those_of_people(dataset):
+def test_routes_are_compared_with_human_routes(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
     document = route_document(["LL", "LR", "RR", "RL"] * 10, 6)
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
@@ -176,7 +174,7 @@ def test_routes_are_set_beside_those_of_people(dataset):
     distance = routes["human_distance_2_obstacles"]
     low, high = distance["interval"]
     caption = f"2 obstacles: {distance['value']:.3f} bits (95 % interval {low:.3f} to {high:.3f})."
-    assert "*Routes of this data set (simulated pairs) beside those of human-human demonstrations" in text
+    assert "*Routes of this data set (simulated pairs) and of human-human demonstrations" in text
     assert caption in text
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     assert "<details><summary>Routes of simulated pairs in each of 1 configurations</summary>" in text
@@ -187,49 +185,49 @@ def test_routes_are_set_beside_those_of_people(dataset):
     assert "**Stale.**" not in text.partition("## Multimodality")[2].partition("## Checks")[0]
     document["dataset"]["episodes"] = 7
     (dataset / "meta" / "copolicy_stats.json").write_text(json.dumps(document), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**Stale.** They were computed when the data set had 7 episodes; it has 6 now." in text
 
 
 def test_a_release_is_named(dataset):
     release = {"version": "1.2.0", "date": "2026-01-02", "content_hash": "abc"}
     (dataset / "meta" / "copolicy_release.json").write_text(json.dumps(release), encoding="utf-8")
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert 'LeRobotDataset("lab/table", revision="data-1.2.0")' in text
     assert "- Version 1.2.0 of 2026-01-02; changes are in `CHANGELOG.md`." in text
 
 
 def test_simulated_episodes_are_called_that(dataset):
     _set_column(dataset, "source", ["simulated"] * 6)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "**No person took part.**" in text
     assert "simulated" in yaml.safe_load(text.split("---")[1])["tags"]
 
 
 def test_a_mixture_names_each_source(dataset):
     _set_column(dataset, "source", ["simulated"] * 2 + ["human"] * 4)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert "human (4), simulated (2)" in text
-    assert "Consent: 0 of 4 (0.0 %) episodes played by people name a consent record" in text
+    assert "Consent: 0 of 4 (0.0 %) episodes played by people state the identifier of a consent record" in text
 
 
 @pytest.mark.parametrize(
     ("licences", "expected"),
     [(["", *["mit"] * 5], "unknown"), (["cc0-1.0", *["mit"] * 5], "other"), (["MIT"] * 6, "mit")],
 )
-def test_a_licence_is_never_made_up(dataset, licences, expected):
+def test_the_licence_follows_from_the_episodes(dataset, licences, expected):
     _set_column(dataset, "license", licences)
-    text = render(DatasetFacts.read(dataset), "lab/table")
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert yaml.safe_load(text.split("---")[1])["license"] == expected
 
 
 def test_what_is_no_licence_identifier_is_refused(dataset):
     _set_column(dataset, "license", ["free for all"] * 6)
     with pytest.raises(InvalidValueError, match=r"license: expected a licence identifier of the Hub such as "):
-        render(DatasetFacts.read(dataset), "lab/table")
+        render_dataset_card(DatasetFacts.read(dataset), "lab/table")
 
 
-def test_a_card_is_not_overwritten_unless_asked(dataset, capsys):
+def test_a_card_is_overwritten_on_request_only(dataset, capsys):
     (dataset / "README.md").write_text("written by hand", encoding="utf-8")
     assert main(["dataset", str(dataset)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
@@ -268,14 +266,14 @@ def test_a_name_that_the_hub_would_refuse_is_refused(dataset, capsys):
     assert is_minimal_card(dataset / "README.md")
 
 
-def test_excluded_episodes_and_what_leaves_them_out_are_told(dataset):
-    assert "## Excluded episodes" not in render(DatasetFacts.read(dataset), "lab/table")
+def test_excluded_episodes_are_listed(dataset):
+    assert "## Excluded episodes" not in render_dataset_card(DatasetFacts.read(dataset), "lab/table")
     assert dataset_command(["exclude", str(dataset), "--episode-ids", "1", "3", "--reason", "stick unplugged"]) == 0
-    text = render(DatasetFacts.read(dataset), "lab/table")
-    assert "2 of 6 episodes are kept and marked as not to be used" in text
+    text = render_dataset_card(DatasetFacts.read(dataset), "lab/table")
+    assert "2 of 6 episodes are stored but marked as excluded" in text
     assert "| 3 | stick unplugged |" in text
     assert "lerobot-train --dataset.repo_id=lab/table --dataset.episodes='[0,2,4,5]'" in text
-    assert "its own trainer and loader take every episode unless they" in text
+    assert "its trainer and loader use every episode unless a list is given" in text
 
 
 def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):
@@ -288,7 +286,8 @@ def test_statistics_of_many_episodes_of_one_map_are_described(tmp_path, capsys):
     assert dataset_command(["stats", str(root)]) == 0
     stored = json.loads((root / "meta" / "copolicy_stats.json").read_text(encoding="utf-8"))["statistics"]
     estimates = [estimate for family in stored.values() for estimate in family.values()]
-    details = [entry for one in estimates for entry in one.get("details", {}).get("configurations", {}).values()]
+    all_details = [estimate.get("details", {}) for estimate in estimates]
+    details = [entry for detail in all_details for entry in detail.get("configurations", {}).values()]
     assert any("counts" in entry for entry in details)
     assert any("counts" not in entry for entry in details)
     capsys.readouterr()

@@ -37,7 +37,7 @@ def _evaluation(maps: str = "holdout", mean: float = 0.75, complete: bool = True
 
 @pytest.fixture
 def run(tmp_path) -> Path:
-    """A training run with one checkpoint, as LeRobot leaves it."""
+    """A training run with one checkpoint, as LeRobot writes it."""
     folder = tmp_path / "training" / "checkpoints" / "last" / "pretrained_model"
     folder.mkdir(parents=True)
     (folder / "model.safetensors").write_bytes(WEIGHTS)
@@ -85,9 +85,9 @@ def test_a_card_states_what_training_and_evaluation_wrote(run, dataset, tmp_path
         in text
     )
     assert "| coplan | unseen, first 5 | ddim, 10 steps, noise x 0.7 | 50.0 ± 4.7 |" in text
-    assert "Only a part of the maps of unseen was tried." in text
+    assert "Only a part of the maps of unseen was evaluated." in text
     assert "**Co-planning in simulation: no person took part.**" in text
-    assert "**No person took part.** Two scripted pilots" in text
+    assert "**No person took part.** Two scripted agents" in text
     assert "- Data set: `lab/table`\n- Source: simulated (4)\n- Episodes used: 2 of 4 (50.0 %)" in text
     assert "| training `seed` | 7 |" in text
     assert "| parameters | 1,132,464 |" in text
@@ -144,15 +144,17 @@ def exported(run) -> Path:
 
 def test_the_card_of_an_exported_policy_comes_from_its_own_files(exported, capsys):
     assert main(["model", str(exported), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["evaluations"], said["trained_on"]) == (2, {"simulated": 18})
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["evaluations"], summary["trained_on"]) == (2, {"simulated": 18})
     text = (exported / "README.md").read_text(encoding="utf-8")
-    assert "In: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
+    assert (
+        "Input: the last 3 frames at 10 Hz of the table's pose and velocity, the map (start, goal, up to three " in text
+    )
     assert "Training data: **No person took part.**" in text
     assert "- Data set: `local/pairs` (a local name, not one on the Hub)" in text
     assert "- Episodes used: 18 of 20 (90.0 %)\n- Frames: 3,400 at 10 Hz\n- Pairs: S01 (18)\n" in text
     assert "| training `steps` | 900 |" in text
-    assert "| weights | moving average over the training, alone |" in text
+    assert "| weights | moving average over the training only |" in text
     assert "`ema`" not in text
     assert "```bash\ncopolicy-collect simulate --episodes 20\ncopolicy-train --steps=900\n```" in text
     assert "hf download" not in text
@@ -163,19 +165,19 @@ def test_a_study_with_partners_has_a_table_of_its_own(exported):
     assert main(["model", str(exported)]) == 0
     text = (exported / "README.md").read_text(encoding="utf-8")
     assert "**With SIMULATED partners, no person took part.**" in text
-    assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) a plan, ddim, 10 steps" in text
+    assert "With simulated partners on 60 starts of the unseen maps, 1 action(s) per chunk, ddim, 10 steps" in text
     assert "| CoDP-H | 90.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0.48 | 95.0 |" in text
     assert "| passive | 75.0 ± 4.7 | 64.8 to 83.0 | 84 | 15.62 | 0.05004 | 0 | - |" in text
-    assert "The partners of the study above are simulated too" in text
+    assert "The partners of the study are also simulated" in text
 
 
-def test_the_model_of_the_package_is_called_by_its_name(exported, tmp_path):
+def test_the_packaged_model_is_named_pretrained(exported, tmp_path):
     folder = exported.rename(tmp_path / "pretrained")
     assert main(["model", str(folder)]) == 0
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert "copolicy-collect play --players keyboard policy:pretrained\n" in text
     assert "copolicy-eval coplan --policy pretrained --maps holdout --out eval.json\n" in text
-    assert "`copolicy-train pretrained` says where it is" in text
+    assert "`copolicy-train pretrained` prints its folder" in text
 
 
 def test_what_is_not_at_hand_is_not_stated(run):
@@ -188,9 +190,9 @@ def test_what_is_not_at_hand_is_not_stated(run):
 
 
 def test_an_evaluation_of_other_weights_is_refused(run, tmp_path, capsys):
-    other = _evaluation()
-    other["policy"]["weights_sha256"] = "0" * 64
-    path = _write(tmp_path / "eval.json", other)
+    evaluation = _evaluation()
+    evaluation["policy"]["weights_sha256"] = "0" * 64
+    path = _write(tmp_path / "eval.json", evaluation)
     assert main(["model", str(run), "--eval", path]) == 2
     digest = hashlib.sha256(WEIGHTS).hexdigest()[:12]
     assert capsys.readouterr().err == (
@@ -223,7 +225,7 @@ def test_a_folder_that_is_no_checkpoint_is_named(tmp_path, capsys):
     )
 
 
-def test_a_card_is_not_overwritten_unless_asked(run, capsys):
+def test_a_card_is_overwritten_on_request_only(run, capsys):
     _card(run).write_text("written by hand", encoding="utf-8")
     assert main(["model", str(run)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err

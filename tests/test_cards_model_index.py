@@ -82,8 +82,8 @@ def test_the_shipped_card_is_what_the_command_writes(tmp_path):
         ([{"complete_set": False, "map_count": 5}, {"complete_set": False, "map_count": 6}], ["coplan", "coplan"]),
     ],
 )  # fmt: skip
-def test_no_two_results_are_merged_whatever_tells_them_apart(changes, configs):
-    evaluations = [_evaluation(mean=0.1 * (place + 1), **change) for place, change in enumerate(changes)]
+def test_no_two_results_are_merged(changes, configs):
+    evaluations = [_evaluation(mean=0.1 * (index + 1), **change) for index, change in enumerate(changes)]
     results = _read_back(evaluations)
     assert len({result.unique_identifier for result in results}) == len(evaluations)
     assert [result.dataset_config for result in results] == configs
@@ -97,14 +97,14 @@ def test_no_two_results_are_merged_whatever_tells_them_apart(changes, configs):
 
 
 def test_a_part_of_the_maps_is_a_split_of_its_own():
-    whole, part = _read_back([_evaluation(), _evaluation(complete_set=False, map_count=5)])
-    assert (whole.dataset_split, part.dataset_split) == ("all", "5-maps")
-    assert part.dataset_name == "unseen maps, a part of them"
+    complete, incomplete = _read_back([_evaluation(), _evaluation(complete_set=False, map_count=5)])
+    assert (complete.dataset_split, incomplete.dataset_split) == ("all", "5-maps")
+    assert incomplete.dataset_name == "unseen maps, a part of them"
     (starts,) = _read_back([_evaluation("partner", complete_set=False, configurations=60)])
     assert starts.dataset_split == "60-starts"
 
 
-def test_the_robots_beside_the_policy_are_no_results_of_the_model():
+def test_baselines_are_no_results_of_the_model():
     evaluation = _evaluation("partner", 0.9)
     evaluation["baselines"] = [{"name": "passive", "summary": _evaluation(mean=0.2)["summary"]}]
     (result,) = _read_back([evaluation])

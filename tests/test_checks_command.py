@@ -94,7 +94,7 @@ def test_damaged_and_unfinished_recordings(recordings, check):
     status, lines = check(recordings)
     assert status == 1
     assert lines[0].startswith("error check_sum [episode_000001.mcap] expected an intact")
-    recover = "a recording that broke off; copolicy-collect recover makes it readable"
+    recover = "an unfinished recording; copolicy-collect recover makes it readable"
     assert f"warning unfinished [episode_000003.mcap.part] {recover}" in lines
 
 
@@ -113,7 +113,7 @@ def test_a_broken_table_of_frames(root, check):
     assert status == 1
     assert lines[0].startswith(f"error check_sum [] {FRAMES.as_posix()} cannot be read: ")
     assert "error check_sum [] no Parquet file in data can be read" in lines
-    assert "error rows [] meta/info.json has another total_frames than the files" in lines
+    assert "error rows [] total_frames of meta/info.json differs from the files" in lines
 
 
 def test_rows_that_are_missing(root, check):
@@ -124,8 +124,8 @@ def test_rows_that_are_missing(root, check):
     status, lines = check(root)
     assert status == 1
     assert serious(lines) == [
-        "error rows [3] another number of frames",
-        "error rows [] meta/info.json has another total_frames than the files",
+        "error rows [3] wrong number of frames",
+        "error rows [] total_frames of meta/info.json differs from the files",
     ]
 
 
@@ -187,7 +187,7 @@ def test_a_name_of_the_hub_is_looked_up_there(tmp_path, monkeypatch, capsys):
     # Tests may not reach the network: the Hub's client says so, for this name.
     monkeypatch.chdir(tmp_path)
     assert main(["check", "lab/no-such-table", "--revision", "data-1.0.0"]) == 1
-    error = "lab/no-such-table: asking the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"
+    error = "lab/no-such-table: querying the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"
     assert capsys.readouterr().err == f"copolicy-dataset: {error}\n"
 
 
@@ -195,7 +195,7 @@ def test_every_limit_is_printed(capsys):
     assert main(["check", "--rules"]) == 0
     out = capsys.readouterr().out
     assert "late_ticks.warning" in out
-    assert "every tenth action was given to a world that people did not see yet" in out
+    assert "every tenth action was applied to a state that people did not see yet" in out
 
 
 def test_help_waits_for_no_heavy_package():

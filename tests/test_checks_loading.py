@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, FRAMES, make_data_set, make_recordings, set_columns, set_frames
 
-from copolicy.dataset.checks.checking import check_dataset, check_table, read_table
+from copolicy.dataset.checks.checking import check_data, check_dataset, read_data
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +62,9 @@ def test_a_missing_column_of_lerobot_is_an_error(root, name):
 
 
 def test_a_rule_that_could_not_be_applied_is_an_error(root):
-    table = read_table(root)
+    table = read_data(root)
     frames = {name: values for name, values in table.frames.items() if name != "timestamp"}
-    result = check_table(replace(table, frames=frames))
+    result = check_data(replace(table, frames=frames))
     assert result.failed()
     assert "error: applied: rules that could not be applied: timestamps needs timestamp" in str(result.findings[0])
 
@@ -79,7 +79,7 @@ def test_a_nan_in_any_number_of_the_frames_is_an_error(root, name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is not there"),
+        (lambda root: set_columns(root, **{"data/file_index": [7, 7, 7]}), "file-007.parquet, which is missing"),
         (lambda root: set_columns(root, **{"data/chunk_index": [0, -1, 0]}), "data/chunk_index -1"),
         (lambda root: set_info(root, data_path=None), "data_path None in meta/info.json"),
         (lambda root: set_info(root, data_path="data/{nothing}.parquet"), "data_path"),
@@ -112,18 +112,18 @@ def test_a_task_that_is_not_there(root):
 def test_sentences_that_are_no_index_are_not_found_by_lerobot(root):
     path = root / "meta/tasks.parquet"
     pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
-    assert any("does not mark its sentences as the index" in line for line in errors(root))
+    assert any("does not have its sentences as the pandas index" in line for line in errors(root))
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda path: path.unlink(), "no such file"),
-        (lambda path: path.write_text("{", encoding="utf-8"), "no JSON"),
-        (lambda path: path.write_text("{}", encoding="utf-8"), "says nothing of"),
+        (lambda path: path.write_text("{", encoding="utf-8"), "invalid JSON"),
+        (lambda path: path.write_text("{}", encoding="utf-8"), "has no statistics of"),
         (lambda path: _set_statistic(path, "mean", [math.nan] * 4), "no usable mean of action"),
         (lambda path: _set_statistic(path, "std", [1.0]), "no usable std of action"),
-        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json is not that"),
+        (lambda path: _set_statistic(path, "max", [9.0] * 4), "the max of action in meta/stats.json differs from"),
     ],
 )
 def test_no_broken_or_foreign_statistics(root, change, message):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from changed_tables import find, of, with_entry, with_frames
 
-from copolicy.dataset.checks.checking import check_table, rules_of
+from copolicy.dataset.checks.checking import check_data, rules_of
 from copolicy.dataset.checks.limits import limits_of
 from copolicy.dataset.features import ACTION, HUMAN_ACTION, STATE
 from copolicy.dataset.task import get_task
@@ -48,7 +48,7 @@ def test_longest_run_does_not_cross_episodes(sound):
     marks = np.array([0, 1, 1, 1, 1, 1, 0, 1], bool)
     assert small.longest_run(marks).tolist() == [2, 1, 2]
     assert small.longest_run(~marks).tolist() == [1, 0, 1]
-    assert small.share(marks).tolist() == [2 / 3, 1.0, 0.75]
+    assert small.proportion(marks).tolist() == [2 / 3, 1.0, 0.75]
 
 
 def test_a_wrong_feature_table(sound):
@@ -102,19 +102,19 @@ def test_rows_and_ranges(sound):
 
 
 def test_rules_without_their_columns_are_named_and_the_others_go_on(sound):
-    assert check_table(sound).not_applied == {}
+    assert check_data(sound).not_applied == {}
     for part in ("columns", "frames"):
         held = getattr(sound, part)
         for name in held:
             if name in ("episode_index", "length"):
                 continue  # without them there is no table
             rest = {other: values for other, values in held.items() if other != name}
-            result = check_table(replace(sound, **{part: rest}))
+            result = check_data(replace(sound, **{part: rest}))
             needing = {rule.name for rule in RULES if name in getattr(rule, part)}
             assert set(result.not_applied) == needing, name
     bare = replace(sound, frames={}, framed=np.array([], int), starts=np.array([], int))
-    result = check_table(bare)
+    result = check_data(bare)
     assert result.not_applied["jumps"] == f"needs {STATE}"
     assert "consent" in result.applied
     nobody = replace(bare, labels=(), columns={name: values[:0] for name, values in sound.columns.items()})
-    assert {finding.severity for finding in check_table(nobody).findings} <= {"error", "info"}
+    assert {finding.severity for finding in check_data(nobody).findings} <= {"error", "info"}

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from changed_tables import all_frames, find, of, with_column, with_entry, with_frames
 
-from copolicy.dataset.checks.episode_table import EpisodeTable
+from copolicy.dataset.checks.episode_data import EpisodeData
 from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.tasks.table.maps import MAP_SETS, identify, map_set
-from copolicy.tasks.table.rules.maps import named_map
+from copolicy.tasks.table.rules.maps import map_by_name
 
 
 def test_maps_by_name():
     for name in MAP_SETS:
         for config in map_set(name, orientations=True):
-            assert named_map(identify(config)[0]) is not None
+            assert map_by_name(identify(config)[0]) is not None
     config = map_set("training", orientations=True)[4 * 17 + 1]
     assert identify(config)[0] == "training-17-90deg"
-    assert named_map("training-17-90deg") == config
-    assert named_map("training-17-90deg-displaced") == config
+    assert map_by_name("training-17-90deg") == config
+    assert map_by_name("training-17-90deg-displaced") == config
     for name in ("training-84", "training-17-45deg", "nowhere-01", "", "custom-1a2b3c4d"):
-        assert named_map(name) is None
+        assert map_by_name(name) is None
 
 
 def test_wrong_maps(sound):
@@ -89,7 +89,7 @@ def test_failures_that_the_geometry_contradicts(sound):
 def test_duplicates_by_name_and_by_bits(sound):
     table = with_entry(sound, "episode_uuid", 4, sound.columns["episode_uuid"][1])
     assert [str(finding) for finding in find(table, "duplicate_names")] == [
-        "error: duplicate: episode 4: the same episode_uuid as episode 1 (2; limit 1)"
+        "error: duplicate: episode 4: same episode_uuid as episode 1 (2; limit 1)"
     ]
     same = np.arange(sound.starts[0], sound.ends[0] + 1)
     rows = np.concatenate((np.arange(sound.frame_count), same))
@@ -100,11 +100,11 @@ def test_duplicates_by_name_and_by_bits(sound):
         framed=np.arange(7),
         starts=np.append(sound.starts, sound.frame_count),
     )
-    message = "the same states and actions, bit for bit, as episode 0"
+    message = "states and actions bit-identical to episode 0"
     assert [(f.episode, f.message) for f in find(copied, "duplicate_motion")] == [("6", message)]
 
 
-def episodes_of(sound: EpisodeTable, maps: list[str], pairs: list[str]) -> EpisodeTable:
+def episodes_of(sound: EpisodeData, maps: list[str], pairs: list[str]) -> EpisodeData:
     columns = {"map_id": np.array(maps), "map_set": np.array(["training"] * len(maps)), "pair_id": np.array(pairs)}
     return replace(sound, labels=tuple(map(str, range(len(maps)))), columns=columns)
 
@@ -159,7 +159,7 @@ def test_leakage_between_splits(sound):
     table = replace(sound, info=info)
     for column in ("pair_id", "player_0_id", "player_1_id"):
         table = with_column(table, column, apart)
-    assert [finding.message for finding in find(table, "leakage")] == ["split odd is no range"]
+    assert [finding.message for finding in find(table, "leakage")] == ["split odd is not a range"]
     shared = with_entry(with_column(table, "source", ["human"] * 6), "pair_id", 5, "p1")
     shared = with_entry(shared, "source_sha256", 5, shared.columns["source_sha256"][2])
     found = find(replace(shared, info={"splits": {"train": "0:4", "test": "4:6"}}), "leakage")
@@ -186,7 +186,7 @@ def test_two_files_of_maps_with_one_name(sound):
     digests = np.array(["a" * 16, *["b" * 16] * (count - 1)])
     found = find(with_column(of_file, "map_set_digest", digests), "map_files")
     assert [f.message for f in found] == [
-        f"episodes of several files of maps that are all named lab: {count - 1} of version 1, digest {'b' * 16}; 1 of "
+        f"episodes from several map files with the same name lab: {count - 1} of version 1, digest {'b' * 16}; 1 of "
         f"version 1, digest {'a' * 16}"
     ]
     elsewhere = with_entry(of_file, "map_id", 0, "other-01")

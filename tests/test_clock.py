@@ -27,8 +27,8 @@ def test_the_first_action_can_be_held_instead():
     np.testing.assert_array_equal(clock.frame_actions(ACTIONS, 10, "first"), ACTIONS[::3])
 
 
-def test_an_unknown_hold_is_refused():
-    with pytest.raises(InvalidValueError, match="hold: expected one of"):
+def test_an_unknown_downsampling_is_refused():
+    with pytest.raises(InvalidValueError, match="downsampling: expected one of"):
         clock.frame_actions(ACTIONS, 10, "median")  # pyright: ignore[reportArgumentType]
 
 

@@ -1,4 +1,4 @@
-"""A reader that has enough, such as `head`: every command ends in silence and with its own status."""
+"""A reader that closes the pipe, such as `head`: every command completes without an error."""
 
 import os
 import subprocess
@@ -11,14 +11,14 @@ SCRIPTS = Path(sysconfig.get_path("scripts"))
 
 
 def _closed() -> int:
-    """The writing end of a pipe that nobody reads."""
+    """The writing end of a pipe whose reading end is closed."""
     reading, writing = os.pipe()
     os.close(reading)
     return writing
 
 
 def _status(call: list[str], unbuffered: bool = False) -> tuple[int, str]:
-    """Exit status of a call whose stdout is a closed pipe, and what it said on stderr."""
+    """Exit status of a call whose stdout is a closed pipe, and its stderr."""
     stdout = _closed()
     environment = {**os.environ, "PYTHONUNBUFFERED": "1" if unbuffered else ""}
     try:
@@ -39,18 +39,18 @@ def _status(call: list[str], unbuffered: bool = False) -> tuple[int, str]:
         (["copolicy-eval", "--version"], 0),
     ],
 )
-def test_nothing_is_said_of_a_reader_that_went(call, status, unbuffered):
+def test_a_closed_pipe_gives_no_error(call, status, unbuffered):
     assert _status(call, unbuffered) == (status, "")
 
 
-def test_the_work_is_done_and_decides_the_status(sound_recordings, tmp_path):
+def test_a_command_with_a_closed_pipe_completes(sound_recordings, tmp_path):
     assert _status(["copolicy-dataset", "check", str(sound_recordings), "--strict"], unbuffered=True) == (1, "")
     out = tmp_path / "simulated"
     assert _status(["copolicy-collect", "simulate", "--episodes", "1", "--workers", "1", "--out", str(out)]) == (0, "")
     assert [path.name for path in out.iterdir()] == ["episode_000000.mcap"]
 
 
-def test_errors_may_go_nowhere_too(tmp_path):
+def test_a_closed_stderr_gives_no_error(tmp_path):
     stderr = _closed()
     try:
         done = subprocess.run(

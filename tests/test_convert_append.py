@@ -19,7 +19,7 @@ from copolicy.dataset.lerobot_folder.exclusions import exclude, excluded_episode
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
+def folders(tmp_path_factory) -> Path:
     """Two sessions, the first as a data set, and both as another."""
     folder = tmp_path_factory.mktemp("append")
     make_recordings(folder / "a", 4, seed=1)
@@ -32,8 +32,8 @@ def made(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def root(made, tmp_path) -> Path:
-    return Path(shutil.copytree(made / "set", tmp_path / "set"))
+def root(folders, tmp_path) -> Path:
+    return Path(shutil.copytree(folders / "set", tmp_path / "set"))
 
 
 def add(folder: Path, root: Path, *flags: str) -> int:
@@ -41,22 +41,22 @@ def add(folder: Path, root: Path, *flags: str) -> int:
     return main([*arguments, "--append", "--json", *flags])
 
 
-def test_the_result_is_that_of_one_conversion(made, root, capsys):
+def test_the_result_is_that_of_one_conversion(folders, root, capsys):
     before = contents(root)
-    assert add(made / "both", root) == 0
+    assert add(folders / "both", root) == 0
     summary = json.loads(capsys.readouterr().out)
-    appended, whole = load(root), load(made / "whole")
+    appended, together = load(root), load(folders / "whole")
     assert (summary["already_there"], summary["episodes_added"]) == (4, 3)
-    assert (summary["episodes"], summary["frames"]) == (7, whole.num_frames) == (7, appended.num_frames)
-    rows, expected = appended.meta.episodes, whole.meta.episodes
+    assert (summary["episodes"], summary["frames"]) == (7, together.num_frames) == (7, appended.num_frames)
+    rows, expected = appended.meta.episodes, together.meta.episodes
     assert rows.column_names == expected.column_names
     for name in rows.column_names:
         if name.endswith(("file_index", "chunk_index")):
             continue
-        for ours, theirs in zip(rows[name], expected[name], strict=True):
-            np.testing.assert_equal(ours, theirs, err_msg=name)
-    assert_same_frames(appended, whole, every=11)
-    assert_same_statistics(appended, whole)
+        for value, expected_value in zip(rows[name], expected[name], strict=True):
+            np.testing.assert_equal(value, expected_value, err_msg=name)
+    assert_same_frames(appended, together, every=11)
+    assert_same_statistics(appended, together)
     assert appended.meta.info.splits == {"train": "0:7"}
     after = contents(root)
     changed = {name for name in before if after[name] != before[name]}
@@ -68,12 +68,12 @@ def test_the_result_is_that_of_one_conversion(made, root, capsys):
     assert list(root.parent.iterdir()) == [root]
 
 
-def test_exclusions_stay_and_nothing_is_added_twice(made, root, capsys):
+def test_exclusions_stay_and_nothing_is_added_twice(folders, root, capsys):
     exclude(root, ["1"], "stick unplugged")
-    assert add(made / "b", root) == 0
+    assert add(folders / "b", root) == 0
     after = contents(root)
     capsys.readouterr()
-    assert add(made / "both", root) == 0
+    assert add(folders / "both", root) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["already_there"], summary["episodes_added"]) == (7, 0)
     assert contents(root) == after
@@ -83,12 +83,12 @@ def test_exclusions_stay_and_nothing_is_added_twice(made, root, capsys):
         (6, "withdrawn"),
     ]
     record = json.loads((root / "meta" / "copolicy.json").read_text(encoding="utf-8"))
-    assert [part["files"] for part in record["appended"]] == [3]
+    assert [addition["files"] for addition in record["appended"]] == [3]
 
 
-def test_a_third_session_goes_into_a_third_file(made, root, tmp_path):
+def test_a_third_session_goes_into_a_third_file(folders, root, tmp_path):
     make_recordings(tmp_path / "c", 2, seed=3)
-    assert add(made / "b", root) == 0
+    assert add(folders / "b", root) == 0
     assert add(tmp_path / "c", root) == 0
     dataset = load(root)
     assert dataset.num_episodes == 9
@@ -99,7 +99,7 @@ def test_a_third_session_goes_into_a_third_file(made, root, tmp_path):
 
 
 @pytest.mark.parametrize("renamed", [0, 1])
-def test_an_interruption_is_made_good(made, root, monkeypatch, renamed):
+def test_an_interrupted_append_is_restored(folders, root, monkeypatch, renamed):
     before = contents(root)
     rename = Path.rename
     calls = []
@@ -112,25 +112,25 @@ def test_an_interruption_is_made_good(made, root, monkeypatch, renamed):
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "rename", interrupted)
-        assert add(made / "b", root) == 130
+        assert add(folders / "b", root) == 130
     append.finish_interrupted(root)
     assert contents(root) == before
     assert list(root.parent.iterdir()) == [root]
-    assert add(made / "b", root) == 0
+    assert add(folders / "b", root) == 0
     assert load(root).num_episodes == 7
 
 
-def test_everything_is_on_the_disk_before_it_takes_the_place(made, root, monkeypatch):
+def test_everything_is_on_the_disk_before_the_rename(folders, root, monkeypatch):
     with monkeypatch.context() as patch:
         happened = record_disk_order(patch)
-        assert add(made / "b", root) == 0
-    place = happened.index(root)
-    assert inodes(root, *root.rglob("*")) <= set(happened[:place])
-    assert happened[place + 1 :] == [*inodes(root.parent)]
+        assert add(folders / "b", root) == 0
+    position = happened.index(root)
+    assert inodes(root, *root.rglob("*")) <= set(happened[:position])
+    assert happened[position + 1 :] == [*inodes(root.parent)]
 
 
-def test_a_damaged_recording_changes_nothing(made, root, tmp_path, capsys):
-    folder = shutil.copytree(made / "b", tmp_path / "damaged")
+def test_a_damaged_recording_changes_nothing(folders, root, tmp_path, capsys):
+    folder = shutil.copytree(folders / "b", tmp_path / "damaged")
     broken = folder / "episode_000001.mcap"
     broken.write_bytes(broken.read_bytes()[:-2000])
     before = contents(root)
@@ -148,15 +148,15 @@ def test_a_damaged_recording_changes_nothing(made, root, tmp_path, capsys):
         (["--downsampling", "first"], "--downsampling: expected 'mean', as {root} has it, found 'first'"),
     ],
 )
-def test_another_clock_is_refused(made, root, capsys, flags, message):
+def test_another_clock_is_refused(folders, root, capsys, flags, message):
     before = contents(root)
-    assert add(made / "b", root, *flags) == 2
+    assert add(folders / "b", root, *flags) == 2
     assert capsys.readouterr().err == f"copolicy-convert: {message.format(root=root)}\n"
     assert contents(root) == before
 
 
-def test_there_must_be_a_data_set(made, tmp_path, capsys):
-    assert add(made / "b", tmp_path / "none") == 2
+def test_there_must_be_a_data_set(folders, tmp_path, capsys):
+    assert add(folders / "b", tmp_path / "none") == 2
     error = capsys.readouterr().err
     assert error.startswith(
         f"copolicy-convert: {tmp_path / 'none'}: expected a LeRobot v3 data set with meta/info.json"

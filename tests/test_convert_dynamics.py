@@ -27,39 +27,39 @@ def turn(angle):
 
 def test_steps_are_those_of_the_original(traces):
     states, actions, physics = traces
-    before, after = states[:, :-1], states[:, 1:]
-    position, velocity = step_linear(before[..., :2], before[..., 3:5], actions, physics)
-    theta, omega = step_angular(before[..., 2], before[..., 5], actions, physics)
-    assert np.abs(position - after[..., :2]).max() < 1e-12
-    assert np.abs(velocity - after[..., 3:5]).max() < 1e-12
-    assert np.abs(turn(theta - after[..., 2])).max() < 1e-12
-    assert np.abs(omega - after[..., 5]).max() < 1e-12
+    states_before, states_after = states[:, :-1], states[:, 1:]
+    position, velocity = step_linear(states_before[..., :2], states_before[..., 3:5], actions, physics)
+    theta, omega = step_angular(states_before[..., 2], states_before[..., 5], actions, physics)
+    assert np.abs(position - states_after[..., :2]).max() < 1e-12
+    assert np.abs(velocity - states_after[..., 3:5]).max() < 1e-12
+    assert np.abs(turn(theta - states_after[..., 2])).max() < 1e-12
+    assert np.abs(omega - states_after[..., 5]).max() < 1e-12
 
 
 def test_undone_steps_are_those_of_the_original(traces):
     states, actions, physics = traces
-    before, after = states[:, :-1], states[:, 1:]
-    position, velocity = undo_linear(after[..., :2], after[..., 3:5], actions, physics)
-    assert np.abs(position - before[..., :2]).max() < 1e-11
-    assert np.abs(velocity - before[..., 3:5]).max() < 1e-12
-    theta, omega = undo_angular(after[..., 2], after[..., 5], actions, physics)
-    errors = np.hypot(turn(theta - before[..., 2]), omega - before[..., 5])
+    states_before, states_after = states[:, :-1], states[:, 1:]
+    position, velocity = undo_linear(states_after[..., :2], states_after[..., 3:5], actions, physics)
+    assert np.abs(position - states_before[..., :2]).max() < 1e-11
+    assert np.abs(velocity - states_before[..., 3:5]).max() < 1e-12
+    theta, omega = undo_angular(states_after[..., 2], states_after[..., 5], actions, physics)
+    errors = np.hypot(turn(theta - states_before[..., 2]), omega - states_before[..., 5])
     assert np.nanmin(errors, axis=0).max() < 1e-12
-    several = (~np.isnan(omega)).sum(axis=0) > 1
-    assert 0.01 < several.mean() < 0.5  # the ambiguity is real, and not the rule
+    ambiguous = (~np.isnan(omega)).sum(axis=0) > 1
+    assert 0.01 < ambiguous.mean() < 0.5  # the ambiguity is real, and not the rule
 
 
 def test_integration_is_the_world(traces):
     states, actions, physics = traces
     for path, forces in zip(states, actions, strict=True):
-        found = integrate(tuple(path[0, :3]), tuple(path[0, 3:]), forces, physics)
+        integrated = integrate(tuple(path[0, :3]), tuple(path[0, 3:]), forces, physics)
         world = TableWorld(MAP_SETS["training"][0], physics)
         world.reset(path[0, :3], path[0, 3:])
         stepped = [(*world.pose, *world.velocity)]
         for force in forces:
             world.step(force)
             stepped.append((*world.pose, *world.velocity))
-        difference = found - np.array(stepped)
+        difference = integrated - np.array(stepped)
         difference[:, 2] = turn(difference[:, 2])
         assert np.abs(difference).max() < 1e-9
 

@@ -15,11 +15,11 @@ from gymnasium.envs.registration import EnvSpec
 
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.features import GYM_ID, OBSERVATION_KEYS, STATE
-from copolicy.dataset.physics_text import physics_text
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
+from copolicy.dataset.settings_text import settings_text
 from copolicy.tasks.table.features import BOUNDS
 from copolicy.tasks.table.physics import Physics
 
@@ -85,34 +85,34 @@ def test_a_store_pairs_a_state_with_the_action_taken_in_it(data_set, tmp_path):
 def test_a_store_with_the_originals_alignment_comes_back_through_the_importer(data_set, tmp_path):
     store = export(data_set, "zarr", tmp_path / "table.zarr", "--alignment", "upstream")
     run("upstream", store, "--out", tmp_path / "back", "--repo-id", "lab/back")
-    for before, after in zip(episodes(data_set), episodes(tmp_path / "back"), strict=True):
-        np.testing.assert_allclose(after.actions, before.actions, atol=1e-6)
-        np.testing.assert_array_equal(after.environment, before.environment)
+    for exported, imported in zip(episodes(data_set), episodes(tmp_path / "back"), strict=True):
+        np.testing.assert_allclose(imported.actions, exported.actions, atol=1e-6)
+        np.testing.assert_array_equal(imported.environment, exported.environment)
         straight = [0, 1, 4, 5]
-        np.testing.assert_allclose(after.states[:, straight], before.states[:, straight], atol=1e-3)
-        # Which of three rotations led here is told from the action of the step before, which 10 Hz do not hold.
-        np.testing.assert_allclose(after.states[:, [2, 3]], before.states[:, [2, 3]], atol=4e-3)
-        assert after.meta["success"] == before.meta["success"]
-        assert after.meta["map_id"] == before.meta["map_id"]
+        np.testing.assert_allclose(imported.states[:, straight], exported.states[:, straight], atol=1e-3)
+        # Selecting one of three rotations needs the action of the previous step, which a data set at 10 Hz lacks.
+        np.testing.assert_allclose(imported.states[:, [2, 3]], exported.states[:, [2, 3]], atol=4e-3)
+        assert imported.meta["success"] == exported.meta["success"]
+        assert imported.meta["map_id"] == exported.meta["map_id"]
 
 
 def test_the_originals_raw_files_at_30_hz_give_the_originals_store(upstream, tmp_path):
     examples = upstream / "examples_scripted"
     run("upstream", examples / "raw", "--fps", 30, "--out", tmp_path / "raw", "--repo-id", "lab/raw")
-    ours = arrays(export(tmp_path / "raw", "zarr", tmp_path / "table.zarr", "--alignment", "upstream"))
-    theirs = arrays(examples / "table_10Hz.zarr")
-    places = {
+    exported = arrays(export(tmp_path / "raw", "zarr", tmp_path / "table.zarr", "--alignment", "upstream"))
+    original = arrays(examples / "table_10Hz.zarr")
+    entries = {
         entry["raw"]: entry for entry in json.loads((examples / "zarr_episode_index.json").read_text(encoding="utf-8"))
     }
     for number, episode in enumerate((1, 2, 3, 4, 8, 11)):
-        entry = places[f"ep_{episode}"]
-        mine, original = rows_of(ours[3], number), rows_of(theirs[3], entry["zarr_episode"])
+        entry = entries[f"ep_{episode}"]
+        rows, original_rows = rows_of(exported[3], number), rows_of(original[3], entry["zarr_episode"])
         # What the original calls ep_1's map may be another's; that is its defect, not a difference of the export.
         width = 18 if entry["map_correct"] else 7
         # The last state of all is integrated in single precision; everything else is stored.
-        np.testing.assert_allclose(ours[0][mine, :width], theirs[0][original, :width], rtol=1e-6, atol=1e-6)
-        np.testing.assert_array_equal(ours[1][mine], theirs[1][original].astype(np.float32))
-        np.testing.assert_array_equal(ours[2][mine], theirs[2][original].astype(np.float32))
+        np.testing.assert_allclose(exported[0][rows, :width], original[0][original_rows, :width], rtol=1e-6, atol=1e-6)
+        np.testing.assert_array_equal(exported[1][rows], original[1][original_rows].astype(np.float32))
+        np.testing.assert_array_equal(exported[2][rows], original[2][original_rows].astype(np.float32))
 
 
 def rows_of(ends: np.ndarray, index: int) -> slice:
@@ -139,9 +139,9 @@ def test_robomimic_gets_transitions_masks_and_the_episode_columns(data_set, tmp_
             assert set(EPISODE_COLUMNS) <= set(demo.attrs)
             assert demo.attrs["source"] == "simulated"
             np.testing.assert_array_equal(demo["actions"], episode.actions)
-            before, after = np.asarray(demo["obs/agent_pos"]), np.asarray(demo["next_obs/agent_pos"])
-            np.testing.assert_array_equal(before, episode.states)
-            np.testing.assert_array_equal(after[:-1], before[1:])
+            states, next_states = np.asarray(demo["obs/agent_pos"]), np.asarray(demo["next_obs/agent_pos"])
+            np.testing.assert_array_equal(states, episode.states)
+            np.testing.assert_array_equal(next_states[:-1], states[1:])
             assert {f"{group}/{key}" in demo for group in ("obs", "next_obs") for key in OBSERVATION_KEYS} == {True}
             assert "obs/state" not in demo
             next_human = np.asarray(demo["next_obs/human_action"])
@@ -192,7 +192,7 @@ def test_minaris_environment_has_the_rate_and_the_limits_of_the_data(
     recordings, tmp_path, fps, physics, kwargs, frames
 ):
     root = make_data_set(recordings, tmp_path / "table", "--no-drift", "--fps", str(fps))
-    set_columns(root, physics=[physics_text(Physics(**physics))] * 3)
+    set_columns(root, physics=[settings_text(Physics(**physics))] * 3)
     metadata = json.loads(
         (export(root, "minari", tmp_path / "table-v0") / "data/metadata.json").read_text(encoding="utf-8")
     )
@@ -219,12 +219,12 @@ def test_minaris_environment_has_the_rate_and_the_limits_of_the_data(
 def test_the_final_state_is_the_one_that_the_recording_ends_with(data_set, recordings):
     ends = {episode.meta.episode_uuid: episode.final_state for episode in map(read_episode, recordings.glob("*.mcap"))}
     for episode in episodes(data_set):
-        found, recorded = episode.final_state(), ends[episode.meta["episode_uuid"]]
-        np.testing.assert_allclose(found[[4, 5]], recorded[[4, 5]], atol=0.01)
-        np.testing.assert_allclose(found[:2], recorded[:2], atol=0.5)  # px; the frame's actions are their mean
+        computed, recorded = episode.final_state(), ends[episode.meta["episode_uuid"]]
+        np.testing.assert_allclose(computed[[4, 5]], recorded[[4, 5]], atol=0.01)
+        np.testing.assert_allclose(computed[:2], recorded[:2], atol=0.5)  # px; the frame's actions are their mean
 
 
-def test_discarded_episodes_stay_behind_unless_asked_for(changed, tmp_path):
+def test_discarded_episodes_are_exported_on_request_only(changed, tmp_path):
     set_columns(changed, discarded=[False, True, False])
     lengths = [len(episode) for episode in list(ExportSource.open(changed, keep_discarded=True).episodes())]
     assert arrays(export(changed, "zarr", tmp_path / "a"))[3].tolist() == [lengths[0], lengths[0] + lengths[2]]
@@ -244,7 +244,7 @@ def test_discarded_episodes_stay_behind_unless_asked_for(changed, tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_a_call_that_cannot_be_met_says_why(data_set, tmp_path, capsys, format, flags, name, message):
+def test_an_invalid_call_gives_one_line(data_set, tmp_path, capsys, format, flags, name, message):
     out = tmp_path / name
     assert main(["export", str(data_set), "--format", format, "--out", str(out), *flags]) == 2
     assert capsys.readouterr().err == f"copolicy-convert: {message}\n"
@@ -269,7 +269,7 @@ def test_what_is_there_is_not_overwritten(data_set, tmp_path, capsys, format):
 
 
 @pytest.mark.parametrize("format", ["zarr", "robomimic", "minari"])
-def test_an_export_that_fails_leaves_nothing_behind(changed, tmp_path, capsys, format):
+def test_a_failed_export_writes_nothing(changed, tmp_path, capsys, format):
     set_columns(changed, length=lambda lengths: [*lengths[:2], lengths[2] + 1])
     folder = tmp_path / "out"
     assert main(["export", str(changed), "--format", format, "--out", str(folder / "table-v0")]) == 2

@@ -1,4 +1,4 @@
-"""What diffusion_policy's ReplayBuffer and zarr 2 ask of a store, each as a condition on the files themselves.
+"""What diffusion_policy's ReplayBuffer and zarr 2 require of a store, each as a condition on the files.
 
 The reader opens the store as a group, wants `data` and `meta/episode_ends`, takes whatever else lies in both for
 arrays, cuts the time axis alone, copies chunks byte for byte where the compressor is the one it knows, and appends by
@@ -100,18 +100,18 @@ def test_arrays_are_what_the_reader_copies_byte_for_byte(store):
 
 def test_chunks_are_complete_and_none_is_too_many(store):
     for name, array in arrays(store).items():
-        about = metadata(array)
-        count = math.ceil(about["shape"][0] / about["chunks"][0])
+        fields = metadata(array)
+        count = math.ceil(fields["shape"][0] / fields["chunks"][0])
         assert count > 1 or name == "meta/episode_ends"
-        rest = ["0"] * (len(about["shape"]) - 1)
-        wanted = {".".join([str(number), *rest]) for number in range(count)}
-        assert {path.name for path in array.iterdir()} == {".zarray", *wanted}
-        whole = int(np.prod(about["chunks"])) * np.dtype(about["dtype"]).itemsize
-        codec: Any = get_codec(about["compressor"])
-        assert {len(codec.decode((array / chunk).read_bytes())) for chunk in wanted} == {whole}
+        further_indices = ["0"] * (len(fields["shape"]) - 1)
+        names = {".".join([str(number), *further_indices]) for number in range(count)}
+        assert {path.name for path in array.iterdir()} == {".zarray", *names}
+        size = int(np.prod(fields["chunks"])) * np.dtype(fields["dtype"]).itemsize
+        codec: Any = get_codec(fields["compressor"])
+        assert {len(codec.decode((array / chunk).read_bytes())) for chunk in names} == {size}
 
 
-def test_an_episode_appended_by_resizing_leaves_the_rest_alone(store):
+def test_appending_an_episode_by_resizing_keeps_the_other_rows(store):
     """What `add_episode` does: a longer shape, and rows written behind the last one."""
     array = arrays(store)["data/action"]
     before, about = read(array), metadata(array)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.tasks.table.features import FEATURES, environment_state

@@ -100,10 +100,10 @@ def test_statistics_are_those_of_lerobot_where_it_is_precise(written):
     for name, expected in theirs.items():
         assert set(ours[name]) == set(expected)
         span = np.subtract(expected["max"], expected["min"])
-        for kind, value in expected.items():
+        for statistic, value in expected.items():
             # Its squares in single precision blur deviations by up to a tenth of a pixel at 1000 px.
-            tolerance = 0.2 if kind == "std" and "state" in name else span / 1000 + 1e-4
-            assert (np.abs(np.subtract(ours[name][kind], value)) <= tolerance).all(), (name, kind)
+            tolerance = 0.2 if statistic == "std" and "state" in name else span / 1000 + 1e-4
+            assert (np.abs(np.subtract(ours[name][statistic], value)) <= tolerance).all(), (name, statistic)
     frames = [episode.columns["observation.state"] for episode in written[2]]
     assert ours["observation.state"]["std"] == pytest.approx(np.concatenate(frames).astype(float).std(axis=0))
 

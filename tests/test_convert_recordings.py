@@ -9,9 +9,9 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.convert.cli import main
-from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.dataset.episode import EPISODE_COLUMNS, EpisodeMeta
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 
@@ -79,8 +79,8 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
     assert max(rows["replay_drift_px"]) < 1e-6
     episode = read_episode(recordings / "a" / "episode_1.mcap")
     for name, column in frame_columns(episode, 10).items():
-        found = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
-        assert np.array_equal(found, column), name
+        stored = np.array([np.asarray(dataset[index][name]) for index in range(11, 22)])
+        assert np.array_equal(stored, column), name
     for name in EPISODE_COLUMNS:
         if name not in ("license", "replay_drift_px", "achieved_hz"):
             assert rows[1][name] == getattr(episode.meta, name)
@@ -112,7 +112,7 @@ def test_a_damaged_file_stops_all(recordings, tmp_path, capsys):
     assert convert(recordings, tmp_path / "set") == 1
     captured = capsys.readouterr()
     assert captured.err.startswith(f"copolicy-convert: {path}: expected an intact and complete MCAP file, found ")
-    assert captured.err.endswith("; nothing was written (--skip-damaged leaves such files out)\n")
+    assert captured.err.endswith("; nothing was written (--skip-damaged skips such files)\n")
     assert captured.err.count("\n") == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["recordings"]
 
@@ -148,7 +148,7 @@ def test_the_same_episode_twice_is_an_error(recordings, tmp_path, capsys):
         (("--fps", "7"), "fps: expected a divisor of 30 [1, 2, 3, 5, 6, 10, 15, 30], found 7"),
         (
             ("--repo-id", "table"),
-            "--repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), found 'table'",
+            "--repo-id: expected USER/NAME that the Hub accepts (one slash between user and name), found 'table'",
         ),
         (("--workers", "0"), "workers: expected at least 1, found 0"),
     ],
@@ -164,7 +164,7 @@ def test_folders_that_do_not_serve(recordings, tmp_path, capsys):
     assert convert(tmp_path / "empty", tmp_path / "set") == 2
     assert convert(recordings, tmp_path / "empty") == 2
     assert capsys.readouterr().err.splitlines() == [
-        f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found nothing there",
+        f"copolicy-convert: {tmp_path / 'nowhere'}: expected a folder of recordings, found no such file or folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected at least one recording (*.mcap), found an empty folder",
         f"copolicy-convert: {tmp_path / 'empty'}: expected a path that does not exist yet, found one; "
         "nothing was overwritten",

@@ -38,23 +38,23 @@ class Calls:
         return self.call
 
 
-def assert_same(found, expected):
+def assert_same(loaded, expected):
     if isinstance(expected, np.ndarray):
-        assert isinstance(found, np.ndarray)
-        assert found.dtype == expected.dtype
-        assert found.shape == expected.shape
-        for one, other in zip(found.ravel(), expected.ravel(), strict=True):
-            assert_same(one, other)
+        assert isinstance(loaded, np.ndarray)
+        assert loaded.dtype == expected.dtype
+        assert loaded.shape == expected.shape
+        for loaded_item, expected_item in zip(loaded.ravel(), expected.ravel(), strict=True):
+            assert_same(loaded_item, expected_item)
     elif isinstance(expected, (list, tuple)):
-        assert type(found) is type(expected)
-        for one, other in zip(found, expected, strict=True):
-            assert_same(one, other)
+        assert type(loaded) is type(expected)
+        for loaded_item, expected_item in zip(loaded, expected, strict=True):
+            assert_same(loaded_item, expected_item)
     elif isinstance(expected, dict):
-        assert list(found) == list(expected)
-        assert_same(list(found.values()), list(expected.values()))
+        assert list(loaded) == list(expected)
+        assert_same(list(loaded.values()), list(expected.values()))
     else:
-        assert type(found) is type(expected)
-        assert found == expected
+        assert type(loaded) is type(expected)
+        assert loaded == expected
 
 
 @pytest.mark.parametrize("protocol", [2, 3, 4, 5])
@@ -109,8 +109,10 @@ def test_a_bare_reference_to_an_allowed_name_is_no_value():
 
 def test_an_array_whose_content_does_not_fill_it_is_refused():
     data = pickle.dumps(np.arange(4.0), 4)
-    places = [place for op, argument, place in pickletools.genops(data) if op.name == "BININT1" and argument == 4]
-    shape = places[0] or 0
+    positions = [
+        position for op, argument, position in pickletools.genops(data) if op.name == "BININT1" and argument == 4
+    ]
+    shape = positions[0] or 0
     damaged = data[: shape + 1] + b"\x09" + data[shape + 2 :]
     with pytest.raises(FileFormatError, match="cannot reshape"):
         load_pickle(damaged, "f.pkl")
@@ -129,9 +131,9 @@ def test_damage_anywhere_is_one_error(upstream):
             load_pickle(data[:end], path)
     rng = np.random.default_rng(0)
     read = 0
-    for place in rng.integers(0, 3000, 300):
+    for position in rng.integers(0, 3000, 300):
         flipped = bytearray(data)
-        flipped[place] ^= 1 << rng.integers(8)
+        flipped[position] ^= 1 << rng.integers(8)
         try:
             load_pickle(bytes(flipped), path)
             read += 1

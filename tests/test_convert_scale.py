@@ -14,7 +14,7 @@ from sharded_calls import EPISODES, call, content, damage, record_rest
 from video_difference import video_difference
 
 from copolicy.convert.cli import main
-from copolicy.dataset.checks.checking import check_dataset, of_data_sets, of_recordings, rules_of
+from copolicy.dataset.checks.checking import check_dataset, judges_data_set, judges_one_recording, rules_of
 from copolicy.dataset.task import get_task
 
 
@@ -36,9 +36,9 @@ def test_shards_of_any_size_have_the_content_of_one_conversion(unsharded, tmp_pa
 
 def test_what_lerobot_loads_is_the_same(unsharded, tmp_path):
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "3", "--stats")) == 0
-    merged, whole = load(tmp_path / "set"), load(unsharded / "whole")
-    assert_same_frames(merged, whole, every=37)
-    assert_same_statistics(merged, whole)
+    merged, unsharded_set = load(tmp_path / "set"), load(unsharded / "whole")
+    assert_same_frames(merged, unsharded_set, every=37)
+    assert_same_statistics(merged, unsharded_set)
     statistics = json.loads((tmp_path / "set/meta/copolicy_stats.json").read_text(encoding="utf-8"))
     assert statistics["dataset"]["episodes"] == EPISODES
     assert [finding for finding in check_dataset(tmp_path / "set").findings if finding.severity == "error"] == []
@@ -46,7 +46,7 @@ def test_what_lerobot_loads_is_the_same(unsharded, tmp_path):
 
 def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_path, capsys):
     rules = rules_of(get_task())
-    assert {*filter(of_recordings, rules), *filter(of_data_sets, rules)} == set(rules)
+    assert {*filter(judges_one_recording, rules), *filter(judges_data_set, rules)} == set(rules)
     recordings = Path(shutil.copytree(unsharded / "recordings", tmp_path / "recordings"))
     shutil.copy(recordings / "episode_000000.mcap", recordings / "episode_000009.mcap")
     assert main(call(recordings, tmp_path / "twice", "--shard-episodes", "3")) == 1
@@ -61,18 +61,18 @@ def test_shards_and_the_merged_set_are_held_against_every_rule(unsharded, tmp_pa
     (recordings / "episode_000009.mcap").unlink()
     record_rest(recordings / "episode_000004b.mcap")
     assert main(call(recordings, tmp_path / "set", "--shard-episodes", "3", "--shards", str(tmp_path / "shards"))) == 0
-    kept = json.loads((tmp_path / "shards/findings.json").read_text(encoding="utf-8"))
-    names = {rule.name for rule in rules if of_recordings(rule)}
+    findings = json.loads((tmp_path / "shards/findings.json").read_text(encoding="utf-8"))
+    names = {rule.name for rule in rules if judges_one_recording(rule)}
     applied = json.loads((tmp_path / "shards/shards/00000/shard.json").read_text(encoding="utf-8"))["applied"]
     assert set(applied) == names
-    # The recordings' own rules find in shards what they find in all at once, episodes named by their index.
-    labels = {path.name: str(place) for place, path in enumerate(sorted(recordings.glob("*.mcap")))}
+    # The rules of recordings give the same findings in shards as in one folder, with episodes named by index.
+    labels = {path.name: str(index) for index, path in enumerate(sorted(recordings.glob("*.mcap")))}
     at_once = check_dataset(recordings).findings
-    known = {finding.rule for finding in at_once}
+    rules_at_once = {finding.rule for finding in at_once}
     expected = {(f.rule, labels[f.episode], f.figure) for f in at_once if f.episode}
     assert {("short", "5", 0.5), ("idle", "5", 1.0)} <= expected
-    assert expected <= {(entry["rule"], entry["episode"], entry["figure"]) for entry in kept}
-    assert {"balance", "balance_pairs"} <= {entry["rule"] for entry in kept} & known
+    assert expected <= {(entry["rule"], entry["episode"], entry["figure"]) for entry in findings}
+    assert {"balance", "balance_pairs"} <= {entry["rule"] for entry in findings} & rules_at_once
 
 
 def test_a_shard_without_episodes_is_no_part_of_the_set(unsharded, tmp_path, capsys):
@@ -98,11 +98,11 @@ def test_a_video_is_merged_with_the_same_content(unsharded, tmp_path):
     flags = ("--video", "--video-size", "128x64")
     assert main(call(recordings, tmp_path / "whole", *flags)) == 0
     assert main(call(recordings, tmp_path / "set", *flags, "--shard-episodes", "1")) == 0
-    same = content(tmp_path / "set") == content(tmp_path / "whole")
-    assert same, video_difference(tmp_path / "set", tmp_path / "whole")
-    merged, whole = load(tmp_path / "set"), load(tmp_path / "whole")
-    last = whole.num_frames - 1
-    assert np.array_equal(merged[last]["observation.images.scene"], whole[last]["observation.images.scene"])
+    same_content = content(tmp_path / "set") == content(tmp_path / "whole")
+    assert same_content, video_difference(tmp_path / "set", tmp_path / "whole")
+    merged, unsharded_set = load(tmp_path / "set"), load(tmp_path / "whole")
+    last = unsharded_set.num_frames - 1
+    assert np.array_equal(merged[last]["observation.images.scene"], unsharded_set[last]["observation.images.scene"])
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_video_is_merged_with_the_same_content(unsharded, tmp_path):
             "--sbatch: expected KEY=VALUE, such as account=lab, found '--account'",
         ),
         (("--shard-episodes", "0"), "shard-episodes: expected at least 1, found 0"),
-        (("--shards", "x", "--append"), "--append: expected without shards, whose flags stand beside it, found True"),
+        (("--shards", "x", "--append"), "--append: expected no flag of a conversion in shards beside it, found True"),
     ],
 )
 def test_a_wrong_call(unsharded, tmp_path, capsys, monkeypatch, flags, message):
@@ -144,7 +144,7 @@ def without_datatrove(monkeypatch) -> Callable[[], None]:
     return hide
 
 
-def test_without_the_extra_one_line_says_so(unsharded, tmp_path, capsys, without_datatrove):
+def test_a_missing_extra_gives_one_line(unsharded, tmp_path, capsys, without_datatrove):
     without_datatrove()
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "4")) == 2
     expected = (

@@ -46,7 +46,7 @@ def test_the_set_is_that_of_one_conversion_and_no_shards_are_left(ray, unsharded
     assert list(tmp_path.iterdir()) == [tmp_path / "set"]
 
 
-def test_shards_that_were_asked_for_are_kept(ray, unsharded, tmp_path, capsys):
+def test_shards_in_a_named_folder_are_kept(ray, unsharded, tmp_path, capsys):
     assert main(_ray(unsharded, tmp_path / "set", "--shards", str(tmp_path / "shards"), "--json")) == 0
     assert json.loads(capsys.readouterr().out)["kept"] == str(tmp_path / "shards")
     assert (tmp_path / "shards" / "findings.json").is_file()

@@ -1,4 +1,4 @@
-"""Conversions in shards that end early: what is finished stays, and the same call once more does the rest."""
+"""Conversions in shards that end early: finished shards stay, and a second call converts the others."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ from copolicy.convert.cli import main
 COMMAND = [sys.executable, "-c", "from copolicy.convert.cli import main; raise SystemExit(main())"]
 
 
-def test_a_finished_shard_is_not_made_again(unsharded, tmp_path, capsys):
+def test_a_finished_shard_is_not_converted_again(unsharded, tmp_path, capsys):
     recordings = Path(shutil.copytree(unsharded / "recordings", tmp_path / "recordings"))
     shards, broken = tmp_path / "shards", recordings / "episode_000002.mcap"
     sound = broken.read_bytes()
@@ -29,8 +29,8 @@ def test_a_finished_shard_is_not_made_again(unsharded, tmp_path, capsys):
     error = capsys.readouterr().err
     assert error.startswith(f"copolicy-convert: {broken}: expected an intact and complete MCAP file, found ")
     assert error.endswith(
-        f" (and 1 more, in {shards / 'damaged'}); 2 of 3 shards are finished and kept in {shards}: mend or remove such "
-        "files, or add --skip-damaged, and run again\n"
+        f" (and 1 more, in {shards / 'damaged'}); 2 of 3 shards are finished and kept in {shards}: repair or remove "
+        "such files, or add --skip-damaged, and run again\n"
     )
     assert error.count("\n") == 1
     assert not (tmp_path / "set").exists()
@@ -66,7 +66,9 @@ def halted_at_work(
                 assert command.poll() is None, f"it ended first: {command.communicate()}"
                 if not workers:
                     children = psutil.Process(command.pid).children()
-                    workers = [child for child in children if any("spawn_main" in part for part in child.cmdline())]
+                    workers = [
+                        child for child in children if any("spawn_main" in argument for argument in child.cmdline())
+                    ]
                 time.sleep(0.005)
             workers[0].suspend()
             yield command, workers[0]
@@ -112,8 +114,8 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
         out, error = command.communicate(timeout=60)
     assert (command.returncode, out) == (1, "")
     assert error == (
-        f"copolicy-convert: {shards}: a process was killed, perhaps for want of memory; 2 of 3 shards are finished and "
-        f"kept in {shards}: run the same again\n"
+        f"copolicy-convert: {shards}: a process was killed, perhaps out of memory; 2 of 3 shards are finished and "
+        f"kept in {shards}: run the command again\n"
     )
     assert times_of(shards) == finished
     assert half_written()
@@ -128,10 +130,10 @@ def test_killed_processes_leave_nothing_half_and_a_rerun_finishes(unsharded, tmp
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recordings", "set", "shards"]
 
 
-def test_what_a_killed_merge_left_goes_away(unsharded, tmp_path):
-    left = tmp_path / ".set.merging"
-    left.mkdir()
-    (left / "half").write_text("", encoding="utf-8")
+def test_files_of_a_killed_merge_are_removed(unsharded, tmp_path):
+    leftover = tmp_path / ".set.merging"
+    leftover.mkdir()
+    (leftover / "half").write_text("", encoding="utf-8")
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shard-episodes", "4")) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
@@ -142,21 +144,21 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
     assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
     before = times_of(shards)
     assert main(call(unsharded / "recordings", tmp_path / "other", *flags, "--fps", "30")) == 2
-    other = tmp_path / "photographs"
-    other.mkdir()
-    (other / "one.jpg").write_text("", encoding="utf-8")
-    assert main(call(unsharded / "recordings", tmp_path / "other", "--shards", str(other))) == 2
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    (folder / "one.jpg").write_text("", encoding="utf-8")
+    assert main(call(unsharded / "recordings", tmp_path / "other", "--shards", str(folder))) == 2
     assert capsys.readouterr().err.splitlines() == [
         f"copolicy-convert: fps of the shards in {shards}: expected 30 (finish that call first, or give another "
         "--shards), found 10",
-        f"copolicy-convert: {other}: expected a new folder, or one with the shards of this call, found another",
+        f"copolicy-convert: {folder}: expected a new folder, or one with the shards of this call, found another",
     ]
     assert times_of(shards) == before
-    assert list(other.iterdir()) == [other / "one.jpg"]
+    assert list(folder.iterdir()) == [folder / "one.jpg"]
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", "null", '{"digest": 1, "episodes": 3}', "{"])
-def test_a_shard_with_another_record_is_made_again(unsharded, tmp_path, capsys, content):
+def test_a_shard_with_an_invalid_record_is_converted_again(unsharded, tmp_path, capsys, content):
     flags = ("--shards", str(tmp_path / "shards"), "--shard-episodes", "4")
     assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
     record = next((tmp_path / "shards").rglob("shard.json"))
@@ -189,6 +191,6 @@ def test_two_calls_do_not_work_in_one_folder(unsharded, tmp_path, capsys):
         process.stdout.readline()
         assert main(call(unsharded / "recordings", tmp_path / "set", "--shards", str(shards))) == 1
         process.kill()
-    expected = f"copolicy-convert: {shards}: expected shards that nobody works on, found another call at work\n"
+    expected = f"copolicy-convert: {shards}: expected shards that no other call works on, found one at work\n"
     assert capsys.readouterr().err == expected
     assert main(call(unsharded / "recordings", tmp_path / "set", "--shards", str(shards))) == 0

@@ -20,31 +20,31 @@ def columns(frames: int, seed: int) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("frames", [1, 2, 10, 333])
 def test_statistics_are_those_of_lerobot(frames):
     data = columns(frames, 0)
-    ours = episode_statistics(data)
+    computed = episode_statistics(data)
     # In double precision: LeRobot squares in the precision of its input.
-    theirs = compute_episode_stats({name: column.astype(float) for name, column in data.items()}, FEATURES)
-    for name, expected in theirs.items():
-        assert set(ours[name]) == set(expected)
-        for kind, value in expected.items():
-            assert ours[name][kind].shape == value.shape, (name, kind)
-            if kind.startswith("q") and frames > 1:
+    reference = compute_episode_stats({name: column.astype(float) for name, column in data.items()}, FEATURES)
+    for name, expected in reference.items():
+        assert set(computed[name]) == set(expected)
+        for statistic, value in expected.items():
+            assert computed[name][statistic].shape == value.shape, (name, statistic)
+            if statistic.startswith("q") and frames > 1:
                 bin_width = (expected["max"] - expected["min"]) / 5000
-                assert (np.abs(ours[name][kind] - value) <= bin_width * 1.001 + 1e-9).all(), (name, kind)
+                assert (np.abs(computed[name][statistic] - value) <= bin_width * 1.001 + 1e-9).all(), (name, statistic)
             else:
-                assert ours[name][kind] == pytest.approx(value, rel=1e-9, abs=1e-5), (name, kind)
+                assert computed[name][statistic] == pytest.approx(value, rel=1e-9, abs=1e-5), (name, statistic)
 
 
 def test_aggregated_statistics_are_those_of_all_frames():
-    parts = [columns(frames, seed) for seed, frames in enumerate((50, 120, 31))]
-    whole = {name: np.concatenate([part[name] for part in parts]).astype(float) for name in parts[0]}
-    found = aggregate_stats([episode_statistics(part) for part in parts])
-    for name, values in whole.items():
+    episodes = [columns(frames, seed) for seed, frames in enumerate((50, 120, 31))]
+    joined = {name: np.concatenate([episode[name] for episode in episodes]).astype(float) for name in episodes[0]}
+    aggregated = aggregate_stats([episode_statistics(episode) for episode in episodes])
+    for name, values in joined.items():
         values = values.reshape(len(values), -1)
-        assert found[name]["mean"] == pytest.approx(values.mean(axis=0))
-        assert found[name]["std"] == pytest.approx(values.std(axis=0))
-        assert found[name]["min"] == pytest.approx(values.min(axis=0))
-        assert found[name]["max"] == pytest.approx(values.max(axis=0))
-        assert found[name]["count"].tolist() == [201]
+        assert aggregated[name]["mean"] == pytest.approx(values.mean(axis=0))
+        assert aggregated[name]["std"] == pytest.approx(values.std(axis=0))
+        assert aggregated[name]["min"] == pytest.approx(values.min(axis=0))
+        assert aggregated[name]["max"] == pytest.approx(values.max(axis=0))
+        assert aggregated[name]["count"].tolist() == [201]
 
 
 def test_a_constant_column_has_no_deviation():

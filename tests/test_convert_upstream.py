@@ -14,9 +14,9 @@ from upstream_files import (
     CONFIG,
     EPISODES,
     OPTIONS,
-    held,
     play,
     processed,
+    random_forces,
     raw,
     write_processed,
     write_raw,
@@ -25,12 +25,12 @@ from upstream_files import (
 )
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.build_episode import UpstreamOptions
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
-from copolicy.convert.upstream.zarr import ZarrStore
+from copolicy.convert.upstream.zarr_episodes import ZarrStore
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.physics_text import physics_of
+from copolicy.dataset.settings_text import parse_settings_text
 from copolicy.tasks.table.physics import Physics
 
 
@@ -39,10 +39,10 @@ def test_raw_rows_are_moved_to_the_state_before_the_action(examples, number):
     episode = raw(examples, number)
     path = examples / "raw" / "trajectories" / f"ep_{number}.pkl"
     rows = pickle.loads(path.read_bytes())
-    after = np.array([row[:6] for row in rows], float)
-    assert np.array_equal(episode.states[1:, :2], after[:-1, :2])
-    assert np.array_equal(episode.final_state[:2], after[-1, :2])
-    assert np.array_equal(episode.states[1:, 4:], after[:-1, 3:])
+    next_states = np.array([row[:6] for row in rows], float)
+    assert np.array_equal(episode.states[1:, :2], next_states[:-1, :2])
+    assert np.array_equal(episode.final_state[:2], next_states[-1, :2])
+    assert np.array_equal(episode.states[1:, 4:], next_states[:-1, 3:])
     assert episode.states[0] == pytest.approx([*episode.map_config.start[:2], math.cos(3.14), math.sin(3.14), 0, 0, 0])
     assert np.array_equal(episode.actions, np.array([row[6] for row in rows]))
     assert episode.map_config.goal == tuple(rows[0][12])
@@ -93,28 +93,28 @@ def test_the_zarr_store_agrees_with_raw_files(examples, number):
 
 def test_a_store_with_a_reward_column_reads_the_same(examples, tmp_path):
     shutil.copytree(examples / "table_10Hz.zarr", tmp_path / "store")
-    before = ZarrStore(tmp_path / "store")
+    original = ZarrStore(tmp_path / "store")
     metadata = json.loads((tmp_path / "store/data/obs/.zarray").read_text(encoding="utf-8"))
     metadata |= {"shape": [1933, 19], "chunks": [1933, 19], "compressor": None}
     (tmp_path / "store/data/obs/.zarray").write_text(json.dumps(metadata), encoding="utf-8")
-    (tmp_path / "store/data/obs/0.0").write_bytes(np.column_stack((before.obs, np.zeros(1933))).tobytes())
-    after = ZarrStore(tmp_path / "store")
-    assert repr(after.read(0, OPTIONS).meta) == repr(before.read(0, OPTIONS).meta)
-    assert np.array_equal(after.read(0, OPTIONS).states, before.read(0, OPTIONS).states)
+    (tmp_path / "store/data/obs/0.0").write_bytes(np.column_stack((original.obs, np.zeros(1933))).tobytes())
+    extended = ZarrStore(tmp_path / "store")
+    assert repr(extended.read(0, OPTIONS).meta) == repr(original.read(0, OPTIONS).meta)
+    assert np.array_equal(extended.read(0, OPTIONS).states, original.read(0, OPTIONS).states)
 
 
 @pytest.mark.parametrize("name", ["pi/2", "pi/8"])
 def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     physics = Physics(angular_acceleration_limit={"pi/2": math.pi / 2, "pi/8": math.pi / 8}[name])
-    states, actions = play(held(90), physics)
+    states, actions = play(random_forces(90), physics)
     path = write_raw(tmp_path, states, actions)
     episode = read_raw(path, OPTIONS)
     assert episode.notes[0].endswith(f"angular limit {name}")
     assert "dynamics_mismatch" not in episode.meta.quality_flags
     assert np.abs(episode.states[0, :2] - CONFIG.start[:2]).max() < 1e-9
-    other = read_raw(path, UpstreamOptions("pi/8" if name == "pi/2" else "pi/2"))
-    assert other.meta.quality_flags == "dynamics_mismatch"
-    assert (physics_of(episode.meta.physics), other.meta.physics) == (physics, "")
+    mismatched = read_raw(path, UpstreamOptions("pi/8" if name == "pi/2" else "pi/2"))
+    assert mismatched.meta.quality_flags == "dynamics_mismatch"
+    assert (parse_settings_text(episode.meta.physics), mismatched.meta.physics) == (physics, "")
     assert episode.meta.obstacle_size == OPTIONS.obstacle_size
 
     cosine, sine = np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])
@@ -124,28 +124,28 @@ def test_the_angular_limit_is_found_in_every_format(tmp_path, name):
     single = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
     assert single.notes[0].endswith(f"angular limit {name}")
     assert np.abs(single.states - episode.states).max() < 1e-4
-    assert physics_of(single.meta.physics) == physics
+    assert parse_settings_text(single.meta.physics) == physics
 
     write_store(tmp_path / "store", states, actions)
     tenth = ZarrStore(tmp_path / "store").read(0, OPTIONS)
     assert tenth.notes[0].endswith(f"angular limit {name}")
     assert tenth.meta.quality_flags == ""
     assert np.abs(tenth.states - episode.states[::3]).max() < 1e-9
-    assert physics_of(tenth.meta.physics) == physics
+    assert parse_settings_text(tenth.meta.physics) == physics
 
 
 def test_rows_that_tell_no_angular_limit_leave_the_physics_unknown(tmp_path):
-    forces = held(90)[:, :2]
+    forces = random_forces(90)[:, :2]
     path = write_raw(tmp_path, *play(np.hstack((forces, forces))))  # without torque
     episode = read_raw(path, OPTIONS)
     assert (episode.meta.physics, episode.meta.quality_flags) == ("", "")
-    assert episode.notes[0].endswith("angular limit pi/2, which the rows do not tell")
+    assert episode.notes[0].endswith("angular limit pi/2, which the rows do not determine")
     stated = read_raw(path, UpstreamOptions("pi/8"))
-    assert physics_of(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
+    assert parse_settings_text(stated.meta.physics) == Physics(angular_acceleration_limit=math.pi / 8)
 
 
 def test_rows_that_were_skipped_are_refused(tmp_path):
-    states, actions = play(held(60))
+    states, actions = play(random_forces(60))
     pose = np.hstack((states[1:, :2], np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])))
     conditions = np.tile([*CONFIG.start, *CONFIG.goal, 1, 1, 1], (60, 1))
     write_processed(tmp_path / "p" / "p.npz", pose[::3], actions[::3], conditions[::3])
@@ -156,18 +156,18 @@ def test_rows_that_were_skipped_are_refused(tmp_path):
 
 
 def test_forces_beyond_the_bound_act_as_the_bound_did(tmp_path):
-    episode = read_raw(write_raw(tmp_path, *play(3 * held(30))), OPTIONS)
+    episode = read_raw(write_raw(tmp_path, *play(3 * random_forces(30))), OPTIONS)
     assert np.abs(episode.actions).max() == 1
     assert episode.meta.replay_drift_px < 1e-9
     assert "dynamics_mismatch" not in episode.meta.quality_flags
 
 
 def test_a_success_flag_that_the_contact_test_denies_is_flagged(tmp_path):
-    states, actions = play(held(30))
+    states, actions = play(random_forces(30))
     episode = read_raw(write_raw(tmp_path, states, actions, success=True), OPTIONS)
     assert (episode.meta.success, episode.meta.termination_reason) == (False, "unknown")
     assert episode.meta.quality_flags == "outcome_differs"
-    assert episode.notes[-1] == "the file says success=True, the contact test False"
+    assert episode.notes[-1] == "the file states success=True, the contact test gives False"
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_a_success_flag_that_the_contact_test_denies_is_flagged(tmp_path):
     ],
 )
 def test_rows_of_another_kind_are_refused(tmp_path, edit, found):
-    path = write_raw(tmp_path, *play(held(20)))
+    path = write_raw(tmp_path, *play(random_forces(20)))
     path.write_bytes(pickle.dumps(edit(pickle.loads(path.read_bytes())), 4))
     with pytest.raises(FileFormatError) as error:
         read_raw(path, OPTIONS)
@@ -244,7 +244,8 @@ def test_a_store_has_one_rate_and_one_hold(examples, tmp_path, capsys):
     assert convert(store, tmp_path / "set", "--downsampling", "mean") == 2
     assert capsys.readouterr().err.splitlines() == [
         "copolicy-convert: fps: expected 10: the store holds every third step only, found 30",
-        "copolicy-convert: hold: expected 'first': the store holds the first of three actions only, found 'mean'",
+        "copolicy-convert: downsampling: expected 'first': the store holds the first of three actions only, "
+        "found 'mean'",
     ]
     assert list(tmp_path.iterdir()) == []
 
@@ -256,7 +257,7 @@ def test_damaged_files_stop_the_conversion_or_are_left_out(examples, tmp_path, c
     assert convert(tmp_path / "raw", tmp_path / "set") == 1
     assert capsys.readouterr().err == (
         f"copolicy-convert: {path}: expected a pickle of NumPy arrays and plain values, found pickle data was "
-        "truncated; nothing was written (--skip-damaged leaves such files out)\n"
+        "truncated; nothing was written (--skip-damaged skips such files)\n"
     )
     assert not (tmp_path / "set").exists()
     assert convert(tmp_path / "raw", tmp_path / "set", "--skip-damaged", "--json") == 0
@@ -274,4 +275,4 @@ def test_a_folder_must_hold_one_format(examples, tmp_path, capsys):
     first, second, third = capsys.readouterr().err.splitlines()
     assert first.endswith("found 6 raw, 6 processed, 1 zarr")
     assert second.endswith("found an empty folder")
-    assert third.endswith("files or a zipped Zarr store, found nothing there")
+    assert third.endswith("files or a zipped Zarr store, found no such file or folder")

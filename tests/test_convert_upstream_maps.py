@@ -1,4 +1,4 @@
-"""Which map was played in the original program's files, and what becomes of an episode where nobody can tell."""
+"""Which map was played in the original program's files, and the exclusion of an episode whose map is unknown."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +9,9 @@ from upstream_files import (
     CONFIG,
     EPISODES,
     OPTIONS,
-    held,
     play,
     processed,
+    random_forces,
     raw,
     write_processed,
     write_raw,
@@ -19,10 +19,10 @@ from upstream_files import (
 )
 
 from copolicy.convert.cli import main
-from copolicy.convert.upstream.maps import check_by_path, check_by_rewards
+from copolicy.convert.upstream.played_map import check_by_path, check_by_rewards
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
-from copolicy.convert.upstream.zarr import ZarrStore
+from copolicy.convert.upstream.zarr_episodes import ZarrStore
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.lerobot_folder.exclusions import excluded_episodes, include
 from copolicy.tasks.table.map_config import MapConfig
@@ -38,7 +38,7 @@ def test_a_processed_file_with_another_map_is_noticed_and_set_right(examples):
     assert episode.meta.map_id == raw(examples, 1).meta.map_id
     assert episode.notes[1] == (
         "stored map is not the one played: its start is 120 px from the path's; goal (960.0, 420.0) and obstacles "
-        "((720.0, 420.0),) recovered from the rewards; others far from the path may have stood there too"
+        "((720.0, 420.0),) recovered from the rewards; there may have been further obstacles far from the path"
     )
     assert [processed(examples, number).meta.quality_flags for number in EPISODES[1:]] == [""] * 5
 
@@ -53,13 +53,13 @@ def test_a_zarr_episode_with_another_map_is_noticed(examples):
     assert episode.notes[1].endswith("its obstacles may be wrong")
 
 
-def test_rewards_that_no_known_map_gives_are_said(tmp_path):
-    states, actions = play(held(60))
+def test_rewards_that_no_known_map_gives_are_noted(tmp_path):
+    states, actions = play(random_forces(60))
     pose = np.hstack((states[1:, :2], np.cos(states[1:, 2:3]), np.sin(states[1:, 2:3])))
     write_processed(tmp_path / "p" / "p.npz", pose, actions, np.tile([*CONFIG.start, *CONFIG.goal, 1, 1, 1], (60, 1)))
     episode = read_processed(tmp_path / "p" / "p.npz", OPTIONS)
     assert episode.meta.quality_flags == "map_mismatch,excluded: map_mismatch"
-    assert "no known map gives the rewards, goal and obstacles kept" in episode.notes[1]
+    assert "no known map gives the rewards, goal and obstacles unchanged" in episode.notes[1]
     assert episode.map_config == CONFIG
 
 
@@ -86,7 +86,7 @@ def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples):
     elsewhere = check(replace(played, goal=(960.0, 420.0)))
     assert elsewhere.flags == ("map_mismatch", "goal_recovered")
     assert elsewhere.config == played
-    assert "the path ends where nothing of it is touched; goal (960.0, 180.0) recovered" in elsewhere.notes[0]
+    assert "the path ends without contact with it; goal (960.0, 180.0) recovered" in elsewhere.notes[0]
     # A table that ends between two goals touches both.
     between = ZarrStore(examples / "table_10Hz.zarr").read(zarr_places(examples)[4], OPTIONS)
     stored = replace(between.map_config, goal=(960.0, 420.0))
@@ -108,7 +108,7 @@ def test_a_path_tells_a_wrong_map_where_the_start_is_right(examples):
     ],
 )
 def test_raw_rows_win_over_a_map_file(tmp_path, changes, says):
-    states, actions = play(held(40))
+    states, actions = play(random_forces(40))
     stored = MapConfig(**{"start": CONFIG.start, "goal": CONFIG.goal, "obstacles": CONFIG.obstacles, **changes})
     episode = read_raw(write_raw(tmp_path, states, actions, map_config=stored), OPTIONS)
     assert episode.meta.quality_flags == "map_mismatch,map_recovered"
@@ -119,16 +119,16 @@ def test_raw_rows_win_over_a_map_file(tmp_path, changes, says):
 
 
 def test_map_files_are_matched_by_their_whole_name(tmp_path):
-    states, actions = play(held(20))
+    states, actions = play(random_forces(20))
     write_raw(tmp_path, states, actions, name="ep_11", map_config=MAP_SETS["training"][50])
     episode = read_raw(write_raw(tmp_path, states, actions, name="ep_1"), OPTIONS)
-    assert episode.notes[1:] == ("no map file of this name: start found by undoing the first step",)
+    assert episode.notes[1:] == ("no map file of this name: start computed by inverting the first step",)
     assert episode.map_config == CONFIG
 
 
 def map_findings(root: Path) -> list[tuple[str, str, str]]:
-    found = check_dataset(root).findings
-    return [(one.episode, one.severity, one.message) for one in found if one.rule == "map_name"]
+    findings = check_dataset(root).findings
+    return [(finding.episode, finding.severity, finding.message) for finding in findings if finding.rule == "map_name"]
 
 
 def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, capsys):
@@ -136,12 +136,14 @@ def test_an_episode_with_a_wrong_map_is_kept_and_excluded(examples, tmp_path, ca
     store = str(examples / "table_10Hz.zarr")
     assert main(["upstream", store, "--out", str(root), "--repo-id", "me/table", "--json"]) == 0
     capsys.readouterr()
-    place = zarr_places(examples)[1]
-    assert [(entry.episode, entry.reason) for entry in excluded_episodes(root)] == [(place, "map_mismatch")]
-    told = "the importer found another map in the file than was played (map_mismatch): the one in the rows may be wrong"
-    assert map_findings(root) == [(str(place), "warning", f"{told}; excluded from training")]
-    include(root, [str(place)])
-    assert map_findings(root) == [(str(place), "warning", told)]
+    index = zarr_places(examples)[1]
+    assert [(entry.episode, entry.reason) for entry in excluded_episodes(root)] == [(index, "map_mismatch")]
+    message = (
+        "the importer found another map in the file than was played (map_mismatch): the one in the rows may be wrong"
+    )
+    assert map_findings(root) == [(str(index), "warning", f"{message}; excluded from training")]
+    include(root, [str(index)])
+    assert map_findings(root) == [(str(index), "warning", message)]
 
 
 def test_an_episode_whose_map_was_recovered_is_used(examples, tmp_path, capsys):

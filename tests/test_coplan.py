@@ -70,7 +70,7 @@ def test_a_replayed_demonstration_reaches_its_goal_on_its_path():
         assert outcome.interaction is not None
         steps = min(len(path), len(outcome.path))
         assert np.abs(outcome.path[:steps] - path[:steps]).max() < 2.0
-        assert outcome.plans == -(-outcome.steps // 24)
+        assert outcome.chunks == -(-outcome.steps // 24)
         assert len(outcome.interaction) == outcome.steps == len(outcome.path) - 1
         assert abs(outcome.steps - 3 * len(actions)) <= 6
 
@@ -163,7 +163,7 @@ def test_a_folder_without_a_checkpoint_is_named(tmp_path, capsys):
 
 def test_more_actions_than_a_plan_holds_are_refused(checkpoint, tmp_path, capsys):
     assert _command(checkpoint, tmp_path / "eval.json", "--n-action-steps", "11") == 2
-    assert "--n-action-steps: expected at most the plan's 10, found 11" in capsys.readouterr().err
+    assert "--n-action-steps: expected 1 to 10, the actions of a chunk, found 11" in capsys.readouterr().err
 
 
 def test_a_setting_that_the_policy_lacks_is_refused(checkpoint):

@@ -1,4 +1,4 @@
-"""A part of the damages of `benchmarks/mutations.py`, over every command that reads data sets."""
+"""A sample of the damages of `benchmarks/mutations.py`, for every command that reads data sets."""
 
 import contextlib
 import io

@@ -1,4 +1,4 @@
-"""`copolicy-collect devices`: which pads there are, and what they say."""
+"""`copolicy-collect devices`: the list of gamepads, and their live input."""
 
 import io
 import json
@@ -9,7 +9,7 @@ import pytest
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.cli import main
-from copolicy.collect.devices import follow_pads, list_devices, open_pads, table, watch
+from copolicy.collect.devices import list_devices, open_gamepads, poll_gamepads, show_input, table_lines
 from copolicy.collect.inputs import CalibrationStore, StickCalibration
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError, RunError
@@ -25,9 +25,9 @@ def sticks():
         stick.unplug()
 
 
-def test_every_pad_is_listed_with_what_it_is(tmp_path, sticks):
+def test_every_gamepad_is_listed(tmp_path, sticks):
     calibrations = CalibrationStore(tmp_path)
-    left, right = list_devices(open_pads(), calibrations)
+    left, right = list_devices(open_gamepads(), calibrations)
     assert left | {"guid": ""} == {
         "instance": sticks[0].instance_id, "name": "Left pad", "guid": "", "axes": 4, "buttons": 10, "hats": 1,
         "calibrated": False,
@@ -36,32 +36,32 @@ def test_every_pad_is_listed_with_what_it_is(tmp_path, sticks):
     assert left["guid"] != right["guid"]
     assert len(left["guid"]) == 32
     calibrations.put(right["guid"], StickCalibration())
-    assert [one["calibrated"] for one in list_devices(open_pads(), calibrations)] == [False, True]
+    assert [device["calibrated"] for device in list_devices(open_gamepads(), calibrations)] == [False, True]
 
 
-def test_pads_are_found_where_the_events_that_told_of_them_are_gone(sticks):
+def test_gamepads_are_found_after_their_events_were_read(sticks):
     pygame.event.get()
-    assert len(open_pads()) == 2
+    assert len(open_gamepads()) == 2
 
 
-def test_events_of_a_window_are_left_to_it(sticks):
-    pads = open_pads()
+def test_events_of_a_window_stay_in_the_queue(sticks):
+    pads = open_gamepads()
     key = pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a)
     pygame.event.post(key)
     sticks[0].move(1.0, 0.0)
     sticks[1].unplug()
-    assert [pad.name for pad in follow_pads(pads)] == ["Right pad"]
+    assert [pad.name for pad in poll_gamepads(pads)] == ["Right pad"]
     kinds = [event.type for event in pygame.event.get()]
     assert pygame.KEYDOWN in kinds
     assert not {pygame.JOYAXISMOTION, pygame.JOYDEVICEREMOVED} & set(kinds)
 
 
 def test_the_table_aligns(sticks, tmp_path):
-    lines = table(list_devices(open_pads(), CalibrationStore(tmp_path)))
+    lines = table_lines(list_devices(open_gamepads(), CalibrationStore(tmp_path)))
     assert lines[0].split() == ["instance", "name", "guid", "axes", "buttons", "hats", "calibrated"]
     assert len({line.index(word) for line, word in zip(lines, ("guid", "ff", "ff"), strict=True)}) == 1
     assert [line.split()[-1] for line in lines[1:]] == ["no", "no"]
-    assert table([]) == ["no pad is plugged in"]
+    assert table_lines([]) == ["no gamepad is connected"]
 
 
 class Terminal(io.StringIO):
@@ -69,8 +69,8 @@ class Terminal(io.StringIO):
         return True
 
 
-def move_while_watched(sticks):
-    """A player's hands: deflect, press, unplug."""
+def move_sticks(sticks):
+    """Deflects, presses and unplugs."""
     while not sticks[0].is_open:
         time.sleep(0.01)
     sticks[0].move(-1.0, 0.5)
@@ -82,14 +82,14 @@ def move_while_watched(sticks):
 
 
 @pytest.mark.parametrize("kind", [Terminal, io.StringIO])
-def test_the_test_shows_and_remembers_what_moved(tmp_path, sticks, kind):
+def test_the_live_test_shows_the_input_and_returns_its_range(tmp_path, sticks, kind):
     out = kind()
-    player = threading.Thread(target=move_while_watched, args=(sticks,))
-    pads = open_pads()
+    player = threading.Thread(target=move_sticks, args=(sticks,))
+    pads = open_gamepads()
     player.start()
-    found = watch(pads, CalibrationStore(tmp_path), 0.8, out)
+    summaries = show_input(pads, CalibrationStore(tmp_path), 0.8, out)
     player.join()
-    left, right = found[sticks[0].instance_id], found[sticks[1].instance_id]
+    left, right = summaries[sticks[0].instance_id], summaries[sticks[1].instance_id]
     assert left["axes"][:2] == [[-1.0, 0.0], [0.0, 0.5]]
     assert (left["buttons"], left["unplugged"]) == ([3], False)
     assert (right["buttons"], right["unplugged"]) == ([], True)
@@ -105,14 +105,14 @@ def test_the_test_shows_and_remembers_what_moved(tmp_path, sticks, kind):
         assert text.count("Left pad") == 1
 
 
-def test_nothing_to_watch(tmp_path, sticks):
+def test_errors_of_the_live_test(tmp_path, sticks):
     calibrations = CalibrationStore(tmp_path)
     with pytest.raises(InvalidValueError, match="seconds: expected a positive number, found 0"):
-        watch(open_pads(), calibrations, 0, io.StringIO())
+        show_input(open_gamepads(), calibrations, 0, io.StringIO())
     for stick in sticks:
         stick.unplug()
-    with pytest.raises(RunError, match="expected at least one pad, found none plugged in"):
-        watch(open_pads(), calibrations, 1.0, io.StringIO())
+    with pytest.raises(RunError, match="expected at least one gamepad, found none connected"):
+        show_input(open_gamepads(), calibrations, 1.0, io.StringIO())
 
 
 def test_the_command(tmp_path, sticks, capsys):
@@ -120,14 +120,14 @@ def test_the_command(tmp_path, sticks, capsys):
     assert "Right pad" in capsys.readouterr().out.splitlines()[2]
     assert main(["devices", "--json", "--test", "0.2", "--config-dir", str(tmp_path)]) == 0
     captured = capsys.readouterr()
-    told = json.loads(captured.out)
-    assert [one["name"] for one in told["devices"]] == ["Left pad", "Right pad"]
-    assert told["test"][str(sticks[0].instance_id)]["axes"] == [[0.0, 0.0]] * 4
+    summary = json.loads(captured.out)
+    assert [device["name"] for device in summary["devices"]] == ["Left pad", "Right pad"]
+    assert summary["test"][str(sticks[0].instance_id)]["axes"] == [[0.0, 0.0]] * 4
     assert "axis 0" in captured.err
 
 
-def test_no_pads_are_no_error_in_a_list(tmp_path, capsys):
+def test_a_list_without_gamepads_is_not_an_error(tmp_path, capsys):
     assert main(["devices", "--config-dir", str(tmp_path)]) == 0
-    assert capsys.readouterr().out == "no pad is plugged in\n"
+    assert capsys.readouterr().out == "no gamepad is connected\n"
     assert main(["devices", "--test", "1", "--config-dir", str(tmp_path)]) == 1
-    assert capsys.readouterr().err == "copolicy-collect: expected at least one pad, found none plugged in\n"
+    assert capsys.readouterr().err == "copolicy-collect: expected at least one gamepad, found none connected\n"

@@ -1,4 +1,4 @@
-"""`copolicy-dataset amend`: stated columns corrected in place, and lost ones restored from their originals."""
+"""`copolicy-dataset amend`: declared columns are corrected in place, lost ones restored from originals."""
 
 import json
 import shutil
@@ -31,7 +31,7 @@ def root(made, tmp_path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "set"))
 
 
-def test_chosen_columns_of_chosen_episodes_and_nothing_else(root):
+def test_only_selected_columns_and_episodes_change(root):
     before, files = columns(root), contents(root)
     schema = pq.read_schema(root / EPISODES)
     summary = amend(root, {"consent_id": "C-12"}, Selection(episodes=("3-5",), where='pair_id == "P02"'))
@@ -46,7 +46,7 @@ def test_chosen_columns_of_chosen_episodes_and_nothing_else(root):
     assert changed == {EPISODES.as_posix(), "meta/copolicy.json"}
 
 
-def test_the_record_says_what_and_nothing_personal(root):
+def test_the_record_omits_personal_values(root):
     amend(root, parse_settings(["license=cc0-1.0", "consent_id=C-77", "pair_id=P09"]))
     record = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
     (note,) = record["amended"]
@@ -74,7 +74,7 @@ def test_it_is_a_patch_release_in_the_change_log(root):
     assert change in (root / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_a_column_of_nulls_gets_its_type_back(root):
+def test_a_column_of_nulls_gets_its_type(root):
     import pyarrow as pa
 
     table = pq.ParquetFile(root / EPISODES).read()
@@ -88,15 +88,15 @@ def test_a_column_of_nulls_gets_its_type_back(root):
 @pytest.mark.parametrize(
     ("texts", "error", "line"),
     [
-        (["success=true"], InvalidValueError, "--set: expected a column that somebody states .*found 'success: it is"),
+        (["success=true"], InvalidValueError, "--set: expected a declared column .*found 'success: it is"),
         (["duration_s=3"], InvalidValueError, "it is measured"),
         (["discarded=true"], InvalidValueError, "copolicy-dataset exclude sets it"),
-        (["episode_uuid=x"], InvalidValueError, "it is measured, or follows from the data"),
+        (["episode_uuid=x"], InvalidValueError, "it is measured or derived from the data"),
         (["licence=mit"], UnknownNameError, "unknown episode column 'licence'; available: consent_id"),
         (["license"], InvalidValueError, "NAME=VALUE"),
         (["license=mit", "license=x"], InvalidValueError, "each name once"),
         (["license=CC BY 4.0"], InvalidValueError, "--set license: expected cc-by-4.0, as the Hub spells it"),
-        (["pair_id=Anna Smith"], InvalidValueError, "--set pair_id: expected up to 64 letters.*no name of a person"),
+        (["pair_id=Anna Smith"], InvalidValueError, "--set pair_id: expected up to 64 letters.*not a person's name"),
         (["consent_id=C-1,,C-2"], InvalidValueError, "--set consent_id"),
         (["source=robot"], InvalidValueError, "one of human, simulated, upstream"),
         (["source="], InvalidValueError, "one of human, simulated, upstream"),
@@ -121,10 +121,10 @@ def test_every_amendable_column_is_an_episode_column():
     [
         (["--set", "license=CC"], 2, "--set license"),
         (["--set", "source=human"], 1, "expected an episode with another value, found none; nothing was changed"),
-        (["--set", "license=mit", "--where", "duration_s < 0"], 1, "expected at least one episode that is meant"),
-        (["--set", "license=mit", "--pair-ids", "P77"], 1, "--pair-ids: expected a value that an episode has"),
-        (["--restore-from", "nowhere"], 1, "found that each has an episode_uuid"),
-        (["--restore-from", "nowhere", "--episode-ids", "1"], 2, "--restore-from: expected no other flag beside it"),
+        (["--set", "license=mit", "--where", "duration_s < 0"], 1, "expected at least one selected episode"),
+        (["--set", "license=mit", "--pair-ids", "P77"], 1, "--pair-ids: expected a value of the data set"),
+        (["--restore-from", "nowhere"], 1, "found an episode_uuid in each"),
+        (["--restore-from", "nowhere", "--episode-ids", "1"], 2, "--restore-from: expected no other flag with it"),
     ],
 )
 def test_a_wrong_call_changes_nothing(root, capsys, flags, status, line):
@@ -138,7 +138,7 @@ def test_a_wrong_call_changes_nothing(root, capsys, flags, status, line):
 
 @pytest.fixture(scope="module")
 def stripped(made, tmp_path_factory) -> Path:
-    """What LeRobot's own tools make of the data set: without episodes 1 and 4, and without our columns."""
+    """The data set after LeRobot's own delete: without episodes 1 and 4, and without our columns."""
     folder = tmp_path_factory.mktemp("stripped")
     delete_episodes(load(made), [1, 4], output_dir=folder / "set", repo_id="lab/left")
     return folder / "set"
@@ -149,7 +149,7 @@ def left(stripped, tmp_path) -> Path:
     return Path(shutil.copytree(stripped, tmp_path / "left"))
 
 
-def test_a_stripped_set_is_named_with_the_way_on(left, capsys):
+def test_a_stripped_set_is_refused_with_a_hint(left, capsys):
     assert main(["check", str(left), "--no-save"]) == 1
     out = capsys.readouterr().out
     assert f"copolicy-dataset amend {left} --restore-from ORIGINAL" in out
@@ -160,7 +160,7 @@ def test_a_stripped_set_is_named_with_the_way_on(left, capsys):
     assert "--restore-from ORIGINAL" in capsys.readouterr().err
 
 
-def test_columns_come_back_from_an_earlier_version(left, made):
+def test_columns_are_restored_from_an_earlier_version(left, made):
     before = digests(made)
     uuids = [columns(made)[number]["episode_uuid"] for number in (0, 2, 3, 5)]
     assert restore(left, made)["restored"] == 4
@@ -175,7 +175,7 @@ def test_columns_come_back_from_an_earlier_version(left, made):
     assert load(left).num_episodes == 4
 
 
-def test_columns_come_back_from_recordings(left, made):
+def test_columns_are_restored_from_recordings(left, made):
     summary = restore(left, made.parent / "recordings")
     assert (summary["restored"], summary["not_measured"]) == (4, "replay_drift_px, which conversion measures")
     assert summary["next"].startswith(f"copolicy-dataset amend {left} --set license=ID, which no original states")
@@ -196,7 +196,7 @@ def test_lerobots_split_is_restored_too(made, tmp_path):
         assert [row["episode_uuid"] for row in columns(part.root)] == wanted
 
 
-def test_only_rows_without_a_name_are_filled(root, made):
+def test_only_rows_without_a_uuid_are_restored(root, made):
     """As after a merge of a set with its columns and one without."""
     values = columns(root)
     set_columns(root, episode_uuid=[None if n in (1, 4) else row["episode_uuid"] for n, row in enumerate(values)])

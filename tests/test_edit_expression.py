@@ -1,4 +1,4 @@
-"""Conditions on episode columns: what they mean, and that nothing of them runs as Python."""
+"""Conditions on episode columns: their meaning, and that they are not run as Python."""
 
 import math
 
@@ -33,7 +33,7 @@ def test_a_condition(text, expected):
 
 
 @pytest.mark.parametrize("unknown", [None, math.nan])
-def test_what_is_unknown_equals_nothing(unknown):
+def test_unknown_values_equal_nothing(unknown):
     row = {**ROW, "duration_s": unknown}
     for text in ("duration_s < 20", "duration_s >= 20", "duration_s == 20", "duration_s in (1, 2)"):
         assert parse_condition(text, COLUMNS)(row) is False
@@ -70,14 +70,14 @@ def test_what_is_unknown_equals_nothing(unknown):
         "not " * 100000 + "success",
     ],
 )
-def test_anything_else_is_refused_in_one_line(text):
+def test_other_syntax_is_refused_in_one_line(text):
     with pytest.raises(InvalidValueError) as error:
         parse_condition(text, COLUMNS)
     assert str(error.value).startswith("--where: expected ")
     assert "\n" not in str(error.value)
 
 
-def test_an_unknown_column_lists_those_there_are():
+def test_an_unknown_column_lists_the_available_ones():
     with pytest.raises(UnknownNameError, match="'lenght'; available: duration_s, length, quality_flags"):
         parse_condition("lenght < 3", COLUMNS)
     with pytest.raises(CopolicyError):

@@ -1,4 +1,4 @@
-"""`copolicy-dataset select`: the chosen episodes, unchanged, as a data set that LeRobot and the checks accept."""
+"""`copolicy-dataset select` copies episodes unchanged to a data set that LeRobot and the checks accept."""
 
 import json
 import shutil
@@ -48,7 +48,7 @@ def stored_statistics(root: Path) -> dict:
     return json.loads((root / "meta" / "stats.json").read_text(encoding="utf-8"))
 
 
-def test_chosen_episodes_are_what_they_were(root, tmp_path):
+def test_selected_episodes_stay_unchanged(root, tmp_path):
     split_files(root, [range(0, 3), range(3, 8)])
     new = tmp_path / "new"
     summary = select(root, new, Selection(episodes=("1", "4-5", columns(root)[7]["episode_uuid"])))
@@ -66,7 +66,7 @@ def test_chosen_episodes_are_what_they_were(root, tmp_path):
     assert summary["made_from"] == read_content(root).hash
 
 
-def test_the_checks_pass_and_lerobot_loads_all_and_each_alone(root, tmp_path):
+def test_the_checks_pass_and_lerobot_loads_all_episodes_and_single_ones(root, tmp_path):
     set_columns(root, consent_id=["C-1"] * 8)
     select(root, tmp_path / "new", Selection(pairs=("P02", "P04")))
     assert not check_dataset(tmp_path / "new").failed()
@@ -83,7 +83,7 @@ def test_the_checks_pass_and_lerobot_loads_all_and_each_alone(root, tmp_path):
         assert alone[0][ACTION].equal(whole[row["dataset_from_index"]][ACTION])
 
 
-def test_statistics_are_those_that_lerobot_aggregates(root, tmp_path):
+def test_statistics_equal_those_that_lerobot_aggregates(root, tmp_path):
     select(root, tmp_path / "new", Selection(episodes=("2", "5-6")))
     after = episode_statistics(tmp_path / "new")
     expected = aggregate_stats(after)
@@ -106,8 +106,8 @@ def test_statistics_are_those_that_lerobot_aggregates(root, tmp_path):
     assert [entry["episode_index"]["q50"].item() for entry in after] == [0, 1, 2]
 
 
-def test_the_same_as_converting_these_recordings_alone(tmp_path):
-    """Files, byte for byte where bytes do not depend on who wrote them: content hash, info and statistics."""
+def test_the_result_equals_a_conversion_of_the_selected_recordings(tmp_path):
+    """Compares content hash, info and statistics, which do not depend on the writer."""
     recordings = make_recordings(tmp_path / "recordings", 4, seed=5)
     root = make_data_set(recordings, tmp_path / "set")
     select(root, tmp_path / "new", Selection(episodes=("1", "3")))
@@ -120,23 +120,23 @@ def test_the_same_as_converting_these_recordings_alone(tmp_path):
     assert str(columns(tmp_path / "new")) == str(columns(alone))  # as text, because nan differs from itself
 
 
-def pictures(root: Path, row: dict) -> np.ndarray:
-    """All of an episode, as one window of frames: LeRobot decodes the video once."""
+def images(root: Path, row: dict) -> np.ndarray:
+    """All images of an episode as one window of frames, which LeRobot decodes in one pass."""
     window = load(root, delta_timestamps={SCENE: [frame / 10 for frame in range(row["length"])]})
     item = window[row["dataset_from_index"]]
     assert not item[f"{SCENE}_is_pad"].any()
     return item[SCENE].numpy()
 
 
-def test_every_picture_stays_with_its_frame(filmed, tmp_path):
+def test_every_image_stays_with_its_frame(filmed, tmp_path):
     select(filmed, tmp_path / "new", Selection(episodes=("1-2", "4")))
     for before, after in zip([columns(filmed)[n] for n in (1, 2, 4)], columns(tmp_path / "new"), strict=True):
         for key in ("from", "to"):
             seconds = after[f"videos/{SCENE}/{key}_timestamp"] * 10
             assert seconds == pytest.approx(round(seconds))
-        found = pictures(tmp_path / "new", after)
+        found = images(tmp_path / "new", after)
         assert len(found) == after["length"]
-        np.testing.assert_array_equal(found, pictures(filmed, before))
+        np.testing.assert_array_equal(found, images(filmed, before))
     files = sorted(path.name for path in (tmp_path / "new" / "videos").rglob("*.mp4"))
     assert files == ["file-000.mp4", "file-001.mp4"]
     assert info(tmp_path / "new")["features"] == info(filmed)["features"]
@@ -147,7 +147,7 @@ def test_every_picture_stays_with_its_frame(filmed, tmp_path):
     )
 
 
-def test_a_file_whose_episodes_are_all_chosen_is_copied(filmed, tmp_path):
+def test_a_file_whose_episodes_are_all_selected_is_copied(filmed, tmp_path):
     select(filmed, tmp_path / "new", Selection(episodes=("0", "3-4")))
     files = [tmp_path / "new", filmed]
     bytes_of = [(folder / "videos" / SCENE / "chunk-000" / "file-001.mp4").read_bytes() for folder in files]
@@ -166,7 +166,7 @@ def test_a_file_whose_episodes_are_all_chosen_is_copied(filmed, tmp_path):
         (Selection(episodes=("6-7",), where="episode_index > 6"), [7]),
     ],
 )
-def test_flags_hold_together_and_values_are_alternatives(made, selection, expected):
+def test_flags_are_combined_and_values_are_alternatives(made, selection, expected):
     from copolicy.dataset.edit.subset.stored_set import StoredSet
 
     stored = StoredSet.read(made)
@@ -187,7 +187,7 @@ def test_results_maps_and_exclusions(root, tmp_path):
     assert {row["map_id"] for row in columns(tmp_path / "goal")} == {rows[1]["map_id"]}
 
 
-def test_record_extra_keys_splits_and_licences_come_along(root, tmp_path):
+def test_record_extra_keys_splits_and_licences_are_copied(root, tmp_path):
     uuids = [row["episode_uuid"] for row in columns(root)]
     record = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
     record["notes"] = {uuids[0]: ["mended"], uuids[5]: ["doubtful"]}
@@ -213,9 +213,9 @@ def test_record_extra_keys_splits_and_licences_come_along(root, tmp_path):
 @pytest.mark.parametrize(
     ("flags", "status", "line"),
     [
-        (["--where", "duration_s < 0"], 1, "expected at least one episode that is meant, found none"),
-        (["--pair-ids", "P99"], 1, "--pair-ids: expected a value that an episode has, found 'P99', which none has"),
-        (["--pair-ids", "P01", "P99"], 1, "--pair-ids: expected a value that an episode has, found 'P99'"),
+        (["--where", "duration_s < 0"], 1, "expected at least one selected episode, found none"),
+        (["--pair-ids", "P99"], 1, "--pair-ids: expected a value of the data set, found 'P99', which no episode has"),
+        (["--pair-ids", "P01", "P99"], 1, "--pair-ids: expected a value of the data set, found 'P99'"),
         (["--episode-ids", "99"], 2, "--episode-ids: expected numbers from 0 to 7"),
         (["--results", "won"], 2, "--results: expected one of success, failure, goal"),
         (["--sources", "robot"], 2, "--sources: expected one of human, simulated, upstream, found 'robot'"),
@@ -237,14 +237,14 @@ def test_an_output_that_exists_and_a_set_without_columns(root, tmp_path, capsys)
     assert main(["select", str(root), "--out", str(tmp_path / "new"), "--episode-ids", "0"]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err
     assert main(["select", str(tmp_path / "none"), "--out", str(tmp_path / "b"), "--episode-ids", "0"]) == 2
-    assert "expected a LeRobot v3 data set with meta/info.json, found nothing there" in capsys.readouterr().err
+    assert "expected a LeRobot v3 data set with meta/info.json, found no such file or folder" in capsys.readouterr().err
 
 
 def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):
     from copolicy.dataset.edit.subset import writing as subset
 
-    original = subset._moved_statistics
-    monkeypatch.setattr(subset, "_moved_statistics", lambda rows, firsts: original(rows, firsts).slice(0, 1))
+    original = subset._shift_statistics
+    monkeypatch.setattr(subset, "_shift_statistics", lambda rows, firsts: original(rows, firsts).slice(0, 1))
     with pytest.raises(FileFormatError):
         select(root, tmp_path / "new", Selection(episodes=("0-2",)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["set"]
@@ -259,6 +259,6 @@ def test_a_damaged_copy_leaves_nothing(root, tmp_path, monkeypatch):
             yield table
 
     monkeypatch.setattr(subset, "_frames", shifted)
-    with pytest.raises(RunError, match="expected episode 1 unchanged in what was written"):
+    with pytest.raises(RunError, match="expected episode 1 unchanged in the new data set"):
         select(root, tmp_path / "new", Selection(episodes=("0-2",)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["set"]

@@ -1,4 +1,4 @@
-"""`copolicy-dataset split`: parts near the proportions asked for, and nothing in two of them."""
+"""`copolicy-dataset split`: parts close to the requested proportions, without overlap."""
 
 from pathlib import Path
 
@@ -9,8 +9,8 @@ from edited_data import columns, digests, info, load, make_people
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
-from copolicy.dataset.edit.groups import By, groups
-from copolicy.dataset.edit.parts import deal, parse_parts
+from copolicy.dataset.edit.groups import By, group_episodes
+from copolicy.dataset.edit.parts import assign_groups, parse_parts
 from copolicy.dataset.edit.split import split
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
@@ -27,42 +27,42 @@ def rows(pairs, source="human", **others):
 
 def dealt(episodes, parts, by: By = "pairs", seed=0, same_consent=False):
     motions = list(range(len(episodes)))
-    return deal(episodes, groups(episodes, motions, by, same_consent), parse_parts(parts), by, seed)
+    return assign_groups(episodes, group_episodes(episodes, motions, by, same_consent), parse_parts(parts), by, seed)
 
 
 def test_a_player_with_two_partners_joins_their_pairs():
     episodes = rows(["a/b", "b/c", "d/e", "c/f", "g/h"])
-    assert groups(episodes, range(5), "pairs") == [[0, 1, 3], [2], [4]]
+    assert group_episodes(episodes, range(5), "pairs") == [[0, 1, 3], [2], [4]]
     # Whoever sat where.
-    assert groups(rows(["a/b", "c/a"]), range(2), "pairs") == [[0, 1]]
+    assert group_episodes(rows(["a/b", "c/a"]), range(2), "pairs") == [[0, 1]]
 
 
 def test_a_consent_id_joins_pairs_where_it_means_one_person():
     episodes = rows(["a/b", "c/d", "e/f"], consent_id=["C-1,C-2", "C-2", "C-3"])
-    assert groups(episodes, range(3), "pairs") == [[0], [1], [2]]
-    assert groups(episodes, range(3), "pairs", same_consent=True) == [[0, 1], [2]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0], [1], [2]]
+    assert group_episodes(episodes, range(3), "pairs", same_consent=True) == [[0, 1], [2]]
 
 
 def test_scripted_agents_are_joined_by_their_pair_alone():
     episodes = rows(["s/t", "s/u", "s/t"], source="simulated")
-    assert groups(episodes, range(3), "pairs") == [[0, 2], [1]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0, 2], [1]]
 
 
 def test_people_without_a_name_stay_together():
     episodes = [{"source": "human"}, {"source": "human", "pair_id": ""}, *rows(["a/b"])]
-    assert groups(episodes, range(3), "pairs") == [[0, 1], [2]]
+    assert group_episodes(episodes, range(3), "pairs") == [[0, 1], [2]]
 
 
-def test_copies_stay_together_whatever_is_asked():
+def test_copies_always_stay_together():
     episodes = rows(["a/b", "c/d", "e/f"], source_sha256=["x", "y", "x"])
-    assert groups(episodes, [1, 2, 3], "episodes") == [[0, 2], [1]]
-    assert groups(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "maps") == [[0, 1, 2]]
-    assert groups(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "episodes") == [[0, 2], [1]]
+    assert group_episodes(episodes, [1, 2, 3], "episodes") == [[0, 2], [1]]
+    assert group_episodes(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "maps") == [[0, 1, 2]]
+    assert group_episodes(rows(["a/b", "c/d", "e/f"]), [1, 2, 1], "episodes") == [[0, 2], [1]]
 
 
 def test_a_map_stays_with_its_orientations():
     episodes = rows(["a/b"] * 4, map_id=["training-01", "training-02", "training-01-90deg", "training-01-displaced"])
-    assert groups(episodes, range(4), "maps") == [[0, 2, 3], [1]]
+    assert group_episodes(episodes, range(4), "maps") == [[0, 2, 3], [1]]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -94,13 +94,13 @@ def test_single_episodes_are_spread_over_pairs_maps_and_results():
     assert sorted(sum(row["pair_id"] == f"{n}a/{n}b" for row in inside) for n in range(4)) == [10] * 4
 
 
-def test_the_seed_decides_and_the_same_one_gives_the_same():
+def test_the_seed_determines_the_split():
     episodes = rows([f"{n}a/{n}b" for n in range(30)])
     parts = [dealt(episodes, ["train=0.5", "test=0.5"], seed=seed)["test"] for seed in (1, 1, 2)]
     assert parts[0] == parts[1] != parts[2]
 
 
-def test_every_part_gets_something():
+def test_no_part_is_empty():
     episodes = rows(["a/b"] * 98 + ["c/d", "e/f"])
     parts = dealt(episodes, ["train=0.98", "valid=0.01", "test=0.01"])
     assert all(parts.values())
@@ -108,7 +108,7 @@ def test_every_part_gets_something():
         dealt(rows(["a/b", "c/d"]), ["train=0.8", "valid=0.1", "test=0.1"])
 
 
-def test_named_pairs_go_where_they_are_named():
+def test_named_pairs_go_to_the_part_that_names_them():
     episodes = rows(["a/b", "b/c", "d/e", "f/g"])
     assert dealt(episodes, ["test=a/b", "train=rest"]) == {"test": [0, 1], "train": [2, 3]}
     assert dealt(episodes, ["test=d", "train=0.5", "valid=0.5"])["test"] == [2]
@@ -120,12 +120,12 @@ def test_named_pairs_go_where_they_are_named():
     ("parts", "line"),
     [
         (["test=a/b", "train=b/c"], "share a person"),
-        (["test=nobody", "train=rest"], "found 'nobody', which none has"),
-        (["test=a/b", "train=d/e"], "found 1 in none; add NAME=rest"),
+        (["test=nobody", "train=rest"], "found 'nobody', which no episode has"),
+        (["test=a/b", "train=d/e"], "found 1 without one; add NAME=rest"),
         (["test=a/b", "train=a/b"], "each name in one part"),
     ],
 )
-def test_names_that_cannot_be_parted(parts, line):
+def test_names_that_cannot_be_separated_are_refused(parts, line):
     with pytest.raises((RunError, InvalidValueError), match=line):
         dealt(rows(["a/b", "b/c", "d/e", "f/g"]), parts)
 
@@ -138,7 +138,7 @@ def test_names_that_cannot_be_parted(parts, line):
         ["..=0.5", "test=0.5"], ["train=nan", "test=0.5"], ["train=inf", "test=0.5"], ["train=0", "test=1"],
     ],
 )  # fmt: skip
-def test_parts_of_another_form(texts):
+def test_invalid_parts_are_refused(texts):
     with pytest.raises(InvalidValueError, match="--parts: expected "):
         parse_parts(texts)
 
@@ -148,7 +148,7 @@ def made(tmp_path_factory) -> Path:
     return make_people(tmp_path_factory.mktemp("split"))
 
 
-def test_folders_that_share_nobody(made, tmp_path, capsys):
+def test_folders_share_no_person(made, tmp_path, capsys):
     out = tmp_path / "parts"
     assert main(["split", str(made), "--out", str(out), "--parts", "train=0.75", "test=0.25"]) == 0
     shown = capsys.readouterr().out
@@ -178,10 +178,10 @@ def test_one_data_set_whose_splits_the_checks_and_robomimic_read(made, tmp_path,
         assert [name.decode() for name in file["mask/valid"]] == ["demo_6", "demo_7"]
         assert len(file["mask/train"]) == 6
     assert convert(["export", str(out), "--format", "robomimic", "--out", str(tmp_path / "b"), "--valid", "0.5"]) == 2
-    assert "a data set without a split of its own" in capsys.readouterr().err
+    assert "a data set without splits" in capsys.readouterr().err
 
 
-def test_robomimics_valid_key_shares_nobody_with_train(made, tmp_path):
+def test_robomimics_valid_key_shares_no_person_with_train(made, tmp_path):
     h5py = pytest.importorskip("h5py")
     flags = ["--format", "robomimic", "--out", str(tmp_path / "a.hdf5"), "--valid", "0.25", "--seed", "1"]
     assert convert(["export", str(made), *flags]) == 0

@@ -1,4 +1,4 @@
-"""`copolicy-dataset withdraw`: nothing of a consent id is left anywhere, and everything else is what it was."""
+"""`copolicy-dataset withdraw`: no trace of a consent id remains, and everything else is unchanged."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunE
 from copolicy.dataset.files import replace_folder
 from copolicy.dataset.files.replace_folder import finish_interrupted
 from copolicy.dataset.publication.minimal_card import is_minimal_card
-from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.reader import read_metadata
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.manifest import Manifest, file_entry
 from copolicy.dataset.versions.release import release
@@ -32,7 +32,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def folder(made, tmp_path) -> Path:
-    """`set` with raw copies, two releases and describing files; `recordings` behind it."""
+    """A data set `set` with raw copies, two releases, card and reports, and its `recordings`."""
     shutil.copytree(made.parent / "recordings", tmp_path / "recordings")
     root = Path(shutil.copytree(made, tmp_path / "set"))
     raw = root / "raw"
@@ -73,7 +73,7 @@ def test_a_call_without_yes_changes_nothing(folder, capsys):
     assert "2 of 8" in out
 
 
-def test_nothing_is_left_of_what_is_withdrawn(folder, capsys):
+def test_no_trace_of_withdrawn_episodes_remains(folder, capsys):
     root = folder / "set"
     rows, before = columns(root), digests(root)
     gone, kept = rows[:2], rows[2:]
@@ -110,18 +110,18 @@ def test_nothing_is_left_of_what_is_withdrawn(folder, capsys):
     assert sorted(path.name for path in folder.iterdir()) == ["recordings", "set"]
 
 
-def test_lerobot_and_the_checks_take_what_is_left(folder):
-    withdraw("C-1", [folder / "set"], really=True)
+def test_lerobot_and_the_checks_accept_the_rest(folder):
+    withdraw("C-1", [folder / "set"], delete=True)
     set_columns(folder / "set", consent_id=["C-3"] * 6)
     assert not check_dataset(folder / "set").failed()
     assert load(folder / "set").num_episodes == info(folder / "set")["total_episodes"] == 6
     assert info(folder / "set")["splits"] == {"train": "0:6"}
 
 
-def test_the_next_release_says_that_and_not_what(folder):
+def test_the_next_release_counts_withdrawn_episodes_without_names(folder):
     root = folder / "set"
     released = read_release(root).content_hash
-    withdraw("C-1", [root], really=True)
+    withdraw("C-1", [root], delete=True)
     withdrawals = json.loads((root / "meta/copolicy_withdrawals.json").read_text(encoding="utf-8"))
     (entry,) = withdrawals["withdrawals"]
     assert (entry.keys(), entry["episodes"]) == ({"date", "episodes"}, 2)
@@ -137,38 +137,38 @@ def test_the_next_release_says_that_and_not_what(folder):
     assert "Sessions of (withdrawn) and P02." in log
     set_columns(root, license=["mit"] * 6)
     assert "withdrawn" not in " ".join(release(root, "patch", "Another licence.").changes)
-    withdraw("C-3", [root], really=True)
+    withdraw("C-3", [root], delete=True)
     assert "2 episodes removed: withdrawn by people who took part" in release(root, "major", "Fewer.").changes
 
 
-def test_a_release_is_compared_with_what_is_left(folder, capsys):
+def test_a_release_is_compared_with_the_remaining_episodes(folder, capsys):
     root = folder / "set"
-    withdraw("C-1", [root], really=True)
+    withdraw("C-1", [root], delete=True)
     assert main(["diff", f"{root}@1.0.1", str(root)]) == 1
     out = capsys.readouterr().out
     assert "2 episodes removed: withdrawn by people who took part (major)" in out
     assert "added" not in out
 
 
-def test_what_was_never_released_is_told_at_the_first_release(made, tmp_path):
+def test_the_first_release_counts_earlier_withdrawals(made, tmp_path):
     root = Path(shutil.copytree(made, tmp_path / "set"))
-    withdraw("C-9", [root], really=True)
+    withdraw("C-9", [root], delete=True)
     changes = release(root, "minor", "The first.").changes
     assert changes[1] == "1 episode removed: withdrawn by people who took part; no release held them"
 
 
-def test_a_consent_id_covers_several_pairs_and_stands_beside_others(folder):
-    withdraw("C-2", [folder / "set", folder / "recordings"], really=True)
+def test_a_consent_id_may_cover_several_pairs_and_be_one_of_several(folder):
+    withdraw("C-2", [folder / "set", folder / "recordings"], delete=True)
     assert [row["pair_id"] for row in columns(folder / "set")] == ["P02", "P02", "P04", "P04"]
     assert len(list((folder / "recordings").glob("*.mcap"))) == 4
 
 
-def test_an_amended_consent_id_leads_to_copies_that_lack_it(folder, made):
+def test_an_amended_consent_id_finds_copies_without_it(folder, made):
     """The recordings were made without consent ids, and so was the other data set."""
     other = Path(shutil.copytree(made, folder / "other"))
     set_columns(other, consent_id=[""] * 8)
     uuids = [row["episode_uuid"] for row in columns(folder / "set")]
-    summary = withdraw("C-9", [folder], really=True)
+    summary = withdraw("C-9", [folder], delete=True)
     assert (summary["withdrawn"], summary["recordings"], len(summary["data_sets"])) == (1, 1, 2)
     assert uuids[6] not in {row["episode_uuid"] for row in columns(other)}
     assert not (folder / "recordings" / "episode_000006.mcap").exists()
@@ -183,25 +183,25 @@ def test_recordings_in_every_state(folder):
     moved = files[2].rename(recordings / "deeper" / "any name.mcap")
     (recordings / "._episode_000003.mcap").write_bytes(b"macOS")
     shutil.rmtree(folder / "set" / "raw")
-    withdraw("C-1", [folder], really=True)
+    withdraw("C-1", [folder], delete=True)
     assert not os_part.exists()
     assert not undone.exists()
     assert moved.exists()
-    withdraw("C-3", [folder], really=True)
+    withdraw("C-3", [folder], delete=True)
     assert not moved.exists()
     assert not files[3].exists()
     assert not (recordings / "._episode_000003.mcap").exists()
 
 
-def test_linked_recordings_are_deleted_where_they_lie(folder):
+def test_targets_of_linked_recordings_are_deleted(folder):
     elsewhere = folder / "disk"
     (folder / "recordings").rename(elsewhere)
     (folder / "recordings").symlink_to(elsewhere)
-    withdraw("C-3", [folder / "set", folder / "recordings"], really=True)
+    withdraw("C-3", [folder / "set", folder / "recordings"], delete=True)
     assert len(list(elsewhere.glob("*.mcap"))) == 6
 
 
-def test_a_session_goes_with_its_last_recording(folder):
+def test_a_session_is_deleted_with_its_last_recording(folder):
     out = folder / "sessions"
     for pair, numbers in (("P01", (0, 1)), ("P02", (2, 6))):
         session = out / f"{pair}-01"
@@ -216,21 +216,21 @@ def test_a_session_goes_with_its_last_recording(folder):
         ]
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (session / "journal.jsonl").write_text(text, encoding="utf-8")
-    withdraw("C-1", [folder / "set", out], really=True)
+    withdraw("C-1", [folder / "set", out], delete=True)
     assert [path.name for path in out.iterdir()] == ["P02-01"]
-    withdraw("C-3", [folder / "set", out], really=True)
+    withdraw("C-3", [folder / "set", out], delete=True)
     journal = (out / "P02-01" / "journal.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
 
 
-def test_a_set_without_an_episode_left_goes(folder):
+def test_a_set_without_remaining_episodes_is_deleted(folder):
     set_columns(folder / "set", consent_id=["C-5"] * 8)
-    summary = withdraw("C-5", [folder / "set"], really=True)
+    summary = withdraw("C-5", [folder / "set"], delete=True)
     assert "no episode is left" in str(summary)
     assert not (folder / "set").exists()
 
 
-def test_a_deletion_that_was_killed_is_finished_and_never_undone(folder, monkeypatch):
+def test_an_interrupted_deletion_is_completed(folder, monkeypatch):
     class Killed(BaseException):
         pass
 
@@ -241,18 +241,18 @@ def test_a_deletion_that_was_killed_is_finished_and_never_undone(folder, monkeyp
     set_columns(folder / "set", consent_id=["C-5"] * 8)
     monkeypatch.setattr(replace_folder.shutil, "rmtree", half)
     with pytest.raises(Killed):
-        withdraw("C-5", [folder / "set"], really=True)
+        withdraw("C-5", [folder / "set"], delete=True)
     monkeypatch.undo()
-    with pytest.raises(FileFormatError, match="nothing there"):
-        withdraw("C-5", [folder / "set"], really=True)
+    with pytest.raises(FileFormatError, match="no such file or folder"):
+        withdraw("C-5", [folder / "set"], delete=True)
     assert [path.name for path in folder.iterdir()] == ["recordings"]
 
 
-def test_files_of_somebody_else_are_named_and_left(folder):
+def test_other_files_are_listed_and_kept(folder):
     notes = folder / "recordings" / "notes.md"
     notes.write_text("C-1 was tired", encoding="utf-8")
     (folder / "set" / "notes.txt").write_text("pair P01 again", encoding="utf-8")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert summary["still_named_in"] == [str(notes)]
     assert summary["data_sets"][str(folder / "set")]["still_named_in"] == ["notes.txt"]
     assert notes.read_text(encoding="utf-8") == "C-1 was tired"
@@ -263,11 +263,11 @@ def test_files_are_searched_whatever_their_name_and_length(folder):
     long.write_text("x" * (1 << 20) + " C-1 " + "y" * (1 << 20), encoding="utf-8")
     odd.write_text("P01", encoding="utf-8")
     (folder / "recordings" / "bytes.bin").write_bytes(b"\0C-1 ")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert summary["still_named_in"] == [str(odd), str(long)]
 
 
-def test_an_mcap_file_of_another_project_is_no_unreadable_recording(folder, capsys):
+def test_an_mcap_file_of_another_project_is_not_unreadable(folder, capsys):
     arm = folder / "recordings" / "arm.mcap"
     with arm.open("wb") as file:
         writer = Writer(file)
@@ -287,10 +287,10 @@ def test_columns_of_another_type_are_refused(folder):
     lists = [[text] for text in table.column("session_id").to_pylist()]
     pq.write_table(table.set_column(column, "session_id", pa.array(lists)), folder / "set" / EPISODES)
     with pytest.raises(FileFormatError, match="texts of session_id, found list"):
-        withdraw("C-1", [folder / "set"], really=True)
+        withdraw("C-1", [folder / "set"], delete=True)
 
 
-def test_an_unreadable_recording_is_named(folder, capsys):
+def test_an_unreadable_recording_is_listed(folder, capsys):
     (folder / "recordings" / "broken.mcap").write_bytes(b"no recording")
     assert main(["withdraw", "C-1", str(folder), "--yes"]) == 1
     assert str(folder / "recordings" / "broken.mcap") in capsys.readouterr().out
@@ -303,13 +303,13 @@ def test_an_unreadable_recording_is_named(folder, capsys):
         ("C-77", ["set", "recordings"], RunError, "expected an episode with consent id C-77, found none"),
         ("", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
         ("C-1,C-2", ["set"], InvalidValueError, "CONSENT_ID: expected one consent id"),
-        ("C-1", ["set", "nowhere"], FileFormatError, "found nothing there"),
+        ("C-1", ["set", "nowhere"], FileFormatError, "found no such file or folder"),
     ],
 )
 def test_a_wrong_call_changes_nothing(folder, consent, paths, error, line):
     before = contents(folder)
     with pytest.raises(error, match=line):
-        withdraw(consent, [folder / path for path in paths], really=True)
+        withdraw(consent, [folder / path for path in paths], delete=True)
     assert contents(folder) == before
 
 
@@ -319,7 +319,7 @@ def test_a_stripped_set_stops_everything(folder):
     pq.write_table(table.drop_columns(["episode_uuid", "consent_id"]), other / EPISODES)
     before = contents(folder)
     with pytest.raises(FileFormatError, match="--restore-from ORIGINAL"):
-        withdraw("C-1", [folder], really=True)
+        withdraw("C-1", [folder], delete=True)
     assert contents(folder) == before
 
 
@@ -347,23 +347,23 @@ def test_an_interruption_leaves_the_old_or_the_new(folder, monkeypatch, stop):
     else:
         monkeypatch.setattr(replace_folder.shutil, "rmtree", killed)
     with pytest.raises(Killed):
-        withdraw("C-1", [root], really=True)
+        withdraw("C-1", [root], delete=True)
     monkeypatch.undo()
     finish_interrupted(root)
     assert (read_content(root).hash == before) is (stop == "first")
     if stop == "first":
-        withdraw("C-1", [root], really=True)
+        withdraw("C-1", [root], delete=True)
     assert len(columns(root)) == 6
     assert sorted(path.name for path in folder.iterdir()) == ["recordings", "set"]
 
 
-def test_what_killed_commands_left_beside_a_set_goes_with_it(folder):
-    """Also where the parent folder is named, in which an interrupted replacement lies under a hidden name."""
+def test_leftovers_of_killed_commands_are_deleted(folder):
+    """Also for the parent folder, which contains an interrupted replacement under a hidden name."""
     root = folder / "set"
     shutil.copytree(root, folder / ".set.0123abcd.partial")
     shutil.copytree(root, folder / ".gone.89abcdef.partial")
     root.rename(folder / ".set.before-edit")
-    summary = withdraw("C-1", [folder], really=True)
+    summary = withdraw("C-1", [folder], delete=True)
     assert len(columns(root)) == 6
     assert summary["unfinished"] == [str(folder / ".gone.89abcdef.partial")]
     assert sorted(path.name for path in folder.iterdir()) == [".gone.89abcdef.partial", "recordings", "set"]

@@ -105,7 +105,7 @@ def test_seeds_go_through_the_maps():
 def test_orientations_quadruple_the_maps():
     env = TableCarryingEnv(map_set="holdout", orientations=True)
     angles = [env.reset(options={"map_index": i})[0]["environment_state"][2] for i in range(4)]
-    assert len(env.maps) == 4 * 84
+    assert len(env.scenarios) == 4 * 84
     assert angles == pytest.approx([0, math.pi / 2, math.pi, 3 * math.pi / 2])
 
 
@@ -169,7 +169,7 @@ def test_partner_acts_for_the_human():
         np.testing.assert_array_equal(a[0]["human_action"], a[4]["action"][2:].astype(np.float32))
         np.testing.assert_array_equal(a[4]["action"][:2], robot)
     assert any(step[0]["human_action"].any() for step in runs[0])
-    env.reset(seed=3 + len(env.maps))  # same map, another mood
+    env.reset(seed=3 + len(env.scenarios))  # same map, another mood
     other = [env.step(robot) for _ in range(10)]
     assert not all(np.array_equal(a[0]["agent_pos"], b[0]["agent_pos"]) for a, b in zip(other, runs[0], strict=True))
 
@@ -192,7 +192,7 @@ def test_observes_the_images_of_a_data_set(size):
         assert env.observation_space.contains(observation)
         states.append(env.world.observation)
         images.append(observation["pixels"]["scene"])
-    expected = list(TableTask().images(env.maps[20], np.stack(states), size))
+    expected = list(TableTask().images(env.scenarios[20], np.stack(states), size))
     np.testing.assert_array_equal(images, expected)
     batch = preprocess_observation(observation)
     assert tuple(batch[SCENE_IMAGE].shape) == (1, 3, size[1], size[0])

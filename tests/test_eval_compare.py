@@ -150,7 +150,7 @@ def test_the_same_training_twice_is_no_second_seed(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("{", "no JSON (Expecting property name enclosed in double quotes: line 1 column 2 (char 1))"),
+        ("{", "invalid JSON (Expecting property name enclosed in double quotes: line 1 column 2 (char 1))"),
         ("[]", "a JSON list"),
         ("{}", "object missing required field `study`"),
         ('{"study": "coplan", "label": "", "policy": {}, "settings": {}, "episodes": [{"map_index": 0}]}',

@@ -12,11 +12,12 @@ import torch
 from scipy import stats
 from untrained_policy import save_untrained_policy
 
-from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.session import recordings
+from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.files.staging import replace_json
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
 from copolicy.evaluate.human_study.questionnaire import read_ratings
@@ -25,7 +26,6 @@ from copolicy.evaluate.human_study.schedule import BlindPolicy
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
 from copolicy.evaluate.partner_study.configurations import study_configurations
-from copolicy.evaluate.result_file import write_json
 from copolicy.tasks.table.map_config import MapConfig
 
 SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
@@ -74,7 +74,7 @@ def test_a_plan_pairs_starts_within_a_person_and_counterbalances_robots():
 def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):
     plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
     path = tmp_path / "plan.json"
-    write_json(path, plan.to_json())
+    replace_json(path, plan.to_json())
     assert StudyPlan.read(path) == plan
     content = json.loads(path.read_text(encoding="utf-8"))
     content["trials"]["P01"][0]["robot"] = "CoDP"
@@ -178,7 +178,7 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
     path.write_text("participant,block,fluent,trust\nP01,1,6,5\nP01,2,4,\nP02,1,3,4\nP02,2,7,4\n", encoding="utf-8")
     ratings = read_ratings(path, plan)
     assert [row["robot"] for row in ratings] == [
-        next(t.robot for t in plan.of(row["participant"]) if t.block == row["block"]) for row in ratings
+        next(t.robot for t in plan.trials_of(row["participant"]) if t.block == row["block"]) for row in ratings
     ]
     assert ratings[1]["trust"] is None
     summary = summarise_study(_rows(), ratings)["ratings"]
@@ -225,9 +225,9 @@ def study(tmp_path_factory) -> Path:
     robots = []
     for name in ("first", "second"):
         torch.manual_seed(len(robots))
-        robots.append(Robot.of(name, str(save_untrained_policy(folder / name))))
+        robots.append(Robot.from_checkpoint(name, str(save_untrained_policy(folder / name))))
     plan = make_plan(robots, "custom", SHORT, 1, 2, 0, settings={"num_inference_steps": 2})
-    write_json(folder / "plan.json", plan.to_json())
+    replace_json(folder / "plan.json", plan.to_json())
     return folder
 
 
@@ -248,11 +248,11 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     assert (told["kept"], told["episodes"], told["plan"]) == (5, 4, plan.plan_id)
     found = sorted(out.rglob("*.mcap"))
     episodes = [read_episode(path) for path in found]
-    codes = [f"study:{plan.plan_id}:P01:{code}" for code in ("practice", *(t.code for t in plan.of("P01")))]
+    codes = [f"study:{plan.plan_id}:P01:{code}" for code in ("practice", *(t.code for t in plan.trials_of("P01")))]
     assert [episode.meta.controller_0 for episode in episodes] == codes
     assert {episode.meta.controller_1 for episode in episodes} == {"scripted:S02"}
     assert {episode.meta.source for episode in episodes} == {"simulated"}
-    assert [e.map_config for e in episodes[1:]] == [plan.configurations[t.configuration] for t in plan.of("P01")]
+    assert [e.map_config for e in episodes[1:]] == [plan.configurations[t.configuration] for t in plan.trials_of("P01")]
     assert {episode.physics.step_limit for episode in episodes} == {2000}
     # Nothing in a recording tells the robot; the plan does.
     for name in ("first", "second"):
@@ -269,7 +269,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     assert summary["tests"]["time_s"]["anova"] is None  # one person
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert (result["study"], len(result["rows"])) == ("human", 4)
-    assert [row["robot"] for row in result["rows"]] == [trial.robot for trial in plan.of("P01")]
+    assert [row["robot"] for row in result["rows"]] == [trial.robot for trial in plan.trials_of("P01")]
     assert all(row["interaction_mean"] > 0 for row in result["rows"])
     named = _summarise(capsys, out)
     assert sorted(named["robots"]) == sorted(codes[1:])
@@ -278,7 +278,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     found[-1].unlink()
     assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
     capsys.readouterr()
-    kept = [one for one in recordings(out) if one.counts]
+    kept = [one for one in iter_recordings(out) if one.counts]
     assert read_episode(kept[-1].path).meta.controller_0 == codes[-1]
     assert len(kept) == 4
 
@@ -292,13 +292,10 @@ def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsy
         "{'not of this plan': 1})"
     )
     assert _summarise(capsys, tmp_path / "none")[1].endswith(
-        "none: expected a folder of recordings, found nothing there"
+        "none: expected a folder of recordings, found no such file or folder"
     )
     status, error = _summarise(capsys, tmp_path, "--ratings", tmp_path / "r.csv")
-    assert (
-        error
-        == "copolicy-eval: --ratings: expected --plan beside it, which tells the robot of each block, found 'none'"
-    )
+    assert error == "copolicy-eval: --ratings: expected --plan too, which names the robot of each block, found 'none'"
 
 
 def test_other_weights_than_the_plans_are_refused(study, tmp_path):
@@ -307,7 +304,7 @@ def test_other_weights_than_the_plans_are_refused(study, tmp_path):
     robot = Robot("first", str(path), "0" * 64)
     plan = make_plan((robot, ROBOTS[1]), "custom", SHORT, 1, 1, 0)
     with pytest.raises(FileFormatError, match=f"{path}: expected the plan's weights {'0' * 12}, found weights "):
-        run_session(plan, "P01", PilotSpec("scripted", "S01"), tmp_path / "out", headless=True)
+        run_session(plan, "P01", PlayerSpec("scripted", "S01"), tmp_path / "out", headless=True)
     assert not (tmp_path / "out").exists()
 
 

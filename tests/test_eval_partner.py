@@ -16,14 +16,14 @@ from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.partner_study.configurations import study_configurations
-from copolicy.evaluate.partner_study.outcome import PartnerOutcome
+from copolicy.evaluate.partner_study.episode_result import PartnerEpisodeResult
 from copolicy.evaluate.partner_study.robots import policy_robot, scripted_robots
-from copolicy.evaluate.partner_study.study import carry_with_partners
+from copolicy.evaluate.partner_study.study import run_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
-from copolicy.tasks.table.agents import Habits
+from copolicy.tasks.table.agents import PlayerProfile
 from copolicy.tasks.table.agents.players import simulated_partner
 from copolicy.tasks.table.agents.profiles import PARTNERS
-from copolicy.tasks.table.agents.scripted import ScriptedPilot
+from copolicy.tasks.table.agents.scripted_player import ScriptedPlayer
 from copolicy.tasks.table.features import environment_state
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
@@ -34,28 +34,28 @@ ROBOTS = scripted_robots(get_task())
 
 
 @pytest.fixture(scope="module")
-def habits():
+def measured_kinds():
     """What an observer measures of each kind, with the same usual robot on the same maps."""
     measured = {}
     for kind in PARTNERS:
         seconds, changes, effort, unrest = [], [], [], []
         for seed, config in enumerate(MAPS):
-            robot, partner = ScriptedPilot(0, config, Habits(), seed), simulated_partner(config, kind, seed)
+            robot, partner = ScriptedPlayer(0, config, PlayerProfile(), seed), simulated_partner(config, kind, seed)
             world, forces, outcome = TableWorld(config, Physics(step_limit=2000)), [], None
             while outcome is None or not outcome.done:
                 state = world.observation
                 forces.append(partner.act(state))
                 outcome = world.step(np.concatenate((robot.act(state), forces[-1])))
             seconds.append(len(forces) / 30)
-            changes.append(partner.intention.changes)
+            changes.append(partner.route_choice.changes)
             effort.append(np.hypot(*np.transpose(forces)).mean())
             unrest.append(np.abs(np.diff(forces, axis=0)).mean())
         measured[kind] = tuple(float(np.mean(one)) for one in (seconds, changes, effort, unrest))
     return measured
 
 
-def test_kinds_of_partner_differ_in_what_can_be_measured(habits):
-    seconds, changes, effort, unrest = ({kind: one[k] for kind, one in habits.items()} for k in range(4))
+def test_kinds_of_partner_differ_in_what_can_be_measured(measured_kinds):
+    seconds, changes, effort, unrest = ({kind: one[k] for kind, one in measured_kinds.items()} for k in range(4))
     assert seconds["slow"] == max(seconds.values()) > 1.2 * seconds["stubborn"]
     assert changes["stubborn"] < min(changes["follower"], changes["erratic"])
     assert effort["follower"] < 0.65 * effort["stubborn"]
@@ -64,8 +64,8 @@ def test_kinds_of_partner_differ_in_what_can_be_measured(habits):
 
 def test_a_partner_wants_its_route_whoever_the_other_is():
     first, second = (simulated_partner(MAPS[0], "erratic", 5) for _ in range(2))
-    assert first.intention.route.sides == second.intention.route.sides
-    wishes = {simulated_partner(MAPS[0], "erratic", seed).intention.route.sides for seed in range(12)}
+    assert first.route_choice.route.sides == second.route_choice.route.sides
+    wishes = {simulated_partner(MAPS[0], "erratic", seed).route_choice.route.sides for seed in range(12)}
     assert len(wishes) > 2
     with pytest.raises(UnknownNameError) as error:
         simulated_partner(MAPS[0], "kind", 0)
@@ -114,13 +114,13 @@ class CountingPolicy:
 def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
     planner = CountingPolicy()
     robot = policy_robot("counter", planner)  # pyright: ignore[reportArgumentType]
-    (outcome,) = carry_with_partners(robot, MAPS[:1], ["stubborn"], Physics(step_limit=31))
-    assert outcome.steps == 31
-    assert outcome.plans == len(planner.calls) == 11
-    np.testing.assert_allclose(outcome.actions[:, 0], np.repeat(0.01 * np.arange(1, 12), 3)[:31])
-    assert not outcome.actions[:, 1].any()
+    (episode,) = run_with_partners(robot, MAPS[:1], ["stubborn"], Physics(step_limit=31))
+    assert episode.steps == 31
+    assert episode.chunks == len(planner.calls) == 11
+    np.testing.assert_allclose(episode.actions[:, 0], np.repeat(0.01 * np.arange(1, 12), 3)[:31])
+    assert not episode.actions[:, 1].any()
     world, states = TableWorld(MAPS[0]), []
-    for action in outcome.actions:
+    for action in episode.actions:
         states.append(world.observation)
         world.step(action)
     first, last = planner.calls[0], planner.calls[10]
@@ -128,7 +128,7 @@ def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
     assert not first[HUMAN_ACTION].any()
     # The newest observation is that of the present step, and the past human action what the partner really did.
     np.testing.assert_array_equal(last[STATE][0], [states[24], states[27], states[30]])
-    done = outcome.actions[:30, 2:].reshape(10, 3, 2).mean(axis=1)
+    done = episode.actions[:30, 2:].reshape(10, 3, 2).mean(axis=1)
     np.testing.assert_allclose(last[HUMAN_ACTION][0], done[7:10])
     np.testing.assert_array_equal(last[ENVIRONMENT_STATE][0], np.tile(environment_state(MAPS[0]), (3, 1)))
 
@@ -136,16 +136,16 @@ def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
 def test_more_actions_a_plan_are_executed_in_turn():
     planner = CountingPolicy(2)
     robot = policy_robot("counter", planner)  # pyright: ignore[reportArgumentType]
-    (outcome,) = carry_with_partners(robot, MAPS[:1], ["slow"], Physics(step_limit=12))
-    np.testing.assert_allclose(outcome.actions[::3, :2], [[0.01, 0], [0.01, 0.001], [0.02, 0], [0.02, 0.001]])
+    (episode,) = run_with_partners(robot, MAPS[:1], ["slow"], Physics(step_limit=12))
+    np.testing.assert_allclose(episode.actions[::3, :2], [[0.01, 0], [0.01, 0.001], [0.02, 0], [0.02, 0.001]])
     assert len(planner.calls) == 2
 
 
 def test_every_robot_meets_the_same_partner():
     physics = Physics(step_limit=40)
     kinds = ["stubborn", "erratic"]
-    one = carry_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
-    other = carry_with_partners(ROBOTS["never-yields"], MAPS[:2], kinds, physics, repeats=2, seed=9)
+    one = run_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
+    other = run_with_partners(ROBOTS["never-yields"], MAPS[:2], kinds, physics, repeats=2, seed=9)
     assert [(o.map_index, o.partner, o.repeat) for o in one] == [
         (m, k, r) for m in (0, 1) for k in kinds for r in (0, 1)
     ]
@@ -153,15 +153,15 @@ def test_every_robot_meets_the_same_partner():
     np.testing.assert_array_equal([o.actions[0, 2:] for o in one], [o.actions[0, 2:] for o in other])
     assert len({tuple(o.actions[0, 2:]) for o in one}) == 8
     assert not np.concatenate([o.actions for o in one])[:, :2].any()
-    again = carry_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
+    again = run_with_partners(ROBOTS["passive"], MAPS[:2], kinds, physics, repeats=2)
     np.testing.assert_array_equal([o.path for o in one], [o.path for o in again])
-    changed = carry_with_partners(ROBOTS["passive"], MAPS[:1], ["erratic"], physics, partner_seed=1)
+    changed = run_with_partners(ROBOTS["passive"], MAPS[:1], ["erratic"], physics, partner_seed=1)
     assert (changed[0].actions[0] != one[2].actions[0]).any()
 
 
-def _outcome(actions, path, still, success=True):
+def _episode(actions, path, still, success=True):
     steps = len(actions)
-    return PartnerOutcome(
+    return PartnerEpisodeResult(
         0, MAPS[0], 0, success, "goal", 1, np.array(path, float), np.zeros(steps), "slow", np.array(actions, float),
         np.array(still, bool), 2,
     )  # fmt: skip
@@ -169,26 +169,26 @@ def _outcome(actions, path, still, success=True):
 
 def test_work_is_shared_by_what_pushes_along_the_way():
     # 10 px to the right: the robot pushes with half a force, the partner with a full one; then one pulls back.
-    outcome = _outcome([[0.5, 9, 1, 0], [-1, 0, 1, 0]], [(0, 0), (10, 0), (20, 0)], [0, 0])
-    assert outcome.work == (5.0, 20.0)
-    assert outcome.robot_share == 0.2
-    assert _outcome([[0, 0, 0, 0]], [(0, 0), (0, 0)], [0]).robot_share == 0.0
+    episode = _episode([[0.5, 9, 1, 0], [-1, 0, 1, 0]], [(0, 0), (10, 0), (20, 0)], [0, 0])
+    assert episode.work == (5.0, 20.0)
+    assert episode.robot_share == 0.2
+    assert _episode([[0, 0, 0, 0]], [(0, 0), (0, 0)], [0]).robot_share == 0.0
 
 
 def test_a_deadlock_is_a_second_of_standing():
     still = [0] * 10 + [1] * 29 + [0] + [1] * 30 + [0] * 5 + [1] * 45
-    outcome = _outcome(np.zeros((len(still), 4)), np.zeros((len(still) + 1, 2)), still)
-    assert outcome.deadlock_s == 2.5
-    summary = summarise_with_partners([outcome], None)
+    episode = _episode(np.zeros((len(still), 4)), np.zeros((len(still) + 1, 2)), still)
+    assert episode.deadlock_s == 2.5
+    summary = summarise_with_partners([episode], None)
     assert summary["deadlock"] == {"time_share": pytest.approx(75 / 120), "episode_share": 1.0}
     assert summary["by_partner"]["slow"]["partner_changes"] == 2
     assert summary["planning_ms_per_call"]["n"] == 0
 
 
 def test_differences_are_paired_and_times_count_where_both_succeed():
-    fast = _outcome(np.zeros((30, 4)), np.zeros((31, 2)), np.zeros(30))
-    slow = _outcome(np.zeros((60, 4)), np.zeros((61, 2)), np.zeros(60))
-    lost = _outcome(np.zeros((90, 4)), np.zeros((91, 2)), np.zeros(90), success=False)
+    fast = _episode(np.zeros((30, 4)), np.zeros((31, 2)), np.zeros(30))
+    slow = _episode(np.zeros((60, 4)), np.zeros((61, 2)), np.zeros(60))
+    lost = _episode(np.zeros((90, 4)), np.zeros((91, 2)), np.zeros(90), success=False)
     found = differences([fast], [slow])["all"]
     assert found["time_s"] == {"mean": -1.0, "bootstrap_95": None, "pairs": 1, "maps": 1}
     assert differences([fast], [lost])["slow"]["success"]["mean"] == 1.0
@@ -251,7 +251,7 @@ def _digest(folder):
         (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
         (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
         (["--repeats", "0"], "--repeats: expected at least 1, found 0"),
-        (["--n-action-steps", "11"], "--n-action-steps: expected at most the plan's 10, found 11"),
+        (["--n-action-steps", "11"], "--n-action-steps: expected 1 to 10, the actions of a chunk, found 11"),
         (
             ["--baseline", "passive", "passive"],
             "--baseline: expected robots of different names (NAME=CKPT gives one), "

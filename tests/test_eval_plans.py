@@ -17,8 +17,8 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan.rollouts import coplan
-from copolicy.evaluate.plans.figure import save_plans
-from copolicy.evaluate.plans.sampling import sample_plans
+from copolicy.evaluate.plans.figure import save_chunk_figure
+from copolicy.evaluate.plans.sampling import sample_chunks
 from copolicy.tasks.table.agents import simulated_pair
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
@@ -60,7 +60,7 @@ class Replayed:
     name, task, n_obs_steps, n_action_steps, fps, keeps_history = "replay", "table", 3, 8, 10, False
 
     def __init__(self, *demonstrations: tuple[np.ndarray, np.ndarray]):
-        self.wanted: int | None = 8
+        self.n_predicted_actions: int | None = 8
         self.demonstrations = demonstrations
         self.frame = 0
         self.lengths = []
@@ -69,10 +69,13 @@ class Replayed:
         """A replay has no noise."""
 
     def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
-        length = 10 if self.wanted is None else self.wanted
+        length = 10 if self.n_predicted_actions is None else self.n_predicted_actions
         self.lengths.append(length)
         places = history[STATE][:, -1, :2]
-        plans = [self._rest(k if self.wanted is None else self._near(place), length) for k, place in enumerate(places)]
+        plans = [
+            self._rest(k if self.n_predicted_actions is None else self._near(place), length)
+            for k, place in enumerate(places)
+        ]
         self.frame += 8
         return np.array(plans)
 
@@ -87,63 +90,64 @@ class Replayed:
 
 
 def decide(policy: Any, physics: Physics | None = None, **settings):
-    return sample_plans(policy, MAP, physics or Physics(), **{"samples": 4, **settings})
+    return sample_chunks(policy, MAP, physics or Physics(), **{"samples": 4, **settings})
 
 
 def test_each_plan_goes_its_way(left, right):
     planner = Replayed(left, right)
-    decision = decide(planner)
-    assert [sample.route for sample in decision.samples] == ["L", "R", "L", "R"]
-    assert decision.pose == MAP.start
-    np.testing.assert_array_equal(decision.way, [MAP.start[:2]])
-    for sample, (actions, path) in zip(decision.samples, (left, right) * 2, strict=True):
-        np.testing.assert_array_equal(sample.plan, actions[:10])  # whole, whatever is executed of it
+    branch_point = decide(planner)
+    assert [sample.route for sample in branch_point.samples] == ["L", "R", "L", "R"]
+    assert branch_point.pose == MAP.start
+    np.testing.assert_array_equal(branch_point.approach, [MAP.start[:2]])
+    for sample, (actions, path) in zip(branch_point.samples, (left, right) * 2, strict=True):
+        np.testing.assert_array_equal(sample.chunk, actions[:10])  # whole, whatever is executed of it
         assert sample.planned_path.shape == (31, 2)
         assert np.abs(sample.planned_path - path[:31]).max() < 1.0
-        assert sample.outcome.path is not None
-        steps = min(len(path), len(sample.outcome.path))
-        assert np.abs(sample.outcome.path[:steps] - path[:steps]).max() < 2.0
-        assert sample.outcome.plans == -(-sample.outcome.steps // 24)
+        assert sample.episode.path is not None
+        steps = min(len(path), len(sample.episode.path))
+        assert np.abs(sample.episode.path[:steps] - path[:steps]).max() < 2.0
+        assert sample.episode.chunks == -(-sample.episode.steps // 24)
     # Whole plans at the state in question, only what is executed elsewhere.
     assert planner.lengths[0] == 10
     assert set(planner.lengths[1:]) == {8}
 
 
 def test_plans_are_sampled_some_way_into_an_episode(left):
-    decision = decide(Replayed(left), samples=2, seconds=1.6)
-    assert decision.way.shape == (49, 2)
-    assert np.abs(decision.way - left[1][:49]).max() < 2.0
-    assert decision.pose[:2] == tuple(decision.way[-1])
-    for sample in decision.samples:
-        assert sample.outcome.path is not None
-        np.testing.assert_array_equal(sample.outcome.path[:49], decision.way)
-        np.testing.assert_array_equal(sample.planned_path[0], decision.way[-1])
-        np.testing.assert_array_equal(sample.plan, left[0][16:26])
+    branch_point = decide(Replayed(left), samples=2, seconds=1.6)
+    assert branch_point.approach.shape == (49, 2)
+    assert np.abs(branch_point.approach - left[1][:49]).max() < 2.0
+    assert branch_point.pose[:2] == tuple(branch_point.approach[-1])
+    for sample in branch_point.samples:
+        assert sample.episode.path is not None
+        np.testing.assert_array_equal(sample.episode.path[:49], branch_point.approach)
+        np.testing.assert_array_equal(sample.planned_path[0], branch_point.approach[-1])
+        np.testing.assert_array_equal(sample.chunk, left[0][16:26])
         assert sample.route == "L"
 
 
 def test_a_moment_within_a_plan_is_reached_by_a_shorter_plan(left):
-    decision = decide(Replayed(left), samples=1, seconds=0.5)
-    assert decision.way.shape == (16, 2)
-    assert np.abs(decision.way - left[1][:16]).max() < 2.0
+    branch_point = decide(Replayed(left), samples=1, seconds=0.5)
+    assert branch_point.approach.shape == (16, 2)
+    assert np.abs(branch_point.approach - left[1][:16]).max() < 2.0
 
 
 def test_a_moment_after_the_end_is_refused(left):
-    with pytest.raises(RunError, match=r"^--seconds: expected a moment before the end, found one at 1\d\.\d s$"):
+    with pytest.raises(RunError, match=r"^--seconds: expected less than 1\d\.\d, when the episode ended, found"):
         decide(Replayed(left), seconds=60.0)
 
 
 def test_the_route_of_an_unfinished_path_is_not_decided():
     upwards = np.tile([0.0, -1.0, 0.0, -1.0], (60, 1))
-    decision = decide(Replayed((upwards, np.tile(MAP.start[:2], (181, 1)))))
-    assert {sample.outcome.reason for sample in decision.samples} == {"collision_wall"}
-    assert {sample.route for sample in decision.samples} == {None}
+    branch_point = decide(Replayed((upwards, np.tile(MAP.start[:2], (181, 1)))))
+    assert {sample.episode.reason for sample in branch_point.samples} == {"collision_wall"}
+    assert {sample.route for sample in branch_point.samples} == {None}
 
 
 class Swaying:
     """Forces that follow from the whole history, for as many tables as there are."""
 
-    name, task, n_obs_steps, n_action_steps, fps, keeps_history, wanted = "swaying", "table", 3, 8, 10, False, 8
+    name, task, n_obs_steps, n_action_steps, fps, keeps_history = "swaying", "table", 3, 8, 10, False
+    n_predicted_actions = 8
 
     def reset(self, seed: int) -> None:
         """Nothing here is random."""
@@ -151,16 +155,16 @@ class Swaying:
     def predict_action_chunk(self, history: dict[str, np.ndarray]) -> np.ndarray:
         seen = np.concatenate([history[STATE], history[HUMAN_ACTION]], axis=-1).sum(axis=(1, 2))
         phase = seen[:, None, None] + np.arange(10)[:, None] + np.arange(4)
-        return np.sin(phase)[:, : self.wanted or 10]
+        return np.sin(phase)[:, : self.n_predicted_actions or 10]
 
 
 def test_a_branch_goes_on_as_the_table_itself():
     physics = Physics(step_limit=200)
     (whole,) = coplan(Swaying(), [MAP], physics)
     for sample in decide(Swaying(), samples=2, seconds=2.4, physics=physics).samples:
-        assert (sample.outcome.reason, sample.outcome.plans) == (whole.reason, whole.plans)
-        np.testing.assert_array_equal(sample.outcome.path, whole.path)
-        np.testing.assert_array_equal(sample.outcome.interaction, whole.interaction)
+        assert (sample.episode.reason, sample.episode.chunks) == (whole.reason, whole.chunks)
+        np.testing.assert_array_equal(sample.episode.path, whole.path)
+        np.testing.assert_array_equal(sample.episode.interaction, whole.interaction)
 
 
 def drawn(path: Path, colour: str) -> int:
@@ -169,8 +173,8 @@ def drawn(path: Path, colour: str) -> int:
 
 
 def test_the_picture_has_a_colour_for_each_route(left, right, tmp_path):
-    save_plans(decide(Replayed(left, right)), tmp_path / "both.png", "both")
-    save_plans(decide(Replayed(left)), tmp_path / "one.png", "one")
+    save_chunk_figure(decide(Replayed(left, right)), tmp_path / "both.png", "both")
+    save_chunk_figure(decide(Replayed(left)), tmp_path / "one.png", "one")
     both, one = ([drawn(tmp_path / name, colour) for colour in (BLUE, VERMILION)] for name in ("both.png", "one.png"))
     assert min(both) > 100
     assert one[0] > 100
@@ -190,7 +194,7 @@ def test_the_same_seed_gives_the_same_plans_and_no_two_are_alike(checkpoint):
     for parameter in policy.policy.parameters():
         torch.nn.init.normal_(parameter, std=0.1)
     first, second, other = (
-        np.array([s.plan for s in sample_plans(policy, MAP, Physics(step_limit=30), samples=3, seed=seed).samples])
+        np.array([s.chunk for s in sample_chunks(policy, MAP, Physics(step_limit=30), samples=3, seed=seed).samples])
         for seed in (4, 4, 5)
     )
     assert first.shape == (3, policy.chunk_size, 4)
@@ -233,8 +237,8 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         (["--samples", "0"], 2, "--samples: expected at least 1, found 0"),
         (["--seconds", "-1"], 2, "--seconds: expected a number of at least 0, found -1.0"),
         (["--seconds", "nan"], 2, "--seconds: expected a number of at least 0, found nan"),
-        (["--seconds", "5"], 1, "--seconds: expected a moment before the end, found one at 2.0 s"),
-        (["--n-action-steps", "11"], 2, "--n-action-steps: expected at most the plan's 10, found 11"),
+        (["--seconds", "5"], 1, "--seconds: expected less than 2.0, when the episode ended, found 5"),
+        (["--n-action-steps", "11"], 2, "--n-action-steps: expected 1 to 10, the actions of a chunk, found 11"),
     ],
 )
 def test_wrong_calls_say_what_is_wrong(checkpoint, tmp_path, capsys, flags, status, text):

@@ -1,4 +1,4 @@
-"""Excluded episodes: flagged, kept, listed, carried along, and left out of training."""
+"""Excluded episodes are flagged, kept, listed, preserved by LeRobot's tools, and left out of training."""
 
 import errno
 import json
@@ -46,7 +46,7 @@ def uuids(root: Path) -> list[str]:
     return table(root).column("episode_uuid").to_pylist()
 
 
-def test_a_flag_with_its_reason_and_nothing_else_changes(root):
+def test_only_the_flag_and_its_reason_change(root):
     before, files = table(root), contents(root)
     set_columns(root, quality_flags=["", "slow_loop", "", "", ""])
     assert exclude(root, ["1", "3-4"], REASON) == {"excluded": [1, 3, 4], "already_discarded": []}
@@ -63,7 +63,7 @@ def test_a_flag_with_its_reason_and_nothing_else_changes(root):
     assert {name for name in files.keys() | now.keys() if files.get(name) != now.get(name)} == {EPISODES.as_posix()}
 
 
-def test_a_flag_is_taken_away_again(root):
+def test_a_flag_is_removed(root):
     before = table(root)
     exclude(root, [uuids(root)[2]], "a first reason, with a comma")
     assert excluded_episodes(root) == [(2, uuids(root)[2], "a first reason; with a comma")]
@@ -74,7 +74,7 @@ def test_a_flag_is_taken_away_again(root):
     assert excluded_episodes(root) == []
 
 
-def test_what_an_operator_discarded_is_left_alone(root):
+def test_discarded_episodes_stay_unchanged(root):
     set_columns(root, discarded=[True, False, False, False, False])
     assert exclude(root, ["0", "1"], REASON) == {"excluded": [1], "already_discarded": [0]}
     assert include(root, ["0", "1"]) == {"included": [1], "not_excluded": [0]}
@@ -101,11 +101,10 @@ def test_the_command(root, capsys):
         (("--reason", "x"), "--episode-ids: expected numbers, ranges such as 3-5, or episode_uuids, found None"),
         (
             ("--episode-ids", "1", "3-9", "--reason", "x"),
-            "--episode-ids: expected numbers from 0 to 4, ranges such as 3-5, or episode_uuids of the data set, "
-            "found '3-9'",
+            "--episode-ids: expected numbers from 0 to 4, ranges such as 3-5, or existing episode_uuids, found '3-9'",
         ),
         (("--episode-ids", "1", "--reason", "x", "--undo"), "--reason: expected none with --undo, found 'x'"),
-        (("--list", "--reason", "x"), "--list: expected no --episode-ids and no --reason beside it, found 'one'"),
+        (("--list", "--reason", "x"), "--list: expected neither --episode-ids nor --reason with it, found 'one'"),
     ],
 )
 def test_a_wrong_call_changes_nothing(root, capsys, arguments, message):
@@ -116,14 +115,14 @@ def test_a_wrong_call_changes_nothing(root, capsys, arguments, message):
 
 
 @pytest.mark.parametrize("text", ["5-3", "0-99999999999", "-1", "two"])
-def test_episodes_that_are_not_there(root, text):
+def test_missing_episodes_are_refused(root, text):
     with pytest.raises(Exception, match="expected numbers from 0 to 4"):
         exclude(root, [text], REASON)
 
 
-def test_a_folder_that_is_no_data_set(root, tmp_path, capsys):
+def test_a_folder_without_a_data_set_is_refused(root, tmp_path, capsys):
     assert main(["exclude", str(tmp_path / "none"), "--list"]) == 2
-    expected = "expected a LeRobot v3 data set with meta/info.json, found nothing there\n"
+    expected = "expected a LeRobot v3 data set with meta/info.json, found no such file or folder\n"
     assert capsys.readouterr().err == f"copolicy-dataset: {tmp_path / 'none'}: {expected}"
     bare = table(root).drop_columns(["discarded"])
     pq.write_table(bare, root / EPISODES)

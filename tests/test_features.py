@@ -23,7 +23,7 @@ def test_maps_lie_inside_the_bounds_and_come_back_from_their_vector(name):
     for config in MAP_SETS[name]:
         vector = features.environment_state(config)
         assert ((low <= vector) & (vector <= high)).all()
-        assert features.map_of(vector, config.obstacle_size) == config
+        assert features.map_from_vector(vector, config.obstacle_size) == config
 
 
 def test_an_obstacle_behind_an_empty_slot_is_refused():
@@ -31,7 +31,7 @@ def test_an_obstacle_behind_an_empty_slot_is_refused():
     vector[9:11] = 5.0
     vector[5:7] = 0.0
     with pytest.raises(InvalidValueError, match="obstacles before the zero padding"):
-        features.map_of(vector, 50)
+        features.map_from_vector(vector, 50)
 
 
 def test_state_vector_holds_the_orientation():

@@ -3,7 +3,13 @@ import os
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.listing import broken_links, distinct, distinct_files, on_visible_files, visible_files
+from copolicy.dataset.files.listing import (
+    broken_links,
+    distinct_files,
+    skipping_hidden_files,
+    visible_files,
+    without_duplicates,
+)
 
 
 @pytest.fixture
@@ -27,22 +33,22 @@ def session(tmp_path):
 
 
 @pytest.mark.parametrize("files", [visible_files, distinct_files])
-def test_links_are_entered_and_hidden_names_passed_over(session, files):
+def test_links_are_followed_and_hidden_files_skipped(session, files):
     assert files(session, "*.mcap") == [session / "a.mcap", session / "linked" / "deep" / "c.mcap"]
     assert files(session, "*.mcap", "*.txt")[-1] == session / "notes.txt"
 
 
-def test_a_linked_folder_itself_may_be_asked_for(session, tmp_path):
+def test_a_linked_folder_can_be_listed(session, tmp_path):
     os.symlink(session, tmp_path / "name")
     assert visible_files(tmp_path / "name", "a.mcap") == [tmp_path / "name" / "a.mcap"]
     assert distinct_files(tmp_path / "name", "a.mcap") == [tmp_path / "name" / "a.mcap"]
 
 
-def test_a_folder_that_is_not_there_holds_nothing(tmp_path):
+def test_a_missing_folder_is_empty(tmp_path):
     assert visible_files(tmp_path / "none", "*") == distinct_files(tmp_path / "none", "*") == []
 
 
-def test_a_file_counts_once_by_its_own_path(tmp_path):
+def test_a_file_is_listed_once_by_its_own_path(tmp_path):
     (tmp_path / "session" / "one").mkdir(parents=True)
     recording = tmp_path / "session" / "one" / "a.mcap"
     recording.touch()
@@ -51,10 +57,10 @@ def test_a_file_counts_once_by_its_own_path(tmp_path):
     os.link(recording, tmp_path / "session" / "one" / "b.mcap")
     assert distinct_files(tmp_path / "session", "*.mcap") == [recording]
     assert len(visible_files(tmp_path / "session", "*.mcap")) == 5
-    assert distinct([recording, tmp_path / "session" / "a.mcap"]) == [recording]
+    assert without_duplicates([recording, tmp_path / "session" / "a.mcap"]) == [recording]
 
 
-def test_folders_that_link_to_each_other_end(tmp_path):
+def test_circular_links_terminate(tmp_path):
     folders = [tmp_path / f"session-{number:02d}" for number in range(12)]
     for folder in folders:
         folder.mkdir()
@@ -64,7 +70,7 @@ def test_folders_that_link_to_each_other_end(tmp_path):
     assert distinct_files(tmp_path, "*.mcap") == [folder / "a.mcap" for folder in folders]
 
 
-def test_links_that_lead_nowhere_are_named(session):
+def test_broken_links_are_listed(session):
     os.symlink("gone.mcap", session / "lost.mcap")
     os.symlink("/nowhere/session-2", session / "session-2")
     os.symlink("ring", session / "ring")
@@ -73,7 +79,7 @@ def test_links_that_lead_nowhere_are_named(session):
     assert broken_links(session) == [session / "lost.mcap", session / "ring", session / "session-2"]
 
 
-def test_a_folder_that_cannot_be_read_is_no_empty_folder(session, monkeypatch):
+def test_an_unreadable_folder_is_an_error(session, monkeypatch):
     scandir = os.scandir
 
     def refused(path):
@@ -88,6 +94,6 @@ def test_a_folder_that_cannot_be_read_is_no_empty_folder(session, monkeypatch):
             files(session, "*.mcap")
 
 
-def test_foreign_code_does_not_find_hidden_files(session):
-    names = on_visible_files(lambda folder: sorted(path.name for path in folder.glob("*.mcap")))
+def test_wrapped_functions_skip_hidden_files(session):
+    names = skipping_hidden_files(lambda folder: sorted(path.name for path in folder.glob("*.mcap")))
     assert names(session) == ["a.mcap"]

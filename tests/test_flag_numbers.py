@@ -1,4 +1,4 @@
-"""Numbers on the command line: each flag has bounds, and says in one line what it takes."""
+"""Number flags have bounds and report them in one line."""
 
 import re
 
@@ -27,23 +27,23 @@ from copolicy.train.quickstart import main as quickstart
         (number("--x"), "-0.5", "--x: expected a number of at least 0, found -0.5"),
         (number("--x"), "nan", "--x: expected a number of at least 0, found nan"),
         (number("--x"), "inf", "--x: expected a finite number, found inf"),
-        (number("--x", above=True), "0", "--x: expected a number above 0, found 0.0"),
+        (number("--x", exclusive=True), "0", "--x: expected a number above 0, found 0.0"),
         (number("--x", 0, 60), "61", "--x: expected a number of at most 60, found 61.0"),
         (number("--x"), "ten", "--x: expected a number, found 'ten'"),
     ],
 )
-def test_a_number_outside_its_bounds_is_named(parse, text, message):
+def test_a_number_out_of_bounds_is_refused(parse, text, message):
     with pytest.raises(InvalidValueError, match=f"^{re.escape(message)}$"):
         parse(text)
 
 
-def test_numbers_within_the_bounds_are_taken():
+def test_numbers_within_the_bounds_are_accepted():
     assert [whole_number("--n", 0, 9)(text) for text in ("0", " 9 ")] == [0, 9]
     assert [number("--x", 0, 60)(text) for text in ("0", "60", "1e1")] == [0, 60, 10]
     assert seed()("4294967295") == 2**32 - 1
 
 
-def test_it_is_one_line_with_status_2(capsys):
+def test_a_number_out_of_bounds_gives_one_line_and_status_2(capsys):
     parser, commands = command_parser("tool", "A tool.")
     command = add_command(commands, "do", lambda arguments: {}, "does it", "tool do")
     command.add_argument("--n", type=whole_number("--n"))
@@ -95,7 +95,7 @@ def test_every_flag_of_every_command_that_takes_a_number_has_bounds():
         (collect, "simulate --episodes=1 --start-noise=nan", "--start-noise: expected a number of at least 0"),
     ],
 )
-def test_such_numbers_end_before_any_work(tmp_path, capsys, command, call, message):
+def test_numbers_out_of_bounds_end_a_command_before_any_work(tmp_path, capsys, command, call, message):
     out = tmp_path / ("out.json" if command is evaluate else "out")
     assert command([*call.split(), "--out", str(out)]) == 2
     said = capsys.readouterr()

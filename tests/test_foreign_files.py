@@ -1,4 +1,4 @@
-"""What is not what a command takes, or is broken, gives one line and exit status 1 or 2, in every command.
+"""Foreign and damaged files give one line and exit status 1 or 2 in every command.
 
 Samples of tests/benchmarks/foreign_sweep.py.
 """
@@ -16,13 +16,13 @@ from reading_commands import COMMANDS
 
 from copolicy.collect.inputs.calibration_store import CalibrationStore
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 
 KINDS = {
-    "nothing": "nothing there",
+    "nothing": "no such file or folder",
     "empty file": "an empty file",
     "text": "a text file",
-    "zeros": "zeros",
+    "zeros": "a file of zeros",
     "magic alone": "an MCAP file",
     "hdf5": "an HDF5 file",
     "npz": "a NumPy archive (.npz)",
@@ -32,28 +32,28 @@ KINDS = {
     "json": "a JSON file",
     "zip": "a zip archive",
     "damaged zip": "a damaged zip archive",
-    "zarr zip of another project": "a zipped Zarr store (copolicy-convert upstream takes the original program's)",
+    "zarr zip of another project": "a zipped Zarr store (copolicy-convert upstream reads the original program's)",
     "pipe": "a pipe, socket or device",
     "empty folder": "an empty folder",
     "folder of text": "a folder of other files",
-    "recordings of another project": "a folder of recordings (copolicy-convert mcap takes it)",
+    "recordings of another project": "a folder of recordings (copolicy-convert mcap reads it)",
     "folder of hdf5": "a folder of other files (.hdf5)",
-    "lerobot of another task": "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)",
-    "zarr v2 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
-    "zarr v3 of another project": "a Zarr store (copolicy-convert upstream takes the original program's)",
+    "lerobot of another task": "a LeRobot data set (copolicy-dataset check and copolicy-convert export read it)",
+    "zarr v2 of another project": "a Zarr store (copolicy-convert upstream reads the original program's)",
+    "zarr v3 of another project": "a Zarr store (copolicy-convert upstream reads the original program's)",
 }
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_and_folders_are_called_what_they_are(tmp_path, kind):
-    assert kind_of(FOREIGN[kind](tmp_path)) == KINDS[kind]
+def test_describe_path(tmp_path, kind):
+    assert describe_path(FOREIGN[kind](tmp_path)) == KINDS[kind]
 
 
 OWN_READERS = ("collect replay", "collect recover", "convert mcap", "convert upstream", "dataset check")
 
 
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_each_gives_one_line_in_each_command(tmp_path, kind, monkeypatch):
+def test_foreign_files_give_one_line_in_each_command(tmp_path, kind, monkeypatch):
     commands = {name: COMMANDS[name] for name in OWN_READERS}
     if kind in ("text", "lerobot of another task", "recordings of another project", "zarr v3 of another project"):
         commands = {name: build for name, build in COMMANDS.items() if name != "dataset stats"}
@@ -86,7 +86,7 @@ for name in ("a.mcap", "a.zarr.zip"):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
-def test_what_may_not_be_read_is_said_so(tmp_path):
+def test_unreadable_files_give_one_line(tmp_path):
     # Root may read anything, unless it gives that right up.
     rights = "-dac_override,-dac_read_search"
     prefix = ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []

@@ -1,4 +1,4 @@
-"""A disk that takes no more: one line with the path, exit status 1, and nothing left, in every command that writes.
+"""A full disk: one line with the path, exit status 1, and nothing left, in every command that writes.
 
 A limit on the size of a file stands in for the full disk: no right to mount anything is needed, and the system answers
 in the same place, with EFBIG for ENOSPC.
@@ -22,7 +22,7 @@ from copolicy.train.cli import main as train
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
+def folders(tmp_path_factory) -> Path:
     """Recordings and two data sets."""
     folder = tmp_path_factory.mktemp("made")
     for seed, name in ((0, "one"), (1, "two")):
@@ -37,7 +37,7 @@ def _files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-NEW = {  # what makes a new file or folder, and how many bytes a file may have
+NEW = {  # commands that write a new file or folder, and the limit of a file's bytes
     "simulate": (collect, ["simulate", "--episodes", "2", "--maps", "training", "--workers", "1", "--out"], 20_000),
     "png": (collect, ["replay", "{recording}", "--out"], 2_000),
     "gif": (collect, ["replay", "{recording}", "--out"], 2_000),
@@ -58,12 +58,12 @@ NEW = {  # what makes a new file or folder, and how many bytes a file may have
 NAMES = {"png": "x.png", "gif": "x.gif", "minari": "x-v0", "robomimic": "x.hdf5", "report": "x.html"}
 
 
-@pytest.mark.parametrize("what", NEW)
-def test_what_is_new_is_not_there_at_all(what, made, tmp_path, capsys):
-    command, arguments, limit = NEW[what]
-    (recording,) = (made / "one-recordings").glob("*.mcap")
-    filled = [part.format(made=made, recording=recording) for part in arguments]
-    out = tmp_path / NAMES.get(what, "out")
+@pytest.mark.parametrize("name", NEW)
+def test_a_new_file_is_not_written(name, folders, tmp_path, capsys):
+    command, arguments, limit = NEW[name]
+    (recording,) = (folders / "one-recordings").glob("*.mcap")
+    filled = [argument.format(made=folders, recording=recording) for argument in arguments]
+    out = tmp_path / NAMES.get(name, "out")
     capsys.readouterr()
     with full_disk(limit):
         status = command([*filled, str(out)])
@@ -76,7 +76,7 @@ def test_what_is_new_is_not_there_at_all(what, made, tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir() if path.name != ".out.shards"] == []
 
 
-CHANGED = {  # what changes a data set
+CHANGED = {  # commands that change a data set
     "stats": (dataset, ["stats", "{set}"], 500),
     "exclude": (dataset, ["exclude", "{set}", "--episode-ids", "0", "--reason", "why"], 5_000),
     "release": (dataset, ["release", "{set}", "--bump", "minor", "--notes", "first"], 500),
@@ -86,13 +86,13 @@ CHANGED = {  # what changes a data set
 }
 
 
-@pytest.mark.parametrize("what", CHANGED)
-def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
-    command, arguments, limit = CHANGED[what]
-    root = Path(shutil.copytree(made / "one", tmp_path / "set"))
+@pytest.mark.parametrize("name", CHANGED)
+def test_a_data_set_stays_as_it_was(name, folders, tmp_path, capsys):
+    command, arguments, limit = CHANGED[name]
+    root = Path(shutil.copytree(folders / "one", tmp_path / "set"))
     before = _files(tmp_path)
     with full_disk(limit):
-        status = command([part.format(set=root, made=made) for part in arguments])
+        status = command([argument.format(set=root, made=folders) for argument in arguments])
     error = capsys.readouterr().err
     lines = [line for line in error.splitlines() if line.startswith("copolicy-")]
     assert (status, len(lines)) == (1, 1)
@@ -101,18 +101,18 @@ def test_a_data_set_stays_as_it_was(what, made, tmp_path, capsys):
     assert _files(tmp_path) == before
 
 
-def test_a_check_says_that_its_findings_were_not_kept(made, tmp_path, capsys):
-    root = Path(shutil.copytree(made / "one", tmp_path / "set"))
+def test_a_check_without_space_for_its_findings_succeeds(folders, tmp_path, capsys):
+    root = Path(shutil.copytree(folders / "one", tmp_path / "set"))
     before = _files(tmp_path)
     with full_disk(500):
         assert dataset(["check", str(root)]) == 0
     assert _files(tmp_path) == before
 
 
-def test_a_training_that_comes_to_no_checkpoint_leaves_none(made, tmp_path, capfd):
+def test_a_training_that_comes_to_no_checkpoint_leaves_none(folders, tmp_path, capfd):
     flags = ["--policy.preset=small", "--policy.device=cpu", "--steps=1", "--batch_size=2", "--env_eval_freq=0"]
     with full_disk(100_000):
-        status = train([f"--dataset.root={made / 'one'}", f"--output_dir={tmp_path / 'run'}", *flags])
+        status = train([f"--dataset.root={folders / 'one'}", f"--output_dir={tmp_path / 'run'}", *flags])
     lines = [line for line in capfd.readouterr().err.splitlines() if line.startswith("copolicy-")]
     assert status == 1
     assert len(lines) == 1
@@ -133,7 +133,7 @@ def _build(path: Path) -> None:
         (partial / "array").write_bytes(bytes(200))
 
 
-def test_several_files_take_their_places_together_or_not_at_all(tmp_path):
+def test_several_files_are_replaced_together_or_not_at_all(tmp_path):
     names = [tmp_path / "a", tmp_path / "b"]
     for name in names:
         name.write_text("old", encoding="utf-8")
@@ -143,7 +143,7 @@ def test_several_files_take_their_places_together_or_not_at_all(tmp_path):
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == {"a": "old", "b": "old"}
 
 
-def test_the_path_is_that_of_the_finished_file(tmp_path):
+def test_the_error_names_the_final_path(tmp_path):
     with full_disk(100), pytest.raises(OSError, match=os.strerror(errno.EFBIG)) as refused:
         _build(tmp_path / "set")
     assert str(system_line(refused.value)).startswith(str(tmp_path / "set"))
@@ -153,7 +153,7 @@ def test_the_path_is_that_of_the_finished_file(tmp_path):
     assert missing.value.filename == str(tmp_path / "set" / "deep" / "file")
 
 
-def test_an_error_that_is_called_otherwise_is_known_by_its_text(tmp_path):
+def test_an_error_of_another_type_is_recognised_by_its_text(tmp_path):
     with pytest.raises(OSError, match="No space left") as refused, new_file(tmp_path / "weights"):
         raise ValueError("I/O error: No space left on device (os error 28)")
     assert system_line(refused.value) == f"{tmp_path / 'weights'}: No space left on device"

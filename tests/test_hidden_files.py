@@ -1,4 +1,4 @@
-"""What macOS leaves beside files (`._NAME`, `.DS_Store`) is passed over by every command."""
+"""Every command ignores the side files of macOS (`._NAME`, `.DS_Store`)."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ from training_table import flags
 
 from copolicy.cards.cli import main as cards
 from copolicy.collect.cli import main as collect
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 from copolicy.convert.upstream.conversion import open_upstream
@@ -24,7 +24,7 @@ from copolicy.train.cli import main as train
 
 
 def litter(folder: Path) -> Path:
-    """Leaves side files in a folder and in each one below, as after a copy to a foreign disk and back."""
+    """Adds side files to a folder and its sub-folders, as after a copy to another disk and back."""
     for inside in [folder, *(path for path in folder.rglob("*") if path.is_dir())]:
         for name in (".DS_Store", "Thumbs.db", *(f"._{path.name}" for path in list(inside.iterdir()))):
             (inside / name).write_bytes(b"\x00\x05\x16\x07\x00\x02\x00\x00Mac OS X")
@@ -60,13 +60,13 @@ def test_recordings_are_converted_checked_and_found(made, tmp_path):
     ok(convert, "mcap", raw, "--out", tmp_path / "set", "--repo-id", "lab/table", *video)
     assert contents(tmp_path / "set").keys() == contents(made / "set").keys()
     assert check_dataset(raw).findings == check_dataset(made / "raw").findings
-    assert len(find_raw_recordings(made / "set", raw).files) == len(list(recordings(raw))) == 4
+    assert len(find_raw_recordings(made / "set", raw).files) == len(list(iter_recordings(raw))) == 4
     assert ok(collect, "recover", raw)["damaged"] == 0
 
 
 def test_a_data_set_is_checked_described_and_released(made, root):
     assert check_dataset(root).findings == check_dataset(made / "set").findings
-    assert Manifest.of_folder(root).files == Manifest.of_folder(made / "set").files
+    assert Manifest.from_folder(root).files == Manifest.from_folder(made / "set").files
     ok(dataset, "exclude", root, "--episode-ids", 1, "--reason", "stick unplugged")
     ok(dataset, "stats", root)
     ok(dataset, "release", root, "--bump", "minor", "--notes", "The first.")

@@ -20,7 +20,7 @@ def released(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory, released):
-    """Has published 1.0.0 with recordings as lab/table."""
+    """A user who has published 1.0.0 with recordings as lab/table."""
     with LocalHub() as hub, HubUser(hub, tmp_path_factory.mktemp("home")) as user:
         done = user.run("publish", released, "--repo-id", "lab/table", "--raw", released.parent / "recordings")
         assert done.status == 0, done.err
@@ -34,14 +34,14 @@ def findings(done) -> list[dict]:
 
 
 @pytest.mark.parametrize("revision", [(), ("--revision", "data-1.0.0"), ("--revision", "v3.0")])
-def test_the_findings_are_those_of_the_folder_that_was_published(user, released, revision):
+def test_the_findings_equal_those_of_the_published_folder(user, released, revision):
     there = user.run("check", "lab/table", *revision, "--json")
     here = user.run("check", released, "--json", "--no-save")
     assert (there.status, findings(there)) == (here.status, findings(here))
     assert json.loads(there.out)["content_hash"] == json.loads(here.out)["content_hash"]
 
 
-def test_recordings_stay_there_and_no_finding_is_put_into_the_clients_cache(user):
+def test_recordings_are_not_downloaded_and_the_cache_is_not_changed(user):
     assert json.loads(user.run("check", "lab/table", "--json").out)["saved"] is None
     cached = [path for path in (user.home / "huggingface").rglob("*") if "snapshots" in path.parts]
     assert [path for path in cached if path.name == "info.json"]
@@ -51,19 +51,19 @@ def test_recordings_stay_there_and_no_finding_is_put_into_the_clients_cache(user
 @pytest.mark.parametrize(
     ("name", "flags", "message"),
     [
-        ("lab/none", (), "lab/none: no such data set on the Hub, or a private one that the token may not see"),
-        ("lab/table", ("--revision", "data-9.0.0"), "lab/table@data-9.0.0: asking the Hub: no such revision"),
+        ("lab/none", (), "lab/none: no such data set on the Hub, or a private one that the token cannot read"),
+        ("lab/table", ("--revision", "data-9.0.0"), "lab/table@data-9.0.0: querying the Hub: no such revision"),
     ],
 )
-def test_what_is_not_there_is_one_line(user, name, flags, message):
+def test_a_missing_data_set_gives_one_line(user, name, flags, message):
     assert user.run("check", name, *flags).error == message
 
 
-def test_a_hub_in_trouble_is_one_line_and_no_older_copy_is_checked_instead(user):
+def test_a_failing_hub_gives_one_line_and_no_cached_copy_is_checked(user):
     assert user.run("check", "lab/table", "--json").status == 0  # and is in the client's cache
     user.hub.fail("GET", r"/api/datasets/lab/table", 503, times=20)
     error = user.run("check", "lab/table").error
     user.hub.faults.clear()
-    trouble = "the Hub has trouble (HTTP 503); run the command again, it goes on where it stopped"
-    assert error == f"lab/table: asking the Hub: {trouble}"
+    trouble = "the Hub failed (HTTP 503); run the command again to continue"
+    assert error == f"lab/table: querying the Hub: {trouble}"
     assert user.run("check", "lab/table", "--json").status == 0

@@ -2,8 +2,8 @@
 
 | fault | what the user sees | what a rerun does |
 |---|---|---|
-| no token, or a wrong one | one line: the Hub does not accept the token; nothing changed | publishes, with a token |
-| a token that may only read | one line: the token may not do this | publishes, with another token |
+| no token, or a wrong one | one line: the Hub rejected the token; nothing changed | publishes, with a token |
+| a token that may only read | one line: the token has no write access | publishes, with another token |
 | 500 once or twice | nothing: the client tries again | |
 | 500 for good, or a connection that drops, while uploading | one line; no commit | sends only what did not arrive |
 | 500 at the commit | one line; no commit | commits; sends no large file again |
@@ -73,7 +73,7 @@ def is_published(hub: LocalHub, root: Path) -> bool:
     return there == files and set(repository.tags.values()) == {repository.branches["main"]}
 
 
-def test_everything_goes_up_in_one_commit_with_both_tags(hub, dataset, publish):
+def test_all_files_are_uploaded_in_one_commit_with_both_tags(hub, dataset, publish):
     (dataset / "figures").mkdir()
     (dataset / "figures" / "routes.png").write_bytes(b"\x89PNG")
     done = publish()
@@ -95,7 +95,7 @@ def test_everything_goes_up_in_one_commit_with_both_tags(hub, dataset, publish):
     assert not repository.private
 
 
-def test_the_token_is_nowhere(hub, dataset, publish):
+def test_the_token_is_not_written_anywhere(hub, dataset, publish):
     hub.fail("POST", COMMIT, 500)
     assert publish().status == 1
     assert publish().status == 0
@@ -112,7 +112,7 @@ def test_the_same_version_is_refused_a_second_time(hub, dataset, publish):
     assert hub.data_set("lab/table").commits == before
 
 
-def test_another_content_under_the_same_version_is_refused(hub, dataset, publish, released_once, tmp_path):
+def test_other_content_under_the_same_version_is_refused(hub, dataset, publish, released_once, tmp_path):
     assert publish().status == 0
     other = Path(shutil.copytree(released_once, tmp_path / "other"))
     (other / "meta/copolicy_release.json").unlink()
@@ -124,7 +124,7 @@ def test_another_content_under_the_same_version_is_refused(hub, dataset, publish
     )
 
 
-def test_the_next_version_moves_the_format_tag_and_leaves_nothing_behind(hub, dataset, publish, released_once):
+def test_the_next_version_moves_the_format_tag_and_deletes_stale_files(hub, dataset, publish, released_once):
     (dataset / "old.txt").write_text("to go", encoding="utf-8")
     assert publish().status == 0
     first = hub.data_set("lab/table").branches["main"]
@@ -170,7 +170,7 @@ REFUSED = {
     "changed metadata": (
         lambda root: set_value(root, EPISODES, "pair_id", 0, "pair-9"),
         1,
-        "{root}: expected what release 1.0.0 holds, found that meta/episodes/chunk-000/file-000.parquet has other "
+        "{root}: expected the content of release 1.0.0, found meta/episodes/chunk-000/file-000.parquet has other "
         "content; release it first",
     ),
     "other statistics": (
@@ -178,7 +178,7 @@ REFUSED = {
             (root / "meta/stats.json").read_text(encoding="utf-8") + " ", encoding="utf-8"
         ),
         1,
-        "{root}: expected what release 1.0.0 holds, found that meta/stats.json has other content; release it first",
+        "{root}: expected the content of release 1.0.0, found meta/stats.json has other content; release it first",
     ),
     "an error that the checks find": (
         lambda root: (set_value(root, FRAMES, "action[0]", 0, 7.0), release(root, "major", "Stronger.")),
@@ -189,7 +189,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("reason", REFUSED)
-def test_what_is_not_ready_is_refused_before_the_hub_is_asked(hub, dataset, publish, reason):
+def test_an_unready_data_set_is_refused_before_the_hub_is_queried(hub, dataset, publish, reason):
     change, status, message = REFUSED[reason]
     change(dataset)
     done = publish()
@@ -199,7 +199,7 @@ def test_what_is_not_ready_is_refused_before_the_hub_is_asked(hub, dataset, publ
     assert hub.requests == []
 
 
-def test_private_is_private_or_nothing(hub, user, dataset, publish):
+def test_private_refuses_a_public_repository(hub, user, dataset, publish):
     assert publish("--private").status == 0
     assert hub.data_set("lab/table").private
     public = Repository(private=False)
@@ -210,19 +210,18 @@ def test_private_is_private_or_nothing(hub, user, dataset, publish):
     assert public.head == {}
 
 
-REJECTED = "the Hub does not accept the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`"
+REJECTED = "the Hub rejected the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`"
 
 
 @pytest.mark.parametrize(
     ("token", "message"),
     [
-        ("hf_" + "w" * 34, f"lab/table: asking the Hub: {REJECTED}"),
-        (None, f"lab/table: asking the Hub: {REJECTED}"),
-        (READ_TOKEN, "lab/table: creating the repository: the token may not do this; it needs the right to write "
-         "to the repository"),
+        ("hf_" + "w" * 34, f"lab/table: querying the Hub: {REJECTED}"),
+        (None, f"lab/table: querying the Hub: {REJECTED}"),
+        (READ_TOKEN, "lab/table: creating the repository: the token has no write access to the repository"),
     ],
 )  # fmt: skip
-def test_a_token_that_does_not_do_is_named_and_not_shown(hub, dataset, publish, token, message):
+def test_a_rejected_token_is_reported_but_not_shown(hub, dataset, publish, token, message):
     done = publish(token=token)
     assert done.error == message
     assert token is None or token not in done.err
@@ -231,17 +230,17 @@ def test_a_token_that_does_not_do_is_named_and_not_shown(hub, dataset, publish, 
 
 
 @pytest.mark.parametrize("path", [r"/preupload/", r"/objects/batch$", r"^/lfs/"])
-def test_a_hub_that_stumbles_is_asked_again(hub, dataset, publish, path):
+def test_a_failed_request_is_retried(hub, dataset, publish, path):
     hub.fail("PUT" if "lfs/" in path else "POST", path, 503, times=2)
     done = publish()
     assert done.status == 0, done.err
     assert is_published(hub, dataset)
 
 
-TROUBLE = "the Hub has trouble (HTTP 500); run the command again, it goes on where it stopped"
+TROUBLE = "the Hub failed (HTTP 500); run the command again to continue"
 
 
-def test_an_upload_that_fails_for_good_goes_on_where_it_stopped(hub, dataset, publish):
+def test_a_failed_upload_resumes(hub, dataset, publish):
     oid = hashlib.sha256((dataset / FRAMES).read_bytes()).hexdigest()
     hub.fail("PUT", rf"^/lfs/{oid}", 500, times=6)  # one try and five more
     assert publish().error == f"lab/table: uploading: {TROUBLE}"
@@ -256,15 +255,15 @@ def test_an_upload_that_fails_for_good_goes_on_where_it_stopped(hub, dataset, pu
 def test_a_connection_that_drops_while_uploading(hub, dataset, publish):
     hub.drop("PUT", r"^/lfs/", "before", times=100)
     message = publish().error
-    assert message.startswith("lab/table: uploading: the connection broke off (")
-    assert message.endswith("); run the command again, it goes on where it stopped")
+    assert message.startswith("lab/table: uploading: the connection was lost (")
+    assert message.endswith("); run the command again to continue")
     assert set(hub.data_set("lab/table").head) == {".gitattributes"}
     hub.faults.clear()
     assert publish().status == 0
     assert is_published(hub, dataset)
 
 
-def test_a_commit_that_fails_sends_no_large_file_again(hub, dataset, publish):
+def test_large_files_are_not_sent_again_after_a_failed_commit(hub, dataset, publish):
     hub.fail("POST", COMMIT, 500)
     assert publish().error == f"lab/table: uploading: {TROUBLE}"
     assert set(hub.data_set("lab/table").head) == {".gitattributes"}
@@ -281,9 +280,9 @@ FAULTS_AFTER_THE_COMMIT = {
 
 
 @pytest.mark.parametrize("fault", FAULTS_AFTER_THE_COMMIT)
-def test_a_commit_that_arrived_is_not_made_again(hub, dataset, publish, fault):
+def test_an_existing_commit_is_not_repeated(hub, dataset, publish, fault):
     FAULTS_AFTER_THE_COMMIT[fault](hub)
-    assert publish().error.endswith("run the command again, it goes on where it stopped")
+    assert publish().error.endswith("run the command again to continue")
     assert "data-1.0.0" not in hub.data_set("lab/table").tags
     done = publish()
     assert done.status == 0, done.err
@@ -292,7 +291,7 @@ def test_a_commit_that_arrived_is_not_made_again(hub, dataset, publish, fault):
     assert len(hub.data_set("lab/table").commits) == 2
 
 
-def test_a_format_tag_that_was_taken_off_and_not_set_again(hub, dataset, publish):
+def test_a_deleted_format_tag_is_set_again(hub, dataset, publish):
     assert publish().status == 0
     set_value(dataset, EPISODES, "pair_id", 0, "pair-9")
     release(dataset, "patch", "Corrected.")
@@ -305,14 +304,15 @@ def test_a_format_tag_that_was_taken_off_and_not_set_again(hub, dataset, publish
     assert repository.tags["v3.0"] == repository.tags["data-1.0.1"] == repository.branches["main"]
 
 
-def test_somebody_elses_commit_is_not_lost_unseen(hub, dataset, publish):
+def test_a_concurrent_commit_is_not_overwritten(hub, dataset, publish):
     def commit():
         repository = hub.data_set("lab/table")
         repository.commit({**repository.head, "README.md": b"theirs"}, "their card")
 
     hub.meanwhile("POST", COMMIT, commit)
     assert publish().error == (
-        "lab/table: uploading: somebody else committed meanwhile; look at what changed there and run the command again"
+        "lab/table: uploading: the repository was changed by another commit; check the changes and run "
+        "the command again"
     )
     repository = hub.data_set("lab/table")
     assert repository.head["README.md"] == b"theirs"
@@ -324,11 +324,11 @@ def test_somebody_elses_commit_is_not_lost_unseen(hub, dataset, publish):
 
 def test_a_conflict_that_the_hub_reports_itself(hub, dataset, publish):
     hub.fail("POST", COMMIT, 409)
-    assert "somebody else committed meanwhile" in publish().error
+    assert "the repository was changed by another commit" in publish().error
     assert publish().status == 0
 
 
-def test_only_the_recordings_of_the_episodes_go_up(hub, dataset, publish, released_once):
+def test_only_the_recordings_of_the_episodes_are_uploaded(hub, dataset, publish, released_once):
     recordings = Path(shutil.copytree(released_once.parent / "recordings", dataset.parent / "recordings"))
     (recordings / "discarded.mcap").write_bytes(b"nobody agreed to this")
     done = publish("--raw", recordings)
@@ -344,31 +344,31 @@ def test_only_the_recordings_of_the_episodes_go_up(hub, dataset, publish, releas
     assert left == [*(f"raw/episode_{index:06}.mcap" for index in (0, 2, 3, 4, 5)), "raw/manifest.json"]
 
 
-def test_recordings_that_are_not_complete_are_refused(hub, dataset, publish, released_once):
+def test_missing_recordings_are_refused(hub, dataset, publish, released_once):
     recordings = Path(shutil.copytree(released_once.parent / "recordings", dataset.parent / "recordings"))
     (recordings / "episode_000003.mcap").unlink()
     message = publish("--raw", recordings).error
-    assert message.startswith(f"{recordings}: expected the recording of every episode, found none of 1, first of ")
+    assert message.startswith(f"{recordings}: expected the recording of every episode, found 1 missing, first that of ")
     assert hub.requests == []
 
 
-def test_a_name_that_is_none_is_refused(hub, user, dataset):
+def test_an_invalid_name_is_refused(hub, user, dataset):
     done = user.run("publish", dataset, "--repo-id", "table")
     assert (done.status, hub.requests) == (2, [])
     assert done.err == (
-        "copolicy-dataset: --repo-id: expected USER/NAME as the Hub takes it (one slash between user and name), "
+        "copolicy-dataset: --repo-id: expected USER/NAME that the Hub accepts (one slash between user and name), "
         "found 'table'\n"
     )
 
 
-def test_excluded_episodes_are_sent_only_when_asked_for(hub, dataset, publish):
+def test_excluded_episodes_are_uploaded_only_with_the_flag(hub, dataset, publish):
     exclude(dataset, ["1"], "a stick was unplugged")
     release(dataset, "minor", "One episode excluded.")
     done = publish()
     assert done.status == 1
     assert "found 1 (1); nothing was uploaded" in done.err
     assert f"copolicy-dataset select {dataset} --out NEW --drop-excluded" in done.err
-    assert "--with-excluded sends them all the same" in done.err
+    assert "--with-excluded uploads them" in done.err
     assert len(done.err.splitlines()) == 1
     assert not hub.repositories
     assert publish("--with-excluded").status == 0

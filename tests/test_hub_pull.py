@@ -37,7 +37,7 @@ def released(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory, released):
-    """Has published 1.0.0 with recordings as lab/table."""
+    """A user who has published 1.0.0 with recordings as lab/table."""
     with LocalHub() as hub, HubUser(hub, tmp_path_factory.mktemp("home")) as user:
         done = user.run("publish", released, "--repo-id", "lab/table", "--raw", released.parent / "recordings")
         assert done.status == 0, done.err
@@ -59,7 +59,7 @@ def files_of(root: Path) -> dict[str, bytes]:
     return {path.relative_to(root).as_posix(): path.read_bytes() for path in root.rglob("*") if path.is_file()}
 
 
-def test_what_comes_back_is_what_went_up(user, hub, released, tmp_path):
+def test_pulled_files_equal_the_published_files(user, hub, released, tmp_path):
     done = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out", "--json")
     assert done.status == 0, done.err
     assert files_of(tmp_path / "out") == files_of(released)
@@ -90,7 +90,7 @@ def test_a_full_disk_leaves_nothing_at_out(user, hub, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"home", "out"}
 
 
-def test_recordings_come_when_asked_for(user, hub, released, tmp_path):
+def test_recordings_are_pulled_with_the_flag(user, hub, released, tmp_path):
     assert user.run("pull", "lab/table", "--out", tmp_path / "out", "--with-raw").status == 0
     recordings = files_of(released.parent / "recordings")
     assert {name: (tmp_path / "out" / "raw" / name).read_bytes() for name in recordings} == recordings
@@ -136,7 +136,7 @@ for revision in ("data-1.0.0", None):
     assert all(line.endswith("torch.Size([4])") for line in lines)
 
 
-def test_a_file_that_breaks_off_in_the_middle_is_asked_for_again(user, hub, released, tmp_path):
+def test_an_interrupted_file_is_downloaded_again(user, hub, released, tmp_path):
     hub.drop("GET", rf"/resolve/.*/{FRAMES}$", "middle")
     assert user.run("pull", "lab/table", "--out", tmp_path / "out").status == 0
     assert files_of(tmp_path / "out") == files_of(released)
@@ -144,7 +144,7 @@ def test_a_file_that_breaks_off_in_the_middle_is_asked_for_again(user, hub, rele
 
 
 @pytest.mark.parametrize("fault", ["500", "drop"])
-def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, released, tmp_path, fault):
+def test_a_failed_download_resumes(user, hub, released, tmp_path, fault):
     path = rf"/resolve/.*/{FRAMES}$"
     if fault == "500":
         hub.fail("GET", path, 500, times=100)
@@ -152,7 +152,7 @@ def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, rele
         hub.drop("GET", path, "before", times=100)
     message = user.run("pull", "lab/table", "--out", tmp_path / "out").error
     assert message.startswith("lab/table: downloading: ")
-    assert message.endswith("; run the command again, it goes on where it stopped")
+    assert message.endswith("; run the command again to continue")
     assert not (tmp_path / "out").exists()
     hub.faults.clear()
     hub.requests.clear()
@@ -165,7 +165,7 @@ def test_a_download_that_fails_for_good_goes_on_where_it_stopped(user, hub, rele
 
 
 def tamper(hub: LocalHub, name: str, data: bytes | None) -> None:
-    """Somebody moves the tag to a commit with another file."""
+    """Moves the tag to a commit with a changed file."""
     repository = hub.data_set("lab/table")
     files = {**repository.head, name: data}
     repository.tags["data-1.0.0"] = repository.commit(
@@ -173,18 +173,22 @@ def tamper(hub: LocalHub, name: str, data: bytes | None) -> None:
     )
 
 
-_UNEXPECTED = "expected the files in its manifest, found that"
+_UNEXPECTED = "expected the files in its manifest, found"
 TAMPERED = {
     "other card": ("README.md", b"theirs", f"{_UNEXPECTED} README.md has other content; nothing was kept"),
     "a file more": ("notes.txt", b"x", f"{_UNEXPECTED} notes.txt is not in the manifest; nothing was kept"),
     "a file less": ("meta/stats.json", None, f"{_UNEXPECTED} meta/stats.json is missing; nothing was kept"),
-    "no manifest": ("meta/manifest.json", None, "what arrived is no release: meta/manifest.json: expected a manifest"),
-    "no release": ("meta/copolicy_release.json", None, "what arrived is no release: expected a release"),
+    "no manifest": (
+        "meta/manifest.json",
+        None,
+        "the download is not a release: meta/manifest.json: expected a manifest",
+    ),
+    "no release": ("meta/copolicy_release.json", None, "the download is not a release: expected a release"),
 }
 
 
 @pytest.mark.parametrize("what", TAMPERED)
-def test_what_is_not_as_released_is_not_kept(user, hub, tmp_path, what):
+def test_files_that_differ_from_the_release_are_deleted(user, hub, tmp_path, what):
     name, data, message = TAMPERED[what]
     tamper(hub, name, data)
     found = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out").error
@@ -192,10 +196,10 @@ def test_what_is_not_as_released_is_not_kept(user, hub, tmp_path, what):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, hub, released, tmp_path):
+def test_the_content_hash_detects_changed_data_with_a_matching_manifest(user, hub, released, tmp_path):
     other = Path(shutil.copytree(released, tmp_path / "other"))
     set_value(other, FRAMES, "action[0]", 0, 0.5)
-    (other / MANIFEST_FILE).write_text(Manifest.of_folder(other).to_text(), encoding="utf-8")
+    (other / MANIFEST_FILE).write_text(Manifest.from_folder(other).to_text(), encoding="utf-8")
     for name in (FRAMES, MANIFEST_FILE):
         tamper(hub, name, (other / name).read_bytes())
     found = user.run("pull", "lab/table@data-1.0.0", "--out", tmp_path / "out").error
@@ -206,24 +210,24 @@ def test_data_whose_manifest_was_made_to_fit_are_told_by_the_content_hash(user, 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("lab/nothing", "lab/nothing: no such data set on the Hub, or a private one that the token may not see"),
-        ("lab/table@data-9.0.0", "lab/table@data-9.0.0: asking the Hub: no such revision"),
+        ("lab/nothing", "lab/nothing: no such data set on the Hub, or a private one that the token cannot read"),
+        ("lab/table@data-9.0.0", "lab/table@data-9.0.0: querying the Hub: no such revision"),
     ],
 )
-def test_what_is_not_there_is_named(user, hub, tmp_path, name, message):
+def test_a_missing_data_set_or_revision_is_reported(user, hub, tmp_path, name, message):
     assert user.run("pull", name, "--out", tmp_path / "out").error == message
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_private_data_set_asks_for_a_token(user, hub, tmp_path):
+def test_a_private_data_set_requires_a_token(user, hub, tmp_path):
     hub.data_set("lab/table").private = True
     assert user.run("pull", "lab/table", "--out", tmp_path / "out", token=None).error == (
-        "lab/table: asking the Hub: the Hub does not accept the token, or a private data set needs one; "
+        "lab/table: querying the Hub: the Hub rejected the token, or a private data set needs one; "
         "set HF_TOKEN or run `hf auth login`"
     )
 
 
-def test_a_data_set_without_versions_is_no_release(user, hub, tmp_path):
+def test_a_data_set_without_version_tags_is_refused(user, hub, tmp_path):
     hub.data_set("lab/table").tags = {"v3.0": hub.data_set("lab/table").branches["main"]}
     assert user.run("pull", "lab/table", "--out", tmp_path / "out").error == (
         "lab/table: expected a tag data-x.y.z on the Hub, found ['v3.0']"

@@ -46,12 +46,12 @@ def test_a_device_with_one_axis_has_no_other():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"dead_zone": 1.0}, "calibration dead_zone: expected a share in [0, 1), found 1.0"),
+        ({"dead_zone": 1.0}, "calibration dead_zone: expected a proportion in [0, 1), found 1.0"),
         (
             {"low": (0.0, -1.0)},
             "calibration: expected low < centre < high, found ((0.0, -1.0), (0.0, 0.0), (1.0, 1.0))",
         ),
-        ({"axes": (-1, 0)}, "calibration axes: expected two numbers of axes, from 0, found (-1, 0)"),
+        ({"axes": (-1, 0)}, "calibration axes: expected two axis indices, from 0, found (-1, 0)"),
         ({"high": (1.0,)}, "calibration high: expected two finite numbers, found (1.0,)"),
     ],
 )
@@ -74,12 +74,12 @@ def test_a_calibration_finds_centre_and_range():
     assert run.stage == "turn"
     _turn(run, (0.085, -0.04), 0.8)
     assert run.stage == "done"
-    found = run.result()
-    assert found.centre == pytest.approx((0.085, -0.04))
-    assert found.low == pytest.approx((-0.715, -0.84), abs=0.01)
-    assert found.high == pytest.approx((0.885, 0.76), abs=0.01)
-    assert found.invert == (True, False)
-    assert found.dead_zone == 0.1
+    calibration = run.result()
+    assert calibration.centre == pytest.approx((0.085, -0.04))
+    assert calibration.low == pytest.approx((-0.715, -0.84), abs=0.01)
+    assert calibration.high == pytest.approx((0.885, 0.76), abs=0.01)
+    assert calibration.invert == (True, False)
+    assert calibration.dead_zone == 0.1
 
 
 def test_a_trembling_stick_gets_a_wider_dead_zone():
@@ -117,10 +117,10 @@ def test_calibrations_are_kept_by_the_kind_of_device(tmp_path):
     CalibrationStore(folder).put("guid-1", StickCalibration(dead_zone=0.2))
     store = CalibrationStore(folder)
     store.put("guid-2", StickCalibration(invert=(True, True)))
-    again = CalibrationStore(folder)
-    assert again.get("guid-1") == StickCalibration(dead_zone=0.2)
-    assert again.get("guid-2") == StickCalibration(invert=(True, True))
-    assert again.get("another") == StickCalibration()
+    reread = CalibrationStore(folder)
+    assert reread.get("guid-1") == StickCalibration(dead_zone=0.2)
+    assert reread.get("guid-2") == StickCalibration(invert=(True, True))
+    assert reread.get("another") == StickCalibration()
     assert [path.name for path in folder.iterdir()] == ["calibrations.json"]
 
 

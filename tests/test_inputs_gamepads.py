@@ -1,256 +1,120 @@
-"""What the buttons of a gamepad mean, by SDL's words, by the user's file, and by what is printed on them."""
-
-from typing import Literal
+"""Virtual joysticks take the whole way of real ones: SDL's events, instance ids, unplugging."""
 
 import pytest
-from virtual_joystick import PLAYSTATION, XBOX, VirtualJoystick
+from virtual_joystick import VirtualJoystick
 
-from copolicy.collect.inputs import (
-    CalibrationStore,
-    Command,
-    CommandReader,
-    GamepadMapping,
-    MappingRun,
-    MappingStore,
-    Pads,
-    Press,
-    StickCalibration,
-)
-from copolicy.collect.inputs.gamepads import UNKNOWN, Binding, Labels
-from copolicy.collect.inputs.steering import steerings
+from copolicy.collect.inputs import HALVES, Command, CommandReader, Gamepads, Press, keyboard_force
+from copolicy.collect.inputs.gamepads import InputSample
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-
-SONY, NINTENDO, OTHER = "050000004c050000cc09000000000000", "030000007e0500000920000000000000", "0" * 32
 
 
 @pytest.fixture
-def events(own_joysticks):
-    """SDL's queue, with joysticks of its own."""
-    return pygame.event
+def gamepads():
+    pygame.display.init()
+    pygame.display.set_mode((64, 64))
+    yield Gamepads()
+    pygame.joystick.quit()
+    pygame.display.quit()
 
 
-def mapping(text: str, name: str = "Pad", source: Literal["sdl", "user"] = "sdl") -> GamepadMapping:
-    return GamepadMapping.parse(name, dict(part.split(":") for part in text.split(",")), source)
+def _pump(gamepads, reader=None):
+    """Hands on all events; returns what came, what went, and the presses."""
+    came, went, presses = [], [], []
+    for event in pygame.event.get():
+        added, removed = gamepads.handle(event)
+        came += [added] if added else []
+        went += [removed] if removed else []
+        press = reader.read(event) if reader else None
+        presses += [press] if press else []
+    return came, went, presses
 
 
-@pytest.mark.parametrize("text", ["b0", "a11", "a1~", "+a2", "-a2", "h0.8"])
-def test_a_binding_is_written_as_it_is_read(text):
-    assert str(Binding.parse(text)) == text
+def test_two_of_a_kind_are_told_apart(gamepads):
+    first, second = VirtualJoystick("Twin"), VirtualJoystick("Twin")
+    came, _, _ = _pump(gamepads)
+    assert [gamepad.instance_id for gamepad in came] == [first.instance_id, second.instance_id]
+    assert came[0].guid == came[1].guid
+    first.move(0.5, -1.0)
+    second.move(-0.25, 0.0)
+    _pump(gamepads)
+    assert gamepads.get(first.instance_id).sample(7).axes[:2] == pytest.approx((0.5, -1.0), abs=1e-4)
+    assert gamepads.get(second.instance_id).sample(7).axes[:2] == pytest.approx((-0.25, 0.0), abs=1e-4)
+    assert gamepads.get(first.instance_id).sample(7).time_ns == 7
 
 
-@pytest.mark.parametrize("text", ["", "c0", "b", "b0.1", "h0", "h0.3", "b1~", "+b1", "a1.2"])
-def test_other_bindings_are_refused(text):
-    with pytest.raises(InvalidValueError, match="binding: expected a button b0"):
-        Binding.parse(text)
+def test_a_gamepad_that_comes_back_is_another(gamepads):
+    gamepad = VirtualJoystick()
+    _pump(gamepads)
+    number = gamepad.instance_id
+    gamepad.unplug()
+    _, went, _ = _pump(gamepads)
+    assert [gamepad.instance_id for gamepad in went] == [number]
+    assert gamepads.get(number) is None
+    assert len(gamepads) == 0
+    replugged = VirtualJoystick()
+    came, _, _ = _pump(gamepads)
+    assert came[0].instance_id == replugged.instance_id != number
 
 
-def test_sdls_mapping_decides_what_a_button_asks_for(events):
-    xbox = VirtualJoystick("Xbox pad", 0x045E, 0x028E, buttons=11)
-    sony = VirtualJoystick("Wireless Controller", 0x054C, 0x09CC, axes=6, buttons=13, mapping=PLAYSTATION)
-    strange = VirtualJoystick("Strange", product=3, buttons=13, mapping=None)
-    pads = Pads()
-    reader = CommandReader(pads)
-    events.get()
-
-    def pressed(pad):
-        found = []
-        for button in range(11):
-            pad.button(button, True)
-            found += [press for event in events.get() if (press := reader.read(event)) is not None]
-            pad.button(button, False)
-            events.get()
-        assert all(press.device == pad.instance_id for press in found)
-        return [press.command.name for press in found]
-
-    assert pressed(xbox)[:9] == "ACCEPT BACK REDO DISCARD NOTE UNDO PAUSE PAUSE OTHER".split()
-    assert pressed(sony)[:10] == "REDO ACCEPT BACK DISCARD NOTE UNDO OTHER OTHER PAUSE PAUSE".split()
-    # A trigger may have any number on a pad that nobody knows.
-    assert pressed(strange) == "ACCEPT BACK REDO DISCARD".split() + ["OTHER"] * 7
+def test_an_event_that_is_told_twice_opens_one_gamepad(gamepads):
+    VirtualJoystick()
+    (event,) = pygame.event.get(pygame.JOYDEVICEADDED)
+    assert gamepads.handle(event)[0] is not None
+    assert gamepads.handle(event) == (None, None)
+    assert len(gamepads) == 1
 
 
-def test_a_stick_that_is_mapped_upside_down_moves_the_cursor_the_right_way(events):
-    pad = VirtualJoystick("Odd", product=4, mapping="a:b0,leftx:a2,lefty:a3~")
-    pads = Pads()
-    reader = CommandReader(pads)
-    events.get()
-    pad.axis(3, -0.9)
-    presses = [press for event in events.get() if (press := reader.read(event)) is not None]
-    assert presses == [Press(Command.DOWN, pad.instance_id, moved=True)]
-    (held,) = pads
-    assert held.usual_calibration() == StickCalibration(axes=(2, 3), invert=(False, True))
-    assert held.force(held.sample(0), held.usual_calibration())[1] == pytest.approx(0.886, abs=1e-3)
+def test_buttons_hat_and_stick_become_commands(gamepads):
+    gamepad, reader = VirtualJoystick(), CommandReader(gamepads)
+    _pump(gamepads)
+    number = gamepad.instance_id
+    for button, command in ((0, Command.ACCEPT), (1, Command.BACK), (7, Command.PAUSE)):
+        gamepad.button(button, True)
+        assert _pump(gamepads, reader)[2] == [Press(command, number)]
+        gamepad.button(button, False)
+        assert _pump(gamepads, reader)[2] == []
+    gamepad.hat(0, 1)
+    assert _pump(gamepads, reader)[2] == [Press(Command.UP, number)]
+    gamepad.hat(0, 0)
+    assert _pump(gamepads, reader)[2] == []
 
 
-@pytest.mark.parametrize(
-    ("guid", "name", "source", "labels"),
-    [
-        (SONY, "anything", "sdl", "Cross Circle Square Triangle Options"),
-        (SONY, "anything", "user", "Cross Circle Square Triangle Options"),
-        (OTHER, "PS3 Controller", "sdl", "Cross Circle Square Triangle Start"),
-        (OTHER, "HORI pad for PS5", "sdl", "Cross Circle Square Triangle Options"),
-        (NINTENDO, "Pro Controller", "sdl", "A B X Y +"),
-        (OTHER, "Xbox 360 Controller", "sdl", "A B X Y Menu"),
-        (OTHER, "Logitech F310", "sdl", "A B X Y Menu"),
-        (OTHER, "USB gamepad", "user", "button0 button1 button2 button3 button7"),
-    ],
-)
-def test_labels_are_those_of_the_maker(guid, name, source, labels):
-    printed = Labels(mapping(XBOX, name, source), name, guid)
-    assert [printed[control].replace(" ", "") for control in ("a", "b", "x", "y", "start")] == labels.split()
-    assert printed["misc1"] == ""
-
-
-def test_buttons_of_an_unknown_pad_go_by_their_numbers():
-    printed = Labels(UNKNOWN, "Wireless Controller", SONY)
-    assert (printed["a"], printed["b"], printed["start"]) == ("button 0", "button 1", "")
-
-
-@pytest.mark.parametrize(
-    ("text", "axes", "hats", "labels"),
-    [
-        (XBOX, 6, 1, ["left stick", "d-pad"]),
-        (PLAYSTATION, 6, 1, ["left stick", "right stick", "d-pad"]),
-        ("a:b0,dpleft:-a0,dpright:+a0,dpup:-a1,dpdown:+a1", 2, 0, ["d-pad"]),
-        ("a:b0,dpleft:b4,dpright:b5,dpup:b6,dpdown:b7", 0, 0, ["d-pad"]),
-        ("a:b0,-leftx:b4,+leftx:b5,-lefty:b6,+lefty:b7", 0, 0, ["d-pad"]),
-        ("a:b0", 3, 0, ["axes 0 and 1", "axes 1 and 2"]),
-        ("a:b0", 0, 2, ["d-pad 1", "d-pad 2"]),
-        ("a:b0,leftx:a4,lefty:a5", 1, 0, []),
-    ],
-)
-def test_everything_that_can_steer_is_on_offer(text, axes, hats, labels):
-    assert [one.label for one in steerings(mapping(text), axes, hats)] == labels
-
-
-def test_a_d_pad_of_buttons_steers(events):
-    pad = VirtualJoystick("Retro", product=5, axes=0, hats=0, mapping="a:b0,dpleft:b4,dpright:b5,dpup:b6,dpdown:b7")
-    (held,) = Pads()
-    calibration = held.usual_calibration()
-    assert held.steering(calibration).digital
-    pad.button(5, True)
-    pad.button(6, True)
-    events.get()
-    assert held.force(held.sample(0), calibration) == pytest.approx((0.5**0.5, -(0.5**0.5)))
-
-
-def test_a_calibration_of_axes_that_a_pad_lacks_is_not_its_own(events, tmp_path):
-    pad = VirtualJoystick("Plain", product=6, axes=0, mapping=None)
-    store = CalibrationStore(tmp_path)
-    store.put(pad.guid, StickCalibration(axes=(2, 3), dead_zone=0.3))
-    (held,) = Pads()
-    assert store.of(held).axes == (0, 1)
-    store.put(pad.guid, StickCalibration(dead_zone=0.3))
-    assert store.of(held).dead_zone == 0.3
-
-
-# The user's file
-
-
-def test_a_line_of_the_communitys_list_is_for_every_pad_of_its_numbers(tmp_path):
-    path = tmp_path / "gamecontrollerdb.txt"
-    lines = [
-        "# remarks stay",
-        f"{SONY},PS4 Controller,{PLAYSTATION},platform:Linux,",
-        f"{NINTENDO},Pro Controller,{XBOX},platform:Windows,",
-    ]
-    path.write_text("\r\n".join(lines), encoding="utf-8-sig")
-    store = MappingStore(tmp_path)
-    with_name = f"{SONY[:4]}ab12{SONY[8:]}"
-    found = store.get(with_name)
-    assert found is not None
-    assert found.of_button(9) == "start"
-    assert store.get(NINTENDO) is None  # of another system
-    store.put(OTHER, mapping("a:b4"))
-    store.put(OTHER, mapping("a:b5,leftx:a1~", name="A, B"))
-    again = MappingStore(tmp_path).get(OTHER)
-    assert again is not None
-    assert (again.name, again.of_button(5), again.source) == ("A  B", "a", "user")
-    assert path.read_text(encoding="utf-8").splitlines() == [*lines, f"{OTHER},A  B,a:b5,leftx:a1~,"]
+def test_a_stick_commands_once_each_time_it_is_tipped(gamepads):
+    gamepad, reader = VirtualJoystick(), CommandReader(gamepads)
+    _pump(gamepads)
+    commands = []
+    for y in (0.5, 0.9, 0.7, 0.5, 0.9, 0.1, -0.9):
+        gamepad.axis(1, y)
+        commands.append([press.command for press in _pump(gamepads, reader)[2]])
+        assert all(press.moved for press in _pump(gamepads, reader)[2])
+    assert commands == [[], [Command.DOWN], [], [], [], [], [Command.UP]]
 
 
 @pytest.mark.parametrize(
-    ("line", "found"),
+    ("key", "command", "device"),
     [
-        ("garbage", "expected GUID,name,a:b0,b:b1,..., found 'garbage'"),
-        (f"{OTHER},Pad,a:b0,b", "expected entries such as a:b0, found 'b'"),
-        (f"{OTHER},Pad,a:c0", "found 'c0'"),
-        (f"{OTHER},Pad", "expected at least one control"),
-        (f"{OTHER},Pad,A B:b0", "expected a name of SDL's"),
+        (pygame.K_e, Command.ACCEPT, "wasd"),
+        (pygame.K_RETURN, Command.ACCEPT, "arrows"),
+        (pygame.K_UP, Command.UP, "arrows"),
+        (pygame.K_k, Command.KEEP, "keyboard"),
     ],
 )
-def test_a_damaged_line_is_named(tmp_path, line, found):
-    path = tmp_path / "gamecontrollerdb.txt"
-    path.write_text(f"\n{line}\n", encoding="utf-8")
-    with pytest.raises(FileFormatError) as error:
-        MappingStore(tmp_path)
-    assert str(error.value).startswith(f"{path}: expected a mapping as SDL writes it in line 2, found ")
-    assert found in str(error.value)
+def test_keys_belong_to_a_half_or_to_the_keyboard(key, command, device):
+    event = pygame.event.Event(pygame.KEYDOWN, key=key)
+    assert CommandReader().read(event) == Press(command, device)
 
 
-def test_the_users_mapping_goes_before_sdls(events, tmp_path):
-    pad = VirtualJoystick("Alpha pad", product=1)
-    store = MappingStore(tmp_path)
-    (held,) = Pads(store)
-    assert (held.mapping.source, held.mapping.of_button(7)) == ("sdl", "start")
-    store.put(pad.guid, mapping("a:b3,b:b4,leftx:a0,lefty:a1"))
-    (held,) = Pads(MappingStore(tmp_path))
-    assert (held.mapping.source, held.mapping.of_button(7), held.mapping.of_button(3)) == ("user", None, "a")
+def test_a_key_without_a_meaning_is_none():
+    assert CommandReader().read(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_F7)) is None
 
 
-# Setting a pad up
-
-
-def _button(index):
-    return pygame.event.Event(pygame.JOYBUTTONDOWN, button=index, instance_id=0)
-
-
-def _axis(index, value):
-    return pygame.event.Event(pygame.JOYAXISMOTION, axis=index, value=value, instance_id=0)
-
-
-def _hat(x, y):
-    return pygame.event.Event(pygame.JOYHATMOTION, hat=0, value=(x, y), instance_id=0)
-
-
-BUTTONS = [_button(index) for index in (3, 3, 1, 9, 3, 3, 3, 3)]  # back cannot be left out
+def test_the_halves_share_no_key():
+    keys = [key for half in HALVES.values() for key in (*half.keys, half.accept_key, half.next_key)]
+    assert len(set(keys)) == len(keys)
 
 
 @pytest.mark.parametrize(
-    ("axes", "hats", "steer", "text", "expected"),
-    [
-        (
-            [0.0, 0.0, -1.0],
-            1,
-            [_axis(2, -0.8), _axis(0, 0.3), _axis(0, 0.9), _axis(0, 0.7), _axis(0, -0.9), _axis(1, -0.8)],
-            "a:b3,b:b1,start:b9,leftx:a0,lefty:a1~",
-            ((0, 1), (False, True)),
-        ),
-        (
-            [0.0, 0.0],
-            1,
-            [_hat(0, 1), _hat(1, 1), _hat(1, 0), _hat(0, 0), _hat(-1, 0), _hat(0, -1)],
-            "a:b3,b:b1,start:b9,dpup:h0.1,dpright:h0.2,dpdown:h0.4,dpleft:h0.8",
-            ((2, 3), (False, False)),
-        ),
-        (
-            [],
-            0,
-            [_button(3), _button(11), _button(11), _button(12), _button(13), _button(14)],
-            "a:b3,b:b1,start:b9,dpright:b11,dpdown:b12,dpleft:b13,dpup:b14",
-            ((0, 1), (False, False)),
-        ),
-    ],
+    ("axes", "force"), [((1.0, 0.0), (1.0, 0.0)), ((0.0, 0.0), (0.0, 0.0)), ((1.0, -1.0), (0.5**0.5, -(0.5**0.5)))]
 )
-def test_a_mapping_is_made_by_doing_what_is_asked(axes, hats, steer, text, expected):
-    run = MappingRun("Strange", axes, hats)
-    for event in (*BUTTONS, *steer):
-        assert not run.done
-        assert run.prompt
-        run.handle(event)
-    assert (run.done, run.prompt, run.progress) == (True, "", 1.0)
-    made, *steering = run.result()
-    assert made == mapping(text, "Strange", "user")
-    assert tuple(steering) == expected
-    run.handle(_button(5))
-    assert run.result()[0] == made
+def test_diagonal_keys_push_no_harder(axes, force):
+    assert keyboard_force(InputSample(axes, (), 0)) == pytest.approx(force)

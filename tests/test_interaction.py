@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from copolicy.dataset.interaction import identical
+from copolicy.dataset.shared_device import identical_actions
 from copolicy.tasks.table.interaction import interaction_force
 
 
@@ -31,20 +31,20 @@ def test_actions_of_one_device_are_told_from_those_of_two_people():
     one = rng.uniform(-1, 1, (300, 2))
     two = np.hstack((one, rng.uniform(-1, 1, (300, 2))))
     both = np.hstack((one, one))
-    assert identical(both)
-    assert not identical(two)
+    assert identical_actions(both)
+    assert not identical_actions(two)
     # A copy that was read a moment later differs in a frame or two; a player who acted for a tenth of it does not.
     both[7, 2:] = 0.0
-    assert identical(both)
+    assert identical_actions(both)
     both[100:130, 2:] = 0.0
-    assert not identical(both)
+    assert not identical_actions(both)
 
 
 def test_nothing_and_rest_are_no_copies():
-    assert not identical(np.zeros((0, 4)))
-    assert not identical(np.zeros((90, 4)))
-    assert not identical(np.full((90, 4), 0.005))
+    assert not identical_actions(np.zeros((0, 4)))
+    assert not identical_actions(np.zeros((90, 4)))
+    assert not identical_actions(np.full((90, 4), 0.005))
     # They rested, but for one push that was the same.
     rest = np.zeros((90, 4))
     rest[40] = 0.5
-    assert identical(rest)
+    assert identical_actions(rest)

@@ -26,7 +26,7 @@ def learned(folder: Path) -> tuple[str, str]:
     """The task, and how it is known."""
     conditions = training_conditions(folder)
     assert isinstance(conditions, TrainingConditions)
-    assert conditions.physics == get_task(conditions.task).settings_type()
+    assert conditions.settings == get_task(conditions.task).settings_type()
     return conditions.task, conditions.notes[0].partition("; ")[2]
 
 

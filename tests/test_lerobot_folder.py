@@ -1,4 +1,4 @@
-"""What every command says of a folder that is no data set of this task."""
+"""Errors of every command for a folder that is not a data set of this task."""
 
 import json
 import shutil
@@ -50,7 +50,7 @@ def root(sound, tmp_path):
 
 @pytest.fixture
 def refused(sound, tmp_path, capsys):
-    """The one line that a command ends with."""
+    """The single line of a command's error."""
 
     def run(name, root) -> str:
         main, *arguments = COMMANDS[name]
@@ -64,7 +64,7 @@ def refused(sound, tmp_path, capsys):
 
 
 def older_set(root):
-    """As LeRobot 0.3 wrote it: no table of episodes, a line of JSON each."""
+    """A data set as LeRobot 0.3 wrote it, with JSON lines instead of a table of episodes."""
     root.joinpath("meta").mkdir(parents=True)
     info = {"codebase_version": "v2.1", "fps": 10, "features": {}, "total_episodes": 1, "total_chunks": 1}
     (root / "meta/info.json").write_text(json.dumps(info), encoding="utf-8")
@@ -73,7 +73,7 @@ def older_set(root):
 
 
 def empty_set(root):
-    """As LeRobot creates it before the first episode."""
+    """A data set as LeRobot creates it before the first episode."""
     root.joinpath("meta").mkdir(parents=True)
     info = {
         "codebase_version": "v3.0", "fps": 10, "features": {"action": {"dtype": "float32", "shape": [4]}},
@@ -107,19 +107,19 @@ def other_tasks_set(root, sound, state_shape=(40, 2)):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_format_v21_is_named_with_the_way_on(name, tmp_path, refused):
+def test_format_v21_is_refused_with_the_conversion_command(name, tmp_path, refused):
     line = refused(name, older_set(tmp_path / "older"))
     assert "v2.1" in line
     assert "convert_dataset_v21_to_v30" in line
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_set_without_episodes_is_named(name, tmp_path, refused):
-    assert "found one without any" in refused(name, empty_set(tmp_path / "empty"))
+def test_a_set_without_episodes_is_refused(name, tmp_path, refused):
+    assert "found an empty one" in refused(name, empty_set(tmp_path / "empty"))
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name not in ("exclude", "release", "merge")])
-def test_a_sound_set_of_another_task_is_named(name, tmp_path, sound, refused):
+def test_a_sound_set_of_another_task_is_refused(name, tmp_path, sound, refused):
     line = refused(name, other_tasks_set(tmp_path / "other", sound))
     assert "one of another task: observation.state of shape (40, 2) instead of (7,)" in line
 
@@ -129,8 +129,8 @@ def test_training_takes_a_sound_set_of_another_task(tmp_path, sound):
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "check"])
-def test_a_folder_of_recordings_is_named_with_the_command_for_it(name, recordings, refused):
-    assert "found a folder of recordings (copolicy-convert mcap takes it)" in refused(name, recordings)
+def test_a_folder_of_recordings_is_refused_with_the_command_for_it(name, recordings, refused):
+    assert "found a folder of recordings (copolicy-convert mcap reads it)" in refused(name, recordings)
 
 
 @pytest.mark.parametrize(
@@ -144,14 +144,14 @@ def test_a_folder_of_recordings_is_named_with_the_command_for_it(name, recording
     ],
 )
 @pytest.mark.parametrize("name", ["check", "stats", "card", "zarr"])
-def test_entries_of_another_type_are_named_by_their_place(name, root, entry, value, found, refused):
+def test_entries_of_another_type_are_refused_with_their_path(name, root, entry, value, found, refused):
     path = root / "meta/info.json"
     path.write_text(json.dumps({**json.loads(path.read_bytes()), entry: value}), encoding="utf-8")
     assert found in refused(name, root)
 
 
 @pytest.mark.parametrize("name", ["check", "stats", "card", "zarr", "exclude"])
-def test_an_empty_length_is_named(name, root, refused):
+def test_a_null_length_is_refused(name, root, refused):
     set_columns(root, length=lambda values: [None, *values[1:]])
     assert "length" in refused(name, root)
 
@@ -172,7 +172,7 @@ def test_columns_of_texts_may_be_dictionaries_and_numbers_of_another_size(root):
     assert all(isinstance(row["length"], int) and isinstance(row["map_id"], str) for row in rows)
 
 
-def test_nothing_is_unknown(root):
+def test_nulls_become_unknown_values(root):
     set_columns(root, achieved_hz=[None, None], pair_id=[None, None])
     (row, _) = LeRobotFolder.open(root).rows(("achieved_hz", "pair_id"))
     assert np.isnan(row["achieved_hz"])
@@ -185,7 +185,7 @@ def test_each_episode_once(root):
         LeRobotFolder.open(root)
 
 
-def test_frames_come_episode_by_episode(sound):
+def test_frames_are_read_by_episode(sound):
     folder = LeRobotFolder.open(sound)
     shapes = {"action": (4,), "index": (1,)}
     read = list(folder.frames(shapes))
@@ -205,12 +205,15 @@ def _change_frames(root, change):
     ("change", "found"),
     [
         (lambda table: table.slice(1), r"expected episode 0 with \d+ frames as in meta/episodes, found episode 0 with"),
-        (lambda table: pa.concat_tables([table, table.slice(0, 1)]), "expected its end as in meta/episodes, found"),
+        (
+            lambda table: pa.concat_tables([table, table.slice(0, 1)]),
+            "expected no further episode as in meta/episodes, found",
+        ),
         (lambda table: table.filter(pc.field("episode_index") == 0), "expected the frames of episode 1"),
         (lambda table: table.drop_columns("next.reward"), "none named next.reward"),
     ],
 )
-def test_frames_that_the_episodes_do_not_tell_of_are_refused(root, change, found):
+def test_frames_that_disagree_with_the_episodes_are_refused(root, change, found):
     _change_frames(root, change)
     with pytest.raises(FileFormatError, match=found):
         list(LeRobotFolder.open(root).frames({"next.reward": (1,)}))
@@ -244,7 +247,7 @@ def test_a_split_is_a_range_of_episodes(text, span):
     assert split_range(text) == span
 
 
-def test_splits_of_another_form_are_named(root):
+def test_invalid_splits_are_refused(root):
     path = root / "meta" / "info.json"
     info = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps({**info, "splits": {"train": "0:1", "test": "1-2"}}), encoding="utf-8")

@@ -11,10 +11,10 @@ from straight_carry import record
 
 from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import Rollout
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.tasks.table.map_config import MapConfig
@@ -67,7 +67,7 @@ def test_a_chunk_is_that_of_lerobots_own_batch(runs, name, frames, longest):
     expected = policy._postprocess(policy.policy.predict_action_chunk(policy._preprocess(batch)))
     np.testing.assert_array_equal(chunk, expected.detach().numpy())
     policy.reset(5)
-    policy.wanted = 3
+    policy.n_predicted_actions = 3
     np.testing.assert_array_equal(policy.predict_action_chunk(seen), chunk[:, :3])
 
 
@@ -87,10 +87,10 @@ def test_it_is_judged_by_co_planning(runs, name, tmp_path, capsys):
 def test_it_plays_at_a_seat(runs, name, seat, tmp_path):
     # The other one pulls hard towards a goal nearby: the episode is over in seconds.
     puller = record(tmp_path / "puller.mcap", config=MapConfig((620.0, 300.0, 3.0), (820.0, 300.0)), push=(1, 0, 1, 0))
-    pilots = (PilotSpec("policy", str(runs[name])), PilotSpec("replay", str(puller)))
-    with prepared(settings(tmp_path, pilots=pilots, episodes=1, headless=True, swap_seats=False)) as application:
+    players = (PlayerSpec("policy", str(runs[name])), PlayerSpec("replay", str(puller)))
+    with prepared(settings(tmp_path, players=players, episodes=1, headless=True, swap_seats=False)) as application:
         if seat:
-            application.game.reseat()
+            application.game.exchange_seats()
         application.run()
     (path,) = (tmp_path / "recordings").rglob("*.mcap")
     episode = read_episode(path)
@@ -105,7 +105,7 @@ def test_what_select_action_alone_can_do_is_asked_frame_by_frame(random_table, t
     assert policy.keeps_history
     agent = PolicyAgent(policy, task)
     maps = task.scenario_sets["unseen"][:2]
-    rollout = Rollout(task, maps, (agent, agent.other_half()))
+    rollout = Rollout(task, maps, (agent, agent.human_half()))
     seen = []
     for _ in range(9):
         seen.append([world.observation for world in rollout.worlds])

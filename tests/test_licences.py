@@ -1,4 +1,4 @@
-"""Licences by the Hub's identifiers, checked where they are first told."""
+"""Licences by the Hub's identifiers, checked where they are entered."""
 
 import pytest
 
@@ -24,14 +24,14 @@ UNKNOWN = ["free for all", "proprietary", "cc-by-5.0", "CC-BY", "Public Domain",
 
 
 @pytest.mark.parametrize(("text", "identifier"), SPELLINGS.items())
-def test_a_common_spelling_is_answered_with_the_identifier(text, identifier):
+def test_a_common_spelling_suggests_the_identifier(text, identifier):
     assert licence_identifier(text) == identifier
     with pytest.raises(InvalidValueError) as error:
         checked_licence(text)
     assert str(error.value) == f"--license: expected {identifier}, as the Hub spells it, found {text!r}"
 
 
-def test_every_name_of_the_list_means_its_identifier():
+def test_every_full_name_gives_its_identifier():
     for identifier, name in LICENCES.items():
         assert checked_licence(identifier) == identifier
         assert {licence_identifier(text) for text in (name, identifier.upper(), name.lower())} == {identifier}
@@ -44,7 +44,7 @@ def test_a_licence_that_is_not_on_the_list_is_refused(text):
         checked_licence(text)
 
 
-def test_no_licence_is_stated():
+def test_an_empty_licence_is_accepted():
     assert checked_licence("") == ""
 
 
@@ -59,7 +59,7 @@ def test_no_licence_is_stated():
         (cards, ["model", "{here}"]),
     ],
 )
-def test_every_command_refuses_it_before_anything_is_made(command, arguments, text, tmp_path, capsys):
+def test_every_command_refuses_an_unknown_licence_before_writing(command, arguments, text, tmp_path, capsys):
     places = {"here": tmp_path / "nothing here", "out": tmp_path / "out", "plan": tmp_path / "plan.json"}
     assert command([*(part.format(**places) for part in arguments), "--license", text]) == 2
     error = capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""A mistyped path is not asked of the Hub."""
+"""A mistyped path is not looked up on the Hub."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.local_path import named_on_hub, require_hub_name
+from copolicy.dataset.files.local_path import repo_id_from_url, require_repo_id
 from copolicy.train.cli import main as train
 
 
@@ -15,7 +15,7 @@ def here(tmp_path, monkeypatch) -> Path:
     (tmp_path / "outputs" / "dataset").mkdir(parents=True)
     (tmp_path / "données").mkdir()
     monkeypatch.chdir(tmp_path)
-    # Whoever asks the Hub all the same does not get far.
+    # A request to the Hub fails.
     monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")
     return tmp_path
 
@@ -25,13 +25,13 @@ def here(tmp_path, monkeypatch) -> Path:
     [
         (
             "outputs/datset",
-            "did you mean outputs/dataset? (as hf://datasets/outputs/datset it is looked up on the Hub)",
+            "did you mean outputs/dataset? (write hf://datasets/outputs/datset for the Hub)",
         ),
         (
             "output/dataset",
-            "did you mean outputs/dataset? (as hf://datasets/output/dataset it is looked up on the Hub)",
+            "did you mean outputs/dataset? (write hf://datasets/output/dataset for the Hub)",
         ),
-        ("outputs/other", "no such file or folder (as hf://datasets/outputs/other it is looked up on the Hub)"),
+        ("outputs/other", "no such file or folder (write hf://datasets/outputs/other for the Hub)"),
         ("./outputs/datset", "did you mean outputs/dataset?"),
         ("outputs/datset/", "did you mean outputs/dataset?"),
         ("outputs/dataset/meta", "no such file or folder"),
@@ -40,11 +40,11 @@ def here(tmp_path, monkeypatch) -> Path:
         ("nothing", "no such file or folder"),
         ("../nothing/here", "no such file or folder"),
         ("~/nothing", "no such file or folder"),
-        ("lab/a..b", "no such file or folder, and no name that the Hub takes (no '--' and no '..')"),
-        ("lab/täble", "and no name that the Hub takes (letters a to z, digits, '-', '_' and '.' only)"),
+        ("lab/a..b", "no such file or folder, and not a valid name on the Hub (no '--' and no '..')"),
+        ("lab/täble", "and not a valid name on the Hub (letters a to z, digits, '-', '_' and '.' only)"),
     ],
 )
-def test_a_path_that_does_not_exist_is_said_so(here, text, found, capsys):
+def test_a_missing_path_is_reported_with_a_suggestion(here, text, found, capsys):
     for flags in ([text], ["outputs/dataset", "--against", text]):
         if "--against" in flags:
             (here / "outputs" / "dataset").mkdir(exist_ok=True)
@@ -55,14 +55,14 @@ def test_a_path_that_does_not_exist_is_said_so(here, text, found, capsys):
         assert error.count("\n") == 1
 
 
-def test_an_absolute_path_is_compared_too(here, capsys):
+def test_a_suggestion_for_an_absolute_path(here, capsys):
     assert main(["check", str(here / "outputs" / "datset")]) == 2
     assert capsys.readouterr().err.endswith(f"did you mean {here / 'outputs' / 'dataset'}?\n")
 
 
-def test_a_name_of_the_hub_stays_one(here):
+def test_a_hub_name_is_returned(here):
     for text in ("lab/table", "lerobot/pusht", "a/b"):
-        assert require_hub_name(text, "something") == text
+        assert require_repo_id(text, "something") == text
 
 
 @pytest.mark.parametrize(
@@ -72,14 +72,14 @@ def test_a_name_of_the_hub_stays_one(here):
         "https://huggingface.co/datasets/outputs/datset/", "hf://outputs/datset",
     ],
 )  # fmt: skip
-def test_a_name_may_say_that_it_is_on_the_hub(here, text):
-    assert named_on_hub(text) == "outputs/datset"
-    assert require_hub_name(text, "something") == "outputs/datset"
+def test_a_hub_url_is_parsed(here, text):
+    assert repo_id_from_url(text) == "outputs/datset"
+    assert require_repo_id(text, "something") == "outputs/datset"
 
 
-def test_a_name_on_the_hub_must_be_one_that_it_takes(here):
-    with pytest.raises(FileFormatError, match=r"something as the Hub takes it \(no '--' and no '\.\.'\)"):
-        require_hub_name("hf://datasets/lab/a..b", "something")
+def test_an_invalid_name_in_a_hub_url_is_refused(here):
+    with pytest.raises(FileFormatError, match=r"something that the Hub accepts \(no '--' and no '\.\.'\)"):
+        require_repo_id("hf://datasets/lab/a..b", "something")
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_a_name_on_the_hub_must_be_one_that_it_takes(here):
         ("config_path", "outputs/train_config.json", "found none"),
     ],
 )
-def test_training_does_not_ask_the_hub_for_a_mistyped_path(here, flag, text, found, capsys):
+def test_training_does_not_query_the_hub_for_a_mistyped_path(here, flag, text, found, capsys):
     assert train([f"--{flag}={text}"]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"copolicy-train: {text}: expected a file or folder for --{flag}, ")

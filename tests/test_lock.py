@@ -1,4 +1,4 @@
-"""The lock of a file, seen from this process and from another."""
+"""The lock of a file, tested from this process and from another."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ time.sleep(60)
 """
 
 
-def test_a_lock_ends_with_its_process_however_that_ends(tmp_path):
+def test_a_lock_is_released_when_its_process_ends(tmp_path):
     path = tmp_path / "lock"
     with subprocess.Popen([sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -38,7 +38,7 @@ def test_a_locked_file_keeps_its_bytes(tmp_path):
     assert path.read_bytes() == b"recorded"
 
 
-def test_a_folder_in_use_is_refused_at_once_with_the_words_of_its_tool(tmp_path):
+def test_a_locked_folder_is_refused_with_the_given_message(tmp_path):
     place = tmp_path / "new" / "lock"
     with FolderLock(place, "in use"), pytest.raises(RunError, match=r"^in use$"):
         FolderLock(place, "in use")

@@ -8,8 +8,8 @@ from map_file import write_lab
 
 from copolicy.collect.cli import main
 from copolicy.collect.play.settings import PlaySettings
-from copolicy.collect.session.balance import Balance, Counts
-from copolicy.dataset.recording.log import read_episode
+from copolicy.collect.session.schedule import BalancedSchedule, EpisodeCounts
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.world import TableWorld
 
@@ -69,7 +69,7 @@ def test_make_writes_a_file_that_passes(tmp_path, capsys):
     assert output(capsys, "maps", "check", path)[0] == 0
     for bound, line in (
         ("obstacle=2", "unknown bound 'obstacle'; available: goal_x, goal_y, obstacle_size,"),
-        ("obstacles=3:2", "--bounds: expected a lowest value that is not above the highest, found 'obstacles=3:2'"),
+        ("obstacles=3:2", "--bounds: expected LOW not above HIGH, both within 1e6 of 0, found 'obstacles=3:2'"),
         ("obstacles=two", "--bounds: expected NAME=LOW:HIGH or NAME=VALUE, in numbers, found 'obstacles=two'"),
     ):
         status, _, err = output(
@@ -88,12 +88,12 @@ def test_schema_is_printed(capsys):
 
 def test_weights_steer_the_schedule_of_play(tmp_path):
     settings = PlaySettings("P01", tmp_path, maps=str(write_lab(tmp_path)))
-    assert settings.fixed()["maps"] == "lab-doors"
-    assert settings.fixed()["maps_digest"] == settings.scenarios.digest
-    balance, counts = Balance(settings.map_configs(), 20, 0, "P01", swap=False), Counts()
+    assert settings.session_settings()["maps"] == "lab-doors"
+    assert settings.session_settings()["maps_digest"] == settings.scenario_set.digest
+    balance, counts = BalancedSchedule(settings.scenarios, 20, 0, "P01", swap=False), EpisodeCounts()
     for _ in range(20):
         config, seating = balance.next(counts)
-        for counter in (counts.kept, counts.tried, counts.kept_here):
+        for counter in (counts.kept, counts.attempted, counts.kept_in_session):
             counter[get_task().identify(config)[0], seating] += 1
     assert counts.kept == {
         ("lab-doors-wide", 0): 8, ("lab-doors-turned-0deg", 0): 4, ("lab-doors-turned-90deg", 0): 4,
@@ -142,15 +142,15 @@ def test_recordings_say_which_file_their_map_is_of(walked):
 
 
 def test_a_data_set_of_a_file_is_checked_and_described(walked, capsys):
+    from copolicy.cards.episode_frames import read_frames
     from copolicy.cards.facts import DatasetFacts
-    from copolicy.cards.frames import read_frames
     from copolicy.dataset.checks.checking import check_dataset
 
     findings = check_dataset(walked / "set").findings
     assert {finding.rule for finding in findings if finding.severity == "error"} <= {"license"}
     assert not [finding for finding in findings if finding.rule.startswith(("map_", "obstacle_size"))]
     facts = DatasetFacts.read(walked / "set")
-    sizes = {row["map_id"]: frames.map_config.sizes for row, frames in zip(facts.episodes, read_frames(facts))}  # noqa: B905
+    sizes = {row["map_id"]: frames.scenario.sizes for row, frames in zip(facts.episodes, read_frames(facts))}  # noqa: B905
     assert sizes["lab-doors-wide"] == (120, 60)
 
 
@@ -205,7 +205,7 @@ def test_the_environment_starts_on_the_maps_of_a_split(tmp_path):
 
     path = write_lab(tmp_path)
     assert TableCarryingEnvConfig(map_set=f"{path}#train").map_set == f"{path}#train"
-    assert len(TableCarryingEnv(map_set=f"{path}#train").maps) == 3
-    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).maps) == 8
+    assert len(TableCarryingEnv(map_set=f"{path}#train").scenarios) == 3
+    assert len(TableCarryingEnv(map_set=f"{path}#train", orientations=True).scenarios) == 8
     with pytest.raises(CopolicyError, match="unknown split"):
         TableCarryingEnvConfig(map_set=f"{path}#valid")

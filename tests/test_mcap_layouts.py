@@ -19,15 +19,15 @@ from copolicy.collect.cli import main as collect
 from copolicy.collect.recording.recover import recover, recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.collect.replay.track import read_track
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main as dataset
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, ForeignRecordingError
-from copolicy.dataset.recording.log import read_episode, read_metadata, read_recording
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, chunk_records
+from copolicy.dataset.recording.reader import read_episode, read_metadata, read_recording
 from copolicy.dataset.transfer.raw_recordings import find_raw_recordings
 from copolicy.evaluate.human_study.recordings import study_rows
 from copolicy.tasks.table.maps import MAP_SETS
@@ -79,9 +79,9 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
     assert said(episode.notes)
 
     assert {key: value for key, value in read_metadata(file).items() if key != "calibration"} == read_metadata(path)
-    assert [(one.map_id, one.counts) for one in recordings(folder)] == [("training-06", True)]
+    assert [(one.map_id, one.counts) for one in iter_recordings(folder)] == [("training-06", True)]
     assert np.array_equal(ReplayAgent(file)._actions[0], truth.episode.actions)
-    assert read_track(file).moments == read_track(path).moments
+    assert read_track(file).events == read_track(path).events
 
     status, summary, lines = run(collect, "replay", file, "--verify", "--out", tmp_path / "sheet.png")
     assert (status, summary["verify"]["reproduced"], lines) == (0, True, [])
@@ -159,9 +159,9 @@ def test_another_projects_file_is_named_as_such(source, tmp_path, options, caplo
     assert status == 1
     assert [(one["rule"], one["message"]) for one in document["findings"]] == [("foreign", expected)]
     status, _, lines = run(convert, "mcap", folder, "--out", tmp_path / "set", "--repo-id", "lab/x")
-    skip = "nothing was written (--skip-damaged leaves such files out)"
+    skip = "nothing was written (--skip-damaged skips such files)"
     assert (status, lines) == (1, [f"copolicy-convert: {line}; {skip}"])
-    assert list(recordings(folder)) == []
+    assert list(iter_recordings(folder)) == []
     assert "not counted: " in caplog.text
     assert "expected a recording of this task, found no metadata entry" in caplog.text
 
@@ -192,9 +192,9 @@ def test_a_later_schema_version_is_named_as_such(source, tmp_path, caplog):
         records.append(record)
     variants.write(records, tmp_path / "later.mcap", enable_data_crcs=False)
     assert refusal(tmp_path / "later.mcap", ForeignRecordingError) == (
-        "expected a recording of schema version 1, the latest known here, found schema version '2' (update copolicy)"
+        "expected a recording of schema version 1, the latest supported, found schema version '2' (update copolicy)"
     )
-    assert list(recordings(tmp_path)) == []
+    assert list(iter_recordings(tmp_path)) == []
     assert "found schema version '2'" in caplog.text
 
 
@@ -267,7 +267,7 @@ def test_a_chunk_that_inflates_beyond_its_head_takes_no_memory(source):
         told = variants.chunk(body, compression, lambda _, stored=stored: stored, crc=False, size=1 << 20)
         tracemalloc.start()
         try:
-            with pytest.raises(ValueError, match="another size than its head says"):
+            with pytest.raises(ValueError, match="whose size contradicts its header"):
                 chunk_records(told)
             assert tracemalloc.get_traced_memory()[1] < 32 << 20
         finally:

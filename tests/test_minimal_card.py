@@ -1,4 +1,4 @@
-"""A converted folder loads by name without a card, a card takes the place of what makes it so, and unknown is null."""
+"""A converted folder loads by name with its minimal card, a card replaces it, and unknown numbers are null."""
 
 import json
 import shutil
@@ -50,7 +50,7 @@ def _loads(root: Path, cache: Path, episodes: int) -> None:
 
 
 @pytest.mark.parametrize("how", ["converted", "sharded", "appended", "merged", "card"])
-def test_both_tables_load_by_name(how, made, tmp_path, monkeypatch):
+def test_both_configurations_load_by_name(how, made, tmp_path, monkeypatch):
     monkeypatch.setattr("datasets.config.HF_DATASETS_OFFLINE", True)
     root, episodes, licence = tmp_path / "set", 2, "cc0-1.0"
     if how == "converted":
@@ -74,7 +74,7 @@ def test_both_tables_load_by_name(how, made, tmp_path, monkeypatch):
     _loads(root, tmp_path / "cache", episodes)
 
 
-def test_what_somebody_wrote_stays(made, tmp_path, capsys):
+def test_a_written_readme_is_kept(made, tmp_path, capsys):
     root = Path(shutil.copytree(made / "one", tmp_path / "set"))
     (root / "README.md").write_text("written by hand", encoding="utf-8")
     assert cards(["dataset", str(root), "--no-figures"]) == 2
@@ -83,23 +83,23 @@ def test_what_somebody_wrote_stays(made, tmp_path, capsys):
     assert (root / "README.md").read_text(encoding="utf-8") == "written by hand"
 
 
-def test_the_minimal_card_is_none_to_publish_with(made, tmp_path):
+def test_a_minimal_card_cannot_be_published(made, tmp_path):
     root = Path(shutil.copytree(made / "one", tmp_path / "set"))
     assert dataset(["release", str(root), "--bump", "minor", "--notes", "first"]) == 0
-    with pytest.raises(FileFormatError, match="found the minimal one of copolicy-convert, which describes nothing"):
+    with pytest.raises(FileFormatError, match="found the minimal one of copolicy-convert"):
         verify_release(root)
     assert cards(["dataset", str(root), "--no-figures"]) == 0
     verify_release(root)
 
 
-def test_a_number_that_is_not_known_is_null(made):
+def test_an_unknown_number_is_null(made):
     table = pq.ParquetFile(made / "one" / EPISODES).read()
     assert table.column("achieved_hz").to_pylist() == [None, None]
     assert table.schema.field("achieved_hz").type == pa.float64()
     assert table.column("replay_drift_px").null_count == 0
 
 
-def test_nan_of_an_earlier_version_is_the_same_content(made, tmp_path):
+def test_nan_of_an_earlier_version_gives_the_same_content_hash(made, tmp_path):
     earlier = Path(shutil.copytree(made / "one", tmp_path / "earlier"))
     table = pq.ParquetFile(earlier / EPISODES).read()
     place = table.column_names.index("achieved_hz")

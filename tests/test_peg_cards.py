@@ -1,4 +1,4 @@
-"""Cards and the report on data and policies of a second task: its names and units, and no word of the first one."""
+"""Cards and the report on data and policies of a second task: its names and units, and no word of the table task."""
 
 import hashlib
 import json
@@ -37,7 +37,7 @@ def test_a_card_speaks_of_its_own_task(peg_set, capsys):
         "| `action` | float32 | 2 | robot_push, human_push |",
         "| right | 3 | 4 | 4 of 4 (100.0 %) |",
         "Left out: the task 'peg' has no strategy labels.",
-        "taken from a recording at 20 Hz",
+        "from a recording at 20 Hz",
     ):
         assert text in card
     assert [path.name for path in (peg_set / "figures").iterdir()] == ["trajectories.png"]
@@ -65,13 +65,13 @@ def test_a_task_without_an_outline_has_no_figures(peg, peg_set, monkeypatch, cap
     assert payload["left_out"]["outline"] == "Left out: the task 'peg' has no outline."
 
 
-def test_the_page_draws_the_outline_and_leaves_out_what_is_lacking(peg_set, visit, tmp_path, capsys):
+def test_the_page_draws_the_outline_and_leaves_out_missing_parts(peg_set, visit, tmp_path, capsys):
     out = tmp_path / "page.html"
     assert main(["report", str(peg_set), "--out", str(out)]) == 0
     page = visit.open(out)
     text = page.locator("body").inner_text()
-    words = {match[0].lower() for match in OF_THE_TABLE.findall(text.replace("Heat maps", ""))}
-    assert words <= {"obstacles", "obstacle"}  # panels are by sets of obstacles, whatever the task
+    table_words = {match[0].lower() for match in OF_THE_TABLE.findall(text.replace("Heat maps", ""))}
+    assert table_words <= {"obstacles", "obstacle"}  # panels are by sets of obstacles, whatever the task
     for part in ("strategy labels", "interaction measure", "tracked point"):
         assert f"Left out: the task 'peg' has no {part}." in text
     assert [head.inner_text() for head in page.locator("#pair-table th[scope=col]").all()] == [
@@ -131,7 +131,7 @@ def test_a_model_card_speaks_of_the_task_of_its_policy(peg, tmp_path, capsys):
     assert main(["model", str(folder), "--eval", str(tmp_path / "eval.json")]) == 0
     card = (folder / "README.md").read_text(encoding="utf-8")
     assert OF_THE_TABLE.findall(re.sub(r"```.*?```", "", card, flags=re.DOTALL)) == []  # but for flags of commands
-    assert "acts together with a partner, in simulation: it plans the next actions of both players" in card
+    assert "acts together with a partner, in simulation: it predicts the next actions of both players" in card
     assert "Left out: the task 'peg' has no interaction measure." in card
     assert "pushing a peg, coplan (simulation)" in card
     assert "| study | scenarios | sampler |" in card

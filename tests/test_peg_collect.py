@@ -7,27 +7,27 @@ import numpy as np
 import pytest
 from play_session import SimulatedClock, settings
 
-from copolicy.collect.agents import HeldAgent, PersonAgent, PolicyAgent, ReplayAgent
+from copolicy.collect.agents import ConstantAgent, PersonAgent, PolicyAgent, ReplayAgent
 from copolicy.collect.cli import main
 from copolicy.collect.episodes import run_episodes
 from copolicy.collect.inputs import HALVES, InputSample
 from copolicy.collect.play.finished import Finished
 from copolicy.collect.play.lobby import Lobby
-from copolicy.collect.play.result import Result
+from copolicy.collect.play.result import ResultPhase
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec, PlaySettings
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
 from copolicy.collect.recording.recover import recover
 from copolicy.collect.replay.sheet import draw_sheet
-from copolicy.collect.replay.track import read_track, sampled
+from copolicy.collect.replay.track import frame_positions, read_track
 from copolicy.collect.replay.verify import verify
 from copolicy.collect.rollout import Rollout
 from copolicy.collect.screen import Canvas, palette
 from copolicy.collect.screen.outline_view import OutlineView, scene_view
 from copolicy.collect.sdl import pygame
-from copolicy.collect.session import Balance, recordings
+from copolicy.collect.session import BalancedSchedule, iter_recordings
 from copolicy.collect.ticker import LoopStatistics, Tick, Ticker
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task_spec import Vector
 
 SIMULATE = ("simulate", "--task", "peg", "--maps", "right", "--seed", "1", "--workers", "1")
@@ -83,7 +83,7 @@ def test_a_task_without_simulated_players_says_so(peg, tmp_path, capsys, monkeyp
     assert main([*SIMULATE, "--episodes", "1", "--out", str(tmp_path / "out")]) == 2
     assert "left out: the task 'peg' has no agents" in capsys.readouterr().err
     with pytest.raises(CopolicyError, match="has no agents"):
-        PilotSpec.parse("scripted", "peg")
+        PlayerSpec.parse("scripted", "peg")
 
 
 def test_the_actions_of_a_recording_are_simulated_again(simulated, capsys):
@@ -125,7 +125,7 @@ def test_films_and_sheets_are_made_from_the_outline(simulated, tmp_path, capsys)
     track = read_track(simulated[0])
     assert track.seconds == track.steps / 20
     # A film of 12 pictures a second of an episode at 20 steps a second, and a second of its end.
-    assert told["gif"]["pictures"] == len(sampled(track, 12, 1.0)) + 12
+    assert told["gif"]["pictures"] == len(frame_positions(track, 12, 1.0)) + 12
     assert told["gif"]["seconds"] == pytest.approx(track.seconds + 1, abs=0.2)
     assert all(path.stat().st_size > 1000 for path in out.values())
 
@@ -216,11 +216,11 @@ def test_a_broken_recording_is_recovered(simulated):
     assert main(["recover", str(path.parent)]) == 0
 
 
-PAIR = (PilotSpec("scripted", "even"), PilotSpec("scripted", "lazy"))
+PAIR = (PlayerSpec("scripted", "even"), PlayerSpec("scripted", "lazy"))
 
 
 def _session(tmp_path, **changes) -> PlaySettings:
-    return settings(tmp_path, **{"pilots": PAIR, "task": "peg", "maps": "right", "headless": True, **changes})
+    return settings(tmp_path, **{"players": PAIR, "task": "peg", "maps": "right", "headless": True, **changes})
 
 
 def test_two_simulated_players_play_a_session(peg, tmp_path):
@@ -238,7 +238,7 @@ def test_two_simulated_players_play_a_session(peg, tmp_path):
     assert json.loads(header.read_text(encoding="utf-8"))["settings"] == {
         "task": "peg", "maps": "right", "orientations": False, "seed": 0,
     }  # fmt: skip
-    assert [(one.task, one.counts) for one in recordings(tmp_path)] == [("peg", True)] * 3
+    assert [(one.task, one.counts) for one in iter_recordings(tmp_path)] == [("peg", True)] * 3
 
 
 def test_the_command_plays_another_task(peg, tmp_path, capsys):
@@ -277,15 +277,15 @@ def test_recordings_of_another_task_do_not_count(peg, tmp_path):
     with prepared(_session(tmp_path, episodes=1), clock=SimulatedClock()) as application:
         assert application.game.folder.counts.kept.total() == 0
         application.run()
-    assert sorted(one.task for one in recordings(out)) == ["peg", "table"]
+    assert sorted(one.task for one in iter_recordings(out)) == ["peg", "table"]
 
 
 def test_the_screen_speaks_of_the_task(peg, tmp_path):
-    pilots = (PilotSpec("keyboard"), PilotSpec("scripted", "even"))
-    with prepared(_session(tmp_path, pilots=pilots, headless=False), clock=SimulatedClock()) as application:
+    players = (PlayerSpec("keyboard"), PlayerSpec("scripted", "even"))
+    with prepared(_session(tmp_path, players=players, headless=False), clock=SimulatedClock()) as application:
         game = application.game
         assert pygame.display.get_caption()[0] == "copolicy: pushing a peg"
-        game.roster.give(next(iter(HALVES.values())))
+        game.roster.assign(next(iter(HALVES.values())))
         canvas = Canvas(pygame.Surface((600, 380), depth=32))
         written: list[str] = []
         canvas.text = lambda text, *rest, **named: written.append(text)
@@ -297,7 +297,7 @@ def test_the_screen_speaks_of_the_task(peg, tmp_path):
         while not trial.outcome.done:
             trial.step(ticker.tick())
         assert (trial.interaction, trial.seconds) == (None, trial.steps / 20)
-        result = Result(game)
+        result = ResultPhase(game)
         result.draw(canvas, 1.0)
         assert {"Mark", "left out: the task 'peg' has no interaction measure"} <= set(written)
         game.close_trial("keep")
@@ -324,19 +324,19 @@ def test_one_number_is_the_stick_from_side_to_side(low, high, pushes):
     [Vector(("x", "y", "z"), ("N",) * 3, (-1.0,) * 3, (1.0,) * 3), Vector(("grip",), ("N",), (0.5,), (1.0,))],
 )
 def test_an_action_that_no_stick_gives_is_refused(action):
-    with pytest.raises(InvalidValueError, match="--players joystick: expected a task whose players act by one or two"):
+    with pytest.raises(InvalidValueError, match="--players joystick: expected a task with actions of one or two"):
         PersonAgent("joystick", action=action)
 
 
 def test_a_recording_of_another_task_is_not_replayed_at_a_seat(peg, simulated):
-    assert ReplayAgent(simulated[0], peg).map_config == read_episode(simulated[0]).scenario
+    assert ReplayAgent(simulated[0], peg).scenario == read_episode(simulated[0]).scenario
     with pytest.raises(CopolicyError, match="expected a recording of the task 'table', found one of 'peg'"):
         ReplayAgent(simulated[0])
 
 
 def test_a_session_balances_what_the_task_names(peg):
     scenarios = peg.scenario_sets["right"]
-    assert Balance(scenarios, 3, 0, "P01", swap=False, task=peg).practice(0) in scenarios
+    assert BalancedSchedule(scenarios, 3, 0, "P01", swap=False, task=peg).practice(0) in scenarios
 
 
 def test_a_policy_holds_its_actions_at_the_rate_of_the_task(peg):
@@ -353,7 +353,7 @@ def test_a_policy_holds_its_actions_at_the_rate_of_the_task(peg):
             return np.full((1, 1, 2), self.frame / 100)
 
     robot = PolicyAgent(Counting(), peg)
-    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, HeldAgent(np.zeros(1))))
+    rollout = Rollout(peg, [peg.scenario_sets["right"][0]], (robot, ConstantAgent(np.zeros(1))))
     taken = []
     for _ in range(6):
         rollout.step()
@@ -374,7 +374,7 @@ def test_the_loop_is_measured_at_the_rate_of_the_task():
 
 
 def test_a_policy_is_filmed_with_a_simulated_partner(peg):
-    from copolicy.collect.demonstration.film import SIZE, demonstrate, pictures
+    from copolicy.collect.demonstration.video import SIZE, demonstrate, draw_images
 
     class Pushing:
         """Both push to the right, gently."""
@@ -391,8 +391,8 @@ def test_a_policy_is_filmed_with_a_simulated_partner(peg):
     assert (track.episode.fps, track.episode.meta.duration_s) == (20, track.steps / 20)
     assert (track.task, track.episode.meta.controller_1) == (peg, "scripted:lazy")
     assert verify(track)["max_drift_position"] == 0.0
-    frames = sum(1 for _ in pictures(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
-    assert frames == len(sampled(track, 4, 2.0)) + 4
+    frames = sum(1 for _ in draw_images(track, (SIZE[0] // 4, SIZE[1] // 4), 4, 2.0))
+    assert frames == len(frame_positions(track, 4, 2.0)) + 4
     with pytest.raises(
         InvalidValueError, match="task: expected 'peg', which policy:pushing has learned, found 'table'"
     ):

@@ -13,7 +13,7 @@ from local_hub import LocalHub
 from test_peg_task import record
 
 from copolicy.convert.cli import main as convert
-from copolicy.dataset.checks.checking import check_dataset, check_table, read_table
+from copolicy.dataset.checks.checking import check_data, check_dataset, read_data
 from copolicy.dataset.cli import main
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, STATE
 from copolicy.dataset.files.meta_files import STATISTICS_FILE
@@ -65,7 +65,7 @@ def test_sound_data_pass_and_rules_that_the_task_lacks_are_named(peg, recordings
 
 
 def test_what_the_task_does_not_know_is_found(root):
-    sound = read_table(root)
+    sound = read_data(root)
 
     def put(place, value):
         return lambda values: values.__setitem__(place, value)
@@ -91,7 +91,7 @@ def test_what_the_task_does_not_know_is_found(root):
 
 
 def errors(table) -> set[str]:
-    return {finding.rule for finding in check_table(table).findings if finding.severity == "error"}
+    return {finding.rule for finding in check_data(table).findings if finding.severity == "error"}
 
 
 def test_damage_fails_the_command(root, capsys):
@@ -100,13 +100,13 @@ def test_damage_fails_the_command(root, capsys):
     assert main(["check", str(root)]) == 1
     out = capsys.readouterr().out
     assert "error: state_range: episode 0: position is this far outside its bounds, in m" in out
-    assert "error: achieved_hz: episode 0: the loop's rate was this share away from 20 Hz (0.25; limit 0.05)" in out
+    assert "error: achieved_hz: episode 0: relative deviation of the loop's rate from 20 Hz (0.25; limit 0.05)" in out
 
 
 def test_a_task_brings_rules_of_its_own(peg, root, monkeypatch):
     def slow(table):
-        speed = table.largest(np.abs(table.frames[STATE][:, 1]))
-        return table.beyond("jump", speed, "faster than a peg")
+        speed = table.maximum(np.abs(table.frames[STATE][:, 1]))
+        return table.over_limit("jump", speed, "faster than a peg")
 
     rules = Rule("jumps", "no faster than a peg", slow, (STATE,)), Rule("last", "nothing", lambda table: ())
     monkeypatch.setattr(type(peg), "rules", TaskRules(rules, {"jump": Limit(0.1, "m/s", "pegs are slow")}))
@@ -156,7 +156,7 @@ def test_a_task_with_more_parts_has_more_statistics(peg, root, capsys, monkeypat
     assert (size["unit"], 0 < size["value"] < top["value"] <= 100) == ("N", True)
     assert top["interval"][0] <= top["value"] <= top["interval"][1]
     coverage = families["visitation"]["visitation_coverage"]["definition"]
-    assert "the peg's middle has been in, on a grid of 0.0416667 m" in coverage
+    assert "the peg's middle visited, on a grid of 0.0416667 m" in coverage
     assert 0 < families["visitation"]["visitation_coverage"]["value"] < 1
     assert "the peg faster than 0.15 m/s" in families["forces"]["conflict_fraction"]["definition"]
     assert families["smoothness"]["sparc"]["value"] < 0
@@ -175,9 +175,9 @@ def test_edits_releases_and_differences(peg, recordings, root, tmp_path, capsys)
     json_of(capsys, "exclude", root, "--episode-ids", "4", "--reason", "late")
     json_of(capsys, "release", root, "--bump", "major", "--notes", "The first.")
     json_of(capsys, "withdraw", "C-7", root)
-    assert len(read_table(root).labels) == 5
+    assert len(read_data(root).labels) == 5
     json_of(capsys, "withdraw", "C-7", root, "--yes")
-    table = read_table(root)
+    table = read_data(root)
     assert (len(table.labels), table.task, table.damage) == (4, peg, ())
     assert json_of(capsys, "diff", tmp_path / "part", root, status=1)
     assert json_of(capsys, "diff", root, root) is not None
@@ -192,5 +192,5 @@ def test_published_and_pulled(root, peg, tmp_path):
         done = user.run("pull", "lab/peg", "--out", tmp_path / "pulled", "--with-raw", "--json")
         assert done.status == 0, done.err
         assert user.run("check", "lab/peg", "--revision", "data-1.0.0").status == 0
-    assert read_table(tmp_path / "pulled").task == peg
+    assert read_data(tmp_path / "pulled").task == peg
     assert main(["check", str(tmp_path / "pulled" / "raw")]) == 0

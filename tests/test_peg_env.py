@@ -33,7 +33,7 @@ def test_it_is_the_world_of_the_task(peg):
     observation, info = env.reset(seed=4)  # the second of three lines
     assert info["map_index"] == 1
     np.testing.assert_allclose(observation["environment_state"], (0.5, -0.4))
-    world = peg.make_world(env.maps[1], peg.settings_type(push=2.0))
+    world = peg.make_world(env.scenarios[1], peg.settings_type(push=2.0))
     action = np.array([-0.5, 0.25])
     for _ in range(4):
         world.step(action)

@@ -14,7 +14,7 @@ from peg_data import convert_pegs, record_pegs
 import lerobot_policy_copolicy  # noqa: F401 - registers the environment
 from copolicy.convert.cli import main
 from copolicy.convert.export.source import ExportSource
-from copolicy.convert.upstream.zarr_store import ZarrArrays
+from copolicy.convert.upstream.zarr_arrays import ZarrArrays
 from copolicy.dataset.features import PAIR_GYM_ID
 from copolicy.dataset.versions.content import read_content
 
@@ -111,11 +111,11 @@ def test_sets_grow_and_join(recordings, peg_set, tmp_path, capsys):
 
 
 def test_shards_give_the_set_of_one_conversion(recordings, peg_set, tmp_path, capsys):
-    whole = tmp_path / "whole"
-    call = ("mcap", recordings, "--out", whole, "--repo-id", "lab/peg", "--license", "cc0-1.0", "--shard-episodes", 3)
+    sharded = tmp_path / "whole"
+    call = ("mcap", recordings, "--out", sharded, "--repo-id", "lab/peg", "--license", "cc0-1.0", "--shard-episodes", 3)
     summary = run(capsys, *call)
     assert (summary["shards"], summary["episodes"]) == (2, 4)
-    assert read_content(whole).hash == read_content(peg_set).hash
+    assert read_content(sharded).hash == read_content(peg_set).hash
 
 
 def test_rates_are_held_against_the_rate_of_the_recordings(recordings, tmp_path, capsys):

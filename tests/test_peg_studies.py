@@ -73,7 +73,7 @@ def test_the_partners_are_the_tasks(runs, tmp_path, capsys):
     assert result["summary"]["deadlock"] is None
     assert set(result["not_measured"]) == {"interaction_force", "deadlock"}
     assert result["definitions"].keys().isdisjoint(result["not_measured"])
-    assert result["definitions"]["success"].startswith("share of episodes that end with mark;")
+    assert result["definitions"]["success"].startswith("proportion of episodes that end with mark;")
     assert "map" not in result["label"]
     # Forces and ways are those of the outline.
     scripted = result["baselines"][1]["summary"]
@@ -112,7 +112,7 @@ def test_a_human_study_is_planned_run_and_summarised(runs, tmp_path, capsys):
     content = json.loads(path.read_text(encoding="utf-8"))
     assert (content["task"], content["step_limit"], "angular_acceleration_limit" in content) == ("peg", 60, False)
     plan = StudyPlan.read(path)
-    assert plan.physics == get_task("peg").settings_type(step_limit=60)
+    assert plan.world_settings == get_task("peg").settings_type(step_limit=60)
     assert plan.configurations == tuple(get_task("peg").scenario_sets["right"])
     session = ["--participant", "P01", "--human", "scripted:lazy", "--headless", "--practice", "0", "--countdown", "0"]
     assert main(["human", "run", str(path), "--out", str(out), *session]) == 0

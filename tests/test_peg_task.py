@@ -16,7 +16,7 @@ from copolicy.dataset.checks.read_recordings import read_recordings
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import ForeignRecordingError, InvalidValueError, ShapeError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 from copolicy.dataset.task import get_task, installed_tasks
 
 

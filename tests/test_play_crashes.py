@@ -13,8 +13,8 @@ import pytest
 from mcap.reader import make_reader
 
 from copolicy.collect.recording.recover import recover
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
+from copolicy.dataset.recording.reader import read_episode
 
 
 def _command(out: Path, *flags: str) -> list[str]:
@@ -94,8 +94,8 @@ def _expect_no_room(output: str, errors: str, program: subprocess.Popen) -> None
     assert program.returncode == 1
     last = errors.strip().splitlines()[-1]
     assert last.startswith("copolicy-collect: ")
-    assert "expected room for a recording, found: " in last
-    assert "finished episodes are complete, what there is of this one stays as .part" in last
+    assert "expected space for a recording, found: " in last
+    assert "finished episodes are complete, this one is kept as .part" in last
 
 
 def test_a_file_that_cannot_grow_ends_the_session_with_a_message(tmp_path):

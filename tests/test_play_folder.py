@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from copolicy.collect.play.settings import PilotSpec, PlaySettings
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
-from copolicy.collect.session import Balance, CollectionLock, Counts, SessionFolder
+from copolicy.collect.session import BalancedSchedule, CollectionLock, EpisodeCounts, SessionFolder
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.tasks.table.maps import MAP_SETS, identify
@@ -43,24 +43,24 @@ def test_a_session_continues_until_it_is_complete(tmp_path):
     first = SessionFolder(tmp_path, "P01", FIXED, 2)
     assert (first.path.name, first.continued) == ("P01-01", False)
     _record(first)
-    again = SessionFolder(tmp_path, "P01", FIXED, 2)
-    assert (again.path, again.session_id, again.continued) == (first.path, first.session_id, True)
-    assert again.next_path().name == "episode_001.mcap"
-    _record(again)
+    continued = SessionFolder(tmp_path, "P01", FIXED, 2)
+    assert (continued.path, continued.session_id, continued.continued) == (first.path, first.session_id, True)
+    assert continued.next_path().name == "episode_001.mcap"
+    _record(continued)
     assert SessionFolder(tmp_path, "P01", FIXED, 2).path.name == "P01-02"
 
 
 def test_another_pair_has_sessions_of_its_own_but_shares_the_counts(tmp_path):
     first = SessionFolder(tmp_path, "P01", FIXED, 2)
     _record(first, seating=1)
-    other = SessionFolder(tmp_path, "P02", FIXED, 2)
-    assert other.path.name == "P02-01"
-    assert other.counts.kept == Counter({("training-00", 1): 1})
-    assert other.counts.kept_here.total() == 0
+    partner_session = SessionFolder(tmp_path, "P02", FIXED, 2)
+    assert partner_session.path.name == "P02-01"
+    assert partner_session.counts.kept == Counter({("training-00", 1): 1})
+    assert partner_session.counts.kept_in_session.total() == 0
 
 
 @pytest.mark.parametrize(
-    ("changes", "kept", "tried"),
+    ("changes", "kept", "attempted"),
     [
         ({}, 1, 1),
         ({"discarded": True}, 0, 1),
@@ -69,11 +69,11 @@ def test_another_pair_has_sessions_of_its_own_but_shares_the_counts(tmp_path):
         ({"reason": "crash_recovered"}, 0, 1),
     ],
 )
-def test_what_counts_is_what_was_played_to_its_end_and_kept(tmp_path, changes, kept, tried):
+def test_what_counts_is_what_was_played_to_its_end_and_kept(tmp_path, changes, kept, attempted):
     folder = SessionFolder(tmp_path, "P01", FIXED, 2)
     _record(folder, **changes)
     counts = SessionFolder(tmp_path, "P01", FIXED, 2).counts
-    assert (counts.kept_here.total(), counts.tried.total()) == (kept, tried)
+    assert (counts.kept_in_session.total(), counts.attempted.total()) == (kept, attempted)
 
 
 def test_an_undone_keep_is_no_recording_any_more(tmp_path):
@@ -87,9 +87,9 @@ def test_an_undone_keep_is_no_recording_any_more(tmp_path):
     assert undone.path == last
     assert not last.exists()
     assert last.with_name("episode_001.mcap.undone").stat().st_size > 0
-    assert folder.counts.kept_here == Counter({("training-00", 0): 1, ("training-01", 0): 0})
+    assert folder.counts.kept_in_session == Counter({("training-00", 0): 1, ("training-01", 0): 0})
     assert folder.next_path().name == "episode_003.mcap"
-    assert SessionFolder(tmp_path, "P01", FIXED, 3).counts.kept_here.total() == 1
+    assert SessionFolder(tmp_path, "P01", FIXED, 3).counts.kept_in_session.total() == 1
     assert folder.undo_last_keep() is not None
     assert folder.undo_last_keep() is None
 
@@ -102,14 +102,14 @@ def test_a_session_with_other_settings_is_not_mixed_in(tmp_path):
         f"{folder.path}: expected the settings that it began with, {FIXED}, or --new-session, "
         "found {'maps': 'unseen', 'seed': 0}"
     )
-    assert SessionFolder(tmp_path, "P01", {"maps": "unseen", "seed": 0}, 2, fresh=True).path.name == "P01-02"
+    assert SessionFolder(tmp_path, "P01", {"maps": "unseen", "seed": 0}, 2, new_session=True).path.name == "P01-02"
 
 
 def test_a_recording_that_cannot_be_read_is_told_and_not_counted(tmp_path, caplog):
     folder = SessionFolder(tmp_path, "P01", FIXED, 2)
     (folder.path / "episode_000.mcap").write_bytes(b"no recording")
     again = SessionFolder(tmp_path, "P01", FIXED, 2)
-    assert again.counts.tried.total() == 0
+    assert again.counts.attempted.total() == 0
     assert "not counted" in caplog.text
     assert again.next_path().name == "episode_001.mcap"
 
@@ -142,7 +142,7 @@ def _play(balance, counts, episodes):
     for _ in range(episodes):
         config, seating = balance.next(counts)
         key = (identify(config)[0], seating)
-        for counter in (counts.kept, counts.tried, counts.kept_here):
+        for counter in (counts.kept, counts.attempted, counts.kept_in_session):
             counter[key] += 1
         played.append((config, seating))
     return played
@@ -152,8 +152,8 @@ def test_every_configuration_gets_its_share_across_pairs():
     maps = MAP_SETS["training"]
     kept = Counter()
     for pair in range(7):
-        counts = Counts(kept)
-        _play(Balance(maps, 24, 0, f"P{pair}", swap=True), counts, 24)
+        counts = EpisodeCounts(kept)
+        _play(BalancedSchedule(maps, 24, 0, f"P{pair}", swap=True), counts, 24)
         kept = counts.kept
     # 7 x 24 episodes are one for each of the 84 maps in both seatings.
     assert set(kept.values()) == {1}
@@ -161,7 +161,7 @@ def test_every_configuration_gets_its_share_across_pairs():
 
 
 def test_a_short_session_is_even_over_starts_goals_and_seats():
-    played = _play(Balance(MAP_SETS["training"], 12, 3, "P01", swap=True), Counts(), 12)
+    played = _play(BalancedSchedule(MAP_SETS["training"], 12, 3, "P01", swap=True), EpisodeCounts(), 12)
     assert Counter(config.start for config, _ in played).most_common()[0][1] <= 4
     assert set(Counter(config.goal for config, _ in played).values()) == {4}
     seats = [seating for _, seating in played]
@@ -170,7 +170,7 @@ def test_a_short_session_is_even_over_starts_goals_and_seats():
 
 def test_the_schedule_depends_on_seed_and_pair_and_on_nothing_else():
     def schedule(seed, pair):
-        return _play(Balance(MAP_SETS["training"], 10, seed, pair, swap=True), Counts(), 10)
+        return _play(BalancedSchedule(MAP_SETS["training"], 10, seed, pair, swap=True), EpisodeCounts(), 10)
 
     assert schedule(0, "P01") == schedule(0, "P01")
     assert schedule(0, "P01") != schedule(1, "P01")
@@ -178,9 +178,9 @@ def test_the_schedule_depends_on_seed_and_pair_and_on_nothing_else():
 
 
 def test_a_discarded_configuration_comes_back_after_the_others():
-    balance, counts = Balance(MAP_SETS["training"][:3], 6, 0, "P01", swap=False), Counts()
+    balance, counts = BalancedSchedule(MAP_SETS["training"][:3], 6, 0, "P01", swap=False), EpisodeCounts()
     discarded, _ = balance.next(counts)
-    counts.tried[identify(discarded)[0], 0] += 1
+    counts.attempted[identify(discarded)[0], 0] += 1
     (second, _), (third, _), (fourth, _) = _play(balance, counts, 3)
     assert discarded not in (second, third)
     assert fourth == discarded
@@ -206,21 +206,21 @@ def test_settings_that_cannot_be(changes, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("robot", "unknown pilot 'robot'; available: joystick, keyboard, policy, replay, scripted"),
+        ("robot", "unknown player 'robot'; available: joystick, keyboard, policy, replay, scripted"),
         ("scripted:S99", "unknown simulated pair 'S99'; available: S01, S02, S03, S04, S05"),
-        ("policy", "pilots: expected policy:CKPT, found 'policy'"),
-        ("joystick:1", "pilots: expected joystick, found 'joystick:1'"),
+        ("policy", "player: expected policy:CKPT, found 'policy'"),
+        ("joystick:1", "player: expected joystick, found 'joystick:1'"),
     ],
 )
 def test_pilots_that_cannot_be(text, message):
     with pytest.raises(CopolicyError) as error:
-        PilotSpec.parse(text)
+        PlayerSpec.parse(text)
     assert str(error.value) == message
 
 
 def test_a_pilot_has_a_kind_and_a_detail():
-    assert PilotSpec.parse("scripted") == PilotSpec("scripted", "S01")
-    assert PilotSpec.parse("policy:C:/a:b") == PilotSpec("policy", "C:/a:b")
+    assert PlayerSpec.parse("scripted") == PlayerSpec("scripted", "S01")
+    assert PlayerSpec.parse("policy:C:/a:b") == PlayerSpec("policy", "C:/a:b")
 
 
 def test_the_header_names_no_path(tmp_path):

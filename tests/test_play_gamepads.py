@@ -8,7 +8,7 @@ from copolicy.collect.inputs import CalibrationStore, MappingStore, StickCalibra
 from copolicy.collect.screen import Canvas
 from copolicy.collect.screen.dialogs import draw_toast
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
 
@@ -40,13 +40,13 @@ def test_buttons_go_by_their_meaning_and_by_what_is_printed_on_them(tmp_path):
         ]
 
 
-def test_a_pad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
+def test_a_gamepad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
     strange = VirtualJoystick("Strange pad", product=3, axes=4, buttons=12, hats=0, mapping=None)
     config = tmp_path / "config"
     with lobby(tmp_path) as hands:
         hands.press(5, strange)  # joins with any button
         assert hands.panel().prompt == "button 0: choose   button 1: next"
-        assert hands.panel().notice == "the buttons of this pad are not known: set them up"
+        assert hands.panel().notice == "the buttons of this gamepad are unknown: set them up"
         for _ in range(5):
             hands.press(1, strange)
         assert hands.panel().items[hands.panel().cursor] == "set up the buttons"
@@ -77,8 +77,8 @@ def test_a_pad_that_nobody_knows_is_set_up_in_the_lobby_and_kept(tmp_path):
         assert hands.panel().progress is None
     mapping = MappingStore(config).get(strange.guid)
     assert mapping is not None
-    assert mapping.of_button(11) == "start"
-    assert mapping.of_button(7) is None
+    assert mapping.control_of_button(11) == "start"
+    assert mapping.control_of_button(7) is None
     assert mapping.stick("left") == ((3, 2), (True, False))
     assert CalibrationStore(config).get(strange.guid) == StickCalibration(axes=(3, 2), invert=(True, False))
 
@@ -105,7 +105,7 @@ def test_a_mapping_that_cannot_be_kept_holds_and_is_said(tmp_path):
         assert hands.panel().prompt == "button 4: choose   button 5: next"
 
 
-def test_a_pad_with_nothing_but_a_hat_steers_by_it(tmp_path):
+def test_a_gamepad_with_nothing_but_a_hat_steers_by_it(tmp_path):
     plain = VirtualJoystick("Plain", product=4, axes=0, hats=1, mapping=None)
     other = VirtualJoystick("Beta pad", product=2)
     with lobby(tmp_path) as hands:
@@ -114,7 +114,7 @@ def test_a_pad_with_nothing_but_a_hat_steers_by_it(tmp_path):
         plain.hat(1, -1)
         hands.ticks(1)
         assert hands.panel().force == pytest.approx((0.5**0.5, 0.5**0.5))
-        assert hands.panel().notice.startswith("the buttons of this pad")
+        assert hands.panel().notice.startswith("the buttons of this gamepad")
         plain.hat(0, 0)
         hands.press(0, other)
         hands.start(plain, other)
@@ -136,50 +136,50 @@ def test_a_device_that_cannot_steer_does_not_join_and_is_told_so(tmp_path):
 
 def test_without_pilots_named_only_what_can_steer_counts(tmp_path):
     VirtualJoystick("Buttons", product=5, axes=1, hats=0, mapping=None)
-    with lobby(tmp_path, pilots=None) as hands:
+    with lobby(tmp_path, players=None) as hands:
         assert [player.spec.kind for player in hands.game.players] == ["keyboard", "keyboard"]
 
 
 def test_the_axes_that_steer_can_be_chosen_and_are_kept(tmp_path):
-    pad = VirtualJoystick("Alpha pad", product=1)
+    gamepad = VirtualJoystick("Alpha pad", product=1)
     config = tmp_path / "config"
     with lobby(tmp_path) as hands:
-        hands.press(0, pad)
+        hands.press(0, gamepad)
         assert hands.panel().steering == "left stick"
         for _ in range(4):
-            hands.press(1, pad)
-        hands.press(0, pad)
+            hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[0] == "steer with: left stick"
-        pad.hat(1, 0)
+        gamepad.hat(1, 0)
         hands.ticks(1)
-        pad.hat(0, 0)
+        gamepad.hat(0, 0)
         hands.ticks(1)
         seen = [hands.panel().steering]
         for _ in range(2):
-            hands.press(0, pad)
+            hands.press(0, gamepad)
             seen.append(hands.panel().steering)
         assert seen == ["d-pad", "left stick", "d-pad"]
-        hands.press(1, pad)
-        hands.press(0, pad)
+        hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[1] == "left-right inverted: yes"
-        pad.hat(1, 0)
+        gamepad.hat(1, 0)
         hands.ticks(1)
         assert hands.panel().force == (-1.0, 0.0)
-        pad.hat(0, 0)
+        gamepad.hat(0, 0)
         for _ in range(2):
-            hands.press(1, pad)
-        hands.press(0, pad)
+            hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[4] == "steering: d-pad"
-    assert CalibrationStore(config).get(pad.guid).axes == (4, 5)
+    assert CalibrationStore(config).get(gamepad.guid).axes == (4, 5)
 
 
 def test_the_box_before_the_start_hides_nothing_of_the_world(tmp_path):
-    pads = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    gamepads = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
     with lobby(tmp_path, countdown_s=30.0) as hands:
-        for pad in pads:
-            hands.press(0, pad)
-        for pad in pads:
-            hands.press(0, pad)
+        for gamepad in gamepads:
+            hands.press(0, gamepad)
+        for gamepad in gamepads:
+            hands.press(0, gamepad)
         hands.ticks(20)
         world = (0, 60, 1200, 600)
         bare = Canvas(pygame.Surface((1200, 760), depth=32))
@@ -191,4 +191,4 @@ def test_the_box_before_the_start_hides_nothing_of_the_world(tmp_path):
             shown = hands.screen()
             draw_toast(Canvas(shown), "a message")
             assert pygame.image.tobytes(shown.subsurface(world), "RGB") == expected
-            hands.press(0, pads[0])
+            hands.press(0, gamepads[0])

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 
 _MISSING = [name for name in ("Xvfb", "xdotool", "xkbcomp") if shutil.which(name) is None]
 pytestmark = pytest.mark.skipif(

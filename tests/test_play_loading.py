@@ -11,7 +11,7 @@ from play_session import settings
 from copolicy.collect.play import loading as loading_module
 from copolicy.collect.play.loading import Loading
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.screen.window import Window
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import RunError
@@ -38,9 +38,11 @@ def window():
     pygame.display.quit()
 
 
-@pytest.mark.parametrize("pilots", [("joystick", "keyboard"), ("keyboard", "policy:pretrained"), ("scripted:S02",) * 2])
-def test_the_window_opens_before_anything_heavy_is_imported(pilots, tmp_path):
-    command = [sys.executable, "-c", FIRST_WINDOW, *pilots]
+@pytest.mark.parametrize(
+    "players", [("joystick", "keyboard"), ("keyboard", "policy:pretrained"), ("scripted:S02",) * 2]
+)
+def test_the_window_opens_before_anything_heavy_is_imported(players, tmp_path):
+    command = [sys.executable, "-c", FIRST_WINDOW, *players]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (7, "[]\n"), done.stderr
 
@@ -91,15 +93,15 @@ def test_a_session_is_loaded_under_its_window_and_named_once_it_is_there(tmp_pat
         "_draw",
         lambda self, *rest: (seen.append((rest[1], pygame.display.get_caption()[0])), drawn(self, *rest)),
     )
-    pilots = (PilotSpec("scripted", "S01"), PilotSpec("keyboard"))
-    with prepared(settings(tmp_path, pilots=pilots), ("the robots", list)):
+    players = (PlayerSpec("scripted", "S01"), PlayerSpec("keyboard"))
+    with prepared(settings(tmp_path, players=players), ("the robots", list)):
         assert pygame.display.get_caption()[0].startswith("copolicy")
     steps = list(dict.fromkeys(what for what, _ in seen))
     assert steps == [
-        "the table and its recorder",
+        "the task table and the recorder",
         "the robots",
-        "recordings that broke off",
+        "interrupted recordings",
         "the players",
-        "what was played before",
+        "earlier episodes",
     ]
     assert {title for _, title in seen} == {"loading: carry the table together"}

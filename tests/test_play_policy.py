@@ -12,11 +12,11 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.cli import main
-from copolicy.collect.rollout import Start
+from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
@@ -57,7 +57,7 @@ class Counter:
 
 
 def begin(agent, config=MAP, seat=0, seed=0):
-    agent.begin(seat, [Start(config, seed, TableWorld(config).observation)])
+    agent.begin(seat, [EpisodeStart(config, seed, TableWorld(config).observation)])
 
 
 @pytest.fixture
@@ -67,11 +67,11 @@ def counter():
 
 @pytest.fixture
 def agent(counter):
-    one = PolicyAgent(counter, real_time=True)
-    begin(one, seed=5)
-    yield one
+    agent = PolicyAgent(counter, real_time=True)
+    begin(agent, seed=5)
+    yield agent
     counter.gate.set()
-    one.close()
+    agent.close()
 
 
 def _run(agent, world, steps, human=(0.0, 0.0), wait=True):
@@ -235,4 +235,4 @@ def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_p
     assert plans.startswith("seat 0: ")
     inputs = [PlayerInput.FromString(m.data) for _, channel, m in messages if channel.topic == "/player/0/input"]
     assert len(inputs) == len(episode.actions)
-    assert max(one.age_ns for one in inputs) > 10**7
+    assert max(sample.age_ns for sample in inputs) > 10**7

@@ -7,7 +7,7 @@ from gamepad_lobby import flags, lobby
 from virtual_joystick import VirtualJoystick
 
 from copolicy.collect.inputs import CalibrationStore, StickCalibration
-from copolicy.dataset.recording.log import read_metadata
+from copolicy.dataset.recording.reader import read_metadata
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
 
@@ -33,10 +33,10 @@ def test_a_stick_that_pushes_at_rest_is_shown_and_the_episode_flagged(tmp_path):
 
 
 def test_an_uncalibrated_stick_that_rests_off_centre_in_an_episode_is_flagged(tmp_path):
-    pads = [VirtualJoystick("Loose", product=6), VirtualJoystick("Sound", product=2)]
+    gamepads = [VirtualJoystick("Loose", product=6), VirtualJoystick("Sound", product=2)]
     with lobby(tmp_path, headless=True, window=None) as hands:
         hands.ticks(3)
-        pads[0].move(0.0, 0.25)
+        gamepads[0].move(0.0, 0.25)
         hands.ticks(35)
     (path,) = tmp_path.rglob("*.mcap")
     assert flags(path) == {"stick_off_centre"}
@@ -63,32 +63,32 @@ def test_a_calibrated_stick_and_one_that_is_let_go_are_not_flagged(tmp_path, res
 
 
 def test_a_calibration_that_no_longer_holds_is_noticed_after_two_seconds(tmp_path):
-    pad = VirtualJoystick("Worn", product=6)
-    CalibrationStore(tmp_path / "config").put(pad.guid, StickCalibration(low=(-0.9, -0.9), high=(0.9, 0.9)))
+    gamepad = VirtualJoystick("Worn", product=6)
+    CalibrationStore(tmp_path / "config").put(gamepad.guid, StickCalibration(low=(-0.9, -0.9), high=(0.9, 0.9)))
     with lobby(tmp_path) as hands:
-        pad.move(0.0, -0.25)
-        hands.press(0, pad)
+        gamepad.move(0.0, -0.25)
+        hands.press(0, gamepad)
         hands.ticks(20)
         assert hands.panel().notice == ""
         hands.ticks(45)
         assert hands.panel().notice == "pushes with 0.18 at rest: calibrate the stick"
-        pad.move(0.0, 0.0)
+        gamepad.move(0.0, 0.0)
         hands.ticks(61)
         assert hands.panel().notice == ""
 
 
 def test_a_changed_dead_zone_is_no_calibration(tmp_path):
-    pad = VirtualJoystick("Loose", product=6)
+    gamepad = VirtualJoystick("Loose", product=6)
     config = tmp_path / "config"
     with lobby(tmp_path) as hands:
-        hands.press(0, pad)
+        hands.press(0, gamepad)
         for _ in range(3):
-            hands.press(1, pad)
-        hands.press(0, pad)
+            hands.press(1, gamepad)
+        hands.press(0, gamepad)
         assert hands.panel().items[3] == "dead zone  0.13"
-    assert pad.guid not in CalibrationStore(config)
+    assert gamepad.guid not in CalibrationStore(config)
     # Files did not say before whether a centre was measured.
     entries = json.loads((config / "calibrations.json").read_text(encoding="utf-8"))
-    assert entries[pad.guid].pop("measured") is False
+    assert entries[gamepad.guid].pop("measured") is False
     (config / "calibrations.json").write_text(json.dumps(entries), encoding="utf-8")
-    assert pad.guid not in CalibrationStore(config)
+    assert gamepad.guid not in CalibrationStore(config)

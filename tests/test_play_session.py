@@ -15,17 +15,17 @@ from virtual_joystick import VirtualJoystick
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.sdl import pygame
 from copolicy.collect.ticker import DT_NS
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 
 
 @pytest.fixture
-def pads():
+def gamepads():
     pygame.display.init()
-    made = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
-    yield made
-    for pad in made:
-        pad.unplug()
+    virtual = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    yield virtual
+    for gamepad in virtual:
+        gamepad.unplug()
     pygame.joystick.quit()
 
 
@@ -40,10 +40,10 @@ def _events(path):
 
 def _join_and_start(players, a, b):
     players.phase("Lobby")
-    for pad in (a, b):
-        players.press(pad, A)  # joins
-    for pad in (a, b):
-        players.press(pad, A)  # agrees
+    for gamepad in (a, b):
+        players.press(gamepad, A)  # joins
+    for gamepad in (a, b):
+        players.press(gamepad, A)  # agrees
     players.phase("Ready")
     players.press(a, A)
     players.phase("Running")
@@ -60,8 +60,8 @@ def _run(application, play):
     return application.summary()
 
 
-def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
-    a, b = pads
+def test_a_session_from_the_lobby_to_the_next_day(tmp_path, gamepads):
+    a, b = gamepads
     spare = []
 
     def first_day(players):
@@ -70,7 +70,7 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         players.press(b, A)
         assert game.players[0].label == "Beta pad", "the first press takes the first seat"
         players.press(a, A)
-        # Player b (pad a) calibrates: B goes down the menu, A chooses.
+        # Player b (gamepad a) calibrates: B goes down the menu, A chooses.
         players.press(a, B)
         players.press(a, B)
         players.press(a, A)
@@ -101,15 +101,15 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         # In the middle of it somebody pulls the cable.
         b.unplug()
         players.phase("Paused")
-        held = game.trial.steps
+        steps = game.trial.steps
         players.press(a, A)  # nobody can go on without a device
         players.sleep(0.3)
         assert type(players.application.phase).__name__ == "Paused"
-        assert game.trial.steps == held
+        assert game.trial.steps == steps
         spare.append(VirtualJoystick("Beta pad", product=2))
         assert spare[0].instance_id != b.instance_id
         players.press(spare[0], A)  # joins again
-        assert game.roster.missing() == []
+        assert game.roster.without_device() == []
         players.press(a, A)
         players.phase("Running")
         players.carry(a, spare[0])
@@ -129,8 +129,8 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
         with prepared(settings(tmp_path, consents=("C-17", "C-18")), clock=SimulatedClock(2)) as application:
             summary = _run(application, first_day)
     finally:
-        for pad in spare:
-            pad.unplug()
+        for gamepad in spare:
+            gamepad.unplug()
     assert summary["ended_by"] == "quit"
     assert (summary["kept"], summary["discarded"], summary["outcomes"]) == (1, 1, {"goal": 2})
     assert summary["complete"] is False
@@ -164,32 +164,32 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
     path = folder / "episode_001.mcap"
     inputs = _messages(path, "/player/1/input", PlayerInput)
     timings = _messages(path, "/loop/timing", LoopTiming)
-    assert [one.step for one in inputs] == [one.step for one in timings] == list(range(len(kept.actions)))
-    raw = np.array([one.axes[:2] for one in inputs])
+    assert [record.step for record in inputs] == [record.step for record in timings] == list(range(len(kept.actions)))
+    raw = np.array([record.axes[:2] for record in inputs])
     size = np.hypot(*raw.T)
     deflected = size > 0.13
     assert deflected.sum() > 20
     expected = raw * np.where(deflected, (size - 0.12) / 0.88 / np.maximum(size, 1e-9), 0.0)[:, None]
     np.testing.assert_allclose(kept.actions[:, 2:][deflected], np.clip(expected, -1, 1)[deflected], atol=1e-9)
-    assert max(one.age_ns for one in inputs) < DT_NS
-    starts = np.array([one.start_ns for one in timings])
+    assert max(record.age_ns for record in inputs) < DT_NS
+    starts = np.array([record.start_ns for record in timings])
     assert np.diff(starts).min() > 0
 
     def second_day(players):
         game = players.application.game
         assert game.folder.continued
-        assert game.folder.counts.kept_here.total() == 1
-        _join_and_start(players, *pads)
-        players.carry(*pads)
+        assert game.folder.counts.kept_in_session.total() == 1
+        _join_and_start(players, *gamepads)
+        players.carry(*gamepads)
         players.result()
-        players.press(pads[0], 5)  # undoes the keep of yesterday
-        players.until(lambda: game.folder.counts.kept_here.total() == 0, "the undo")
-        players.press(pads[0], A)
+        players.press(gamepads[0], 5)  # undoes the keep of yesterday
+        players.until(lambda: game.folder.counts.kept_in_session.total() == 0, "the undo")
+        players.press(gamepads[0], A)
         players.phase("Ready")
-        players.until(lambda: game.folder.counts.kept_here.total() == 1, "the keep")
+        players.until(lambda: game.folder.counts.kept_in_session.total() == 1, "the keep")
 
     # SDL forgets its virtual joysticks when the program closes it.
-    pads[:] = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
+    gamepads[:] = [VirtualJoystick("Alpha pad", product=1), VirtualJoystick("Beta pad", product=2)]
     with prepared(settings(tmp_path), clock=SimulatedClock(2)) as application:
         summary = _run(application, second_day)
     assert summary["kept_in_session"] == 1
@@ -200,8 +200,8 @@ def test_a_session_from_the_lobby_to_the_next_day(tmp_path, pads):
     assert {"continue", "undo", "redo", "keep", "device_lost", "swap"} <= set(lines)
 
 
-def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
-    a, b = pads
+def test_a_discard_has_its_reason_and_comes_again(tmp_path, gamepads):
+    a, b = gamepads
 
     def play(players):
         game = players.application.game
@@ -224,7 +224,7 @@ def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
         players.press(a, A)
         players.phase("Ready")
         assert game.folder.counts.kept.total() == 0
-        assert game.folder.counts.tried.total() == 1
+        assert game.folder.counts.attempted.total() == 1
 
     with prepared(settings(tmp_path), clock=SimulatedClock(2)) as application:
         _run(application, play)
@@ -233,14 +233,14 @@ def test_a_discard_has_its_reason_and_comes_again(tmp_path, pads):
     assert read_metadata(path)["episode_result"]["notes"] == "discarded: was not ready; hesitated"
 
 
-def test_practice_is_recorded_but_never_counts(tmp_path, pads):
+def test_practice_is_recorded_but_never_counts(tmp_path, gamepads):
     def play(players):
         game = players.application.game
-        _join_and_start(players, *pads)
+        _join_and_start(players, *gamepads)
         assert game.trial.practice
-        players.carry(*pads)
+        players.carry(*gamepads)
         players.result()
-        players.press(pads[0], A)
+        players.press(gamepads[0], A)
         players.phase("Ready")
         assert not game.trial.practice
 
@@ -253,8 +253,8 @@ def test_practice_is_recorded_but_never_counts(tmp_path, pads):
     assert summary["kept_in_session"] == 0
 
 
-def test_headless_joysticks_join_by_order_and_rejoin(tmp_path, pads):
-    a, b = pads
+def test_headless_joysticks_join_by_order_and_rejoin(tmp_path, gamepads):
+    a, b = gamepads
     spare = []
 
     def play(players):
@@ -273,16 +273,16 @@ def test_headless_joysticks_join_by_order_and_rejoin(tmp_path, pads):
         with prepared(settings(tmp_path, headless=True, episodes=1, window=None)) as application:
             summary = _run(application, play)
     finally:
-        for pad in spare:
-            pad.unplug()
+        for gamepad in spare:
+            gamepad.unplug()
     assert summary["complete"] is True
     assert summary["outcomes"] == {"goal": 1}
 
 
-def test_closing_the_window_keeps_what_was_played(tmp_path, pads):
+def test_closing_the_window_keeps_what_was_played(tmp_path, gamepads):
     def play(players):
-        _join_and_start(players, *pads)
-        players.carry(*pads, steps=15)
+        _join_and_start(players, *gamepads)
+        players.carry(*gamepads, steps=15)
         pygame.event.post(pygame.event.Event(pygame.QUIT))
         players.until(lambda: players.application.game.stop, "the end")
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from copolicy.collect.ticker import DT_NS, LATE, LoopStatistics, Tick, Ticker
+from copolicy.collect.ticker import DT_NS, LATE_DIVISOR, LoopStatistics, Tick, Ticker
 
 
 class Clock:
@@ -65,7 +65,7 @@ def test_the_statistics_of_a_steady_loop():
 @pytest.mark.parametrize(("hiccups", "slow"), [(1, False), (4, True)])
 def test_an_episode_is_judged_by_its_99th_percentile(hiccups, slow):
     loop = LoopStatistics()
-    late = DT_NS // LATE + 10**6
+    late = DT_NS // LATE_DIVISOR + 10**6
     for k in range(200):
         delay = late if k % 40 == 20 and k // 40 < hiccups else 0
         loop.add(Tick(k * DT_NS, k * DT_NS + delay, 0))

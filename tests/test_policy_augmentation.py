@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.tasks.table.features import environment_state, map_of
+from copolicy.tasks.table.features import environment_state, map_from_vector
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.policy.symmetries import mirror, permute_obstacles
@@ -36,11 +36,11 @@ def test_mirrored_sample_is_what_the_mirrored_world_does():
     actions = np.random.default_rng(0).uniform(-1, 1, (60, 4))
     config = MapConfig((400.0, 200.0, 2.0), (960.0, 180.0), ((720.0, 420.0), (480.0, 300.0)))
     mirrored = mirror(rollout(config, actions), ALL)
-    map_config = map_of(mirrored[ENVIRONMENT_STATE][0, 0].numpy(), 50)
+    map_config = map_from_vector(mirrored[ENVIRONMENT_STATE][0, 0].numpy(), 50)
     assert map_config.goal == (960.0, 420.0)
     assert map_config.obstacles == ((720.0, 180.0), (480.0, 300.0))
-    again = rollout(map_config, mirrored[ACTION][0].numpy())
-    for key, values in again.items():
+    repeated = rollout(map_config, mirrored[ACTION][0].numpy())
+    for key, values in repeated.items():
         torch.testing.assert_close(mirrored[key], values, atol=1e-9, rtol=0)
 
 
@@ -70,10 +70,10 @@ def test_obstacles_are_shuffled_among_themselves():
     orders = set()
     for row in shuffled:
         assert torch.equal(row, row[:1].expand_as(row))  # one order for all frames of a sample
-        found = map_of(row[0].numpy(), 50)  # raises if padding comes before an obstacle
-        assert set(found.obstacles) == centres
-        assert (found.start, found.goal) == (config.start, config.goal)
-        orders.add(found.obstacles)
+        permuted = map_from_vector(row[0].numpy(), 50)  # raises if padding comes before an obstacle
+        assert set(permuted.obstacles) == centres
+        assert (permuted.start, permuted.goal) == (config.start, config.goal)
+        orders.add(permuted.obstacles)
     assert len(orders) == 2
 
 

@@ -19,11 +19,11 @@ from lerobot_policy_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
 from lerobot_policy_copolicy.copolicy.fast import fastest_backend
+from lerobot_policy_copolicy.copolicy.fast.fast_sampler import FastSampler
 from lerobot_policy_copolicy.copolicy.fast.mlp import FastMlp
 from lerobot_policy_copolicy.copolicy.fast.numba_kernels import gelu, transformer
 from lerobot_policy_copolicy.copolicy.fast.onnx_denoiser import OnnxDenoiser, denoiser_graph
 from lerobot_policy_copolicy.copolicy.fast.packed_weights import LANES, OUTPUTS, pack
-from lerobot_policy_copolicy.copolicy.fast.planner import FastPlanner
 from lerobot_policy_copolicy.copolicy.fast.transformer import FastTransformer
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
@@ -38,15 +38,15 @@ ALL = {"onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}
 @pytest.fixture
 def fresh_choice():
     """What is installed is looked at again, and said again."""
-    for remembered in (fastest_backend._loads, fastest_backend._say):
+    for remembered in (fastest_backend._is_available, fastest_backend._log_choice):
         remembered.cache_clear()
     yield
-    for remembered in (fastest_backend._loads, fastest_backend._say):
+    for remembered in (fastest_backend._is_available, fastest_backend._log_choice):
         remembered.cache_clear()
 
 
 def plan(planner, batch: int = 3, actions: int | None = None) -> torch.Tensor:
-    return planner.plan(columns(batch, 3), torch.Generator().manual_seed(0), actions=actions)
+    return planner.sample_actions(columns(batch, 3), torch.Generator().manual_seed(0), actions=actions)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -146,11 +146,11 @@ def test_torch_plans_where_the_extra_is_missing(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_another_device_is_refused(backend):
-    planner = FastPlanner(lively_policy().diffusion.table, backend)
+    planner = FastSampler(lively_policy().diffusion.coefficients, backend)
     condition, noise = torch.empty(1, 3, 20, device="meta"), torch.empty(1, 12, 4, device="meta")
     message = f"^policy.device, for policy.backend={backend}: expected cpu, found 'meta'"
     with pytest.raises(InvalidValueError, match=message):
-        planner.plan(MlpDenoiser(4, 20, 12, 3), condition, noise, 12)
+        planner.sample(MlpDenoiser(4, 20, 12, 3), condition, noise, 12)
 
 
 @pytest.mark.parametrize(
@@ -195,9 +195,9 @@ def test_auto_plans_what_torch_plans_with_the_fastest_for_the_batch(fresh_choice
         torch.testing.assert_close(plan(quick, batch), plan(plain, batch), atol=1e-4, rtol=0)
         used.append(quick.planned_with)
     assert used == [("numba",), ("numba", "onnx")]
-    said = [record.message for record in caplog.records if record.message.startswith("planning on the CPU")]
+    said = [record.message for record in caplog.records if record.message.startswith("sampling on the CPU")]
     assert said == [
-        "planning on the CPU with numba (up to 4 plans at once), onnx (more): the fastest that is installed "
+        "sampling on the CPU with numba (batches of up to 4), onnx (larger batches): the fastest installed backends "
         "(--policy.backend sets one)"
     ]
 
@@ -230,7 +230,7 @@ def test_auto_passes_over_a_package_that_does_not_load(fresh_choice, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "numba")
     assert fastest_backend.fastest_backend(torch.zeros(1, 3, 20), 1) == "onnx"
-    assert "planning without numba: ImportError: needs another numpy" in caplog.text
+    assert "sampling without numba: ImportError: needs another numpy" in caplog.text
 
 
 def test_auto_leaves_other_devices_and_precisions_to_torch():

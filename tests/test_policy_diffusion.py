@@ -4,13 +4,13 @@ import pytest
 import torch
 
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.diffusion import PlanDiffusion
+from lerobot_policy_copolicy.copolicy.diffusion import ActionDiffusion
 
 PREDICTIONS = ("epsilon", "sample", "v_prediction")
 
 
-def diffusion(**settings) -> PlanDiffusion:
-    return PlanDiffusion(CopolicyConfig(device="cpu", **settings))
+def diffusion(**settings) -> ActionDiffusion:
+    return ActionDiffusion(CopolicyConfig(device="cpu", **settings))
 
 
 @pytest.mark.parametrize("prediction_type", PREDICTIONS)
@@ -18,7 +18,7 @@ def test_the_target_leads_back_to_the_actions(prediction_type):
     torch.manual_seed(0)
     actions = torch.rand(64, 12, 4) * 2 - 1
     process = diffusion(prediction_type=prediction_type)
-    noisy, steps, target = process.noised(actions)
+    noisy, steps, target = process.add_noise(actions)
     kept = process.scheduler.alphas_cumprod[steps][:, None, None]
     recovered = {
         "epsilon": (noisy - (1 - kept).sqrt() * target) / kept.sqrt(),

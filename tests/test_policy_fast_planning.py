@@ -18,7 +18,7 @@ PAPER = {"n_layers": 8, "width": 256, "n_heads": 4, "feedforward_width": 1024}
 
 
 def plan(planner, batch: int = 3, seed: int = 0, actions: int | None = None) -> torch.Tensor:
-    return planner.plan(columns(batch, 3, seed=seed), torch.Generator().manual_seed(seed), actions=actions)
+    return planner.sample_actions(columns(batch, 3, seed=seed), torch.Generator().manual_seed(seed), actions=actions)
 
 
 @pytest.mark.parametrize("network", [{**TRANSFORMER, "n_layers": 3}, MLP], ids=["transformer", "mlp"])
@@ -56,7 +56,7 @@ def test_plans_of_the_papers_network_are_those_of_the_plain_sampler(sampler, ste
 def test_any_length_of_history_and_plan(network, frames):
     settings = {**network, "n_obs_steps": frames, "horizon": 9, "n_action_steps": 4}
     plain, fast = (lively_policy(**settings, planner=name) for name in ("plain", "fast"))
-    plans = [planner.plan(columns(2, frames), torch.Generator().manual_seed(0)) for planner in (plain, fast)]
+    plans = [planner.sample_actions(columns(2, frames), torch.Generator().manual_seed(0)) for planner in (plain, fast)]
     torch.testing.assert_close(plans[1], plans[0], atol=1e-4, rtol=0)
 
 
@@ -89,7 +89,7 @@ def test_fewer_tokens_are_denoised_where_fewer_actions_are_executed(monkeypatch)
     monkeypatch.setattr(FastTransformer, "denoise", denoise)
     planner = lively_policy(n_action_steps=1, sampler="ddim", num_inference_steps=2)
     planner.select_action(columns(2))
-    planner.plan(columns(2, 3))
+    planner.sample_actions(columns(2, 3))
     assert seen == [3, 3, 12, 12]
 
 
@@ -188,7 +188,7 @@ def test_one_step_is_the_networks(network, fast):
 def test_history_reaches_the_plan_through_the_tables():
     planner = lively_policy(initial_noise_scale=0.0)
     batch = columns(1, 3)
-    before = planner.plan(batch)
+    before = planner.sample_actions(batch)
     for key in OBSERVATIONS:
         changed = {**batch, key: batch[key] + 0.1 * batch[key].abs().amax(dim=(0, 1))}
-        assert (planner.plan(changed) - before).abs().max() > 1e-3
+        assert (planner.sample_actions(changed) - before).abs().max() > 1e-3

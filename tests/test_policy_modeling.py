@@ -50,28 +50,30 @@ def test_human_action_is_seen_only_with_the_switch():
     changed[HUMAN_ACTION] = -changed[HUMAN_ACTION]
     for past_human_action in (True, False):
         planner = policy(past_human_action=past_human_action, initial_noise_scale=0.0).eval()
-        assert torch.equal(planner.plan(columns(2, 3)), planner.plan(changed)) is not past_human_action
+        assert (
+            torch.equal(planner.sample_actions(columns(2, 3)), planner.sample_actions(changed)) is not past_human_action
+        )
 
 
 def test_plan_is_repeatable_and_in_range():
     planner = policy().eval()
-    plans = [planner.plan(columns(3, 3), torch.Generator().manual_seed(5)) for _ in range(2)]
+    plans = [planner.sample_actions(columns(3, 3), torch.Generator().manual_seed(5)) for _ in range(2)]
     assert torch.equal(*plans)
     assert plans[0].shape == (3, 12, 4)
     assert plans[0].abs().max() <= 1
-    assert not torch.equal(plans[0], planner.plan(columns(3, 3), torch.Generator().manual_seed(6)))
+    assert not torch.equal(plans[0], planner.sample_actions(columns(3, 3), torch.Generator().manual_seed(6)))
     noise = torch.randn((3, 12, 4), generator=torch.Generator().manual_seed(5))
-    assert torch.equal(plans[0], planner.plan(columns(3, 3), noise=noise))
+    assert torch.equal(plans[0], planner.sample_actions(columns(3, 3), noise=noise))
     with pytest.raises(ShapeError, match=r"^noise: expected shape \(3, 12, 4\), got \(3, 11, 4\)$"):
-        planner.plan(columns(3, 3), noise=noise[:, :11])
+        planner.sample_actions(columns(3, 3), noise=noise[:, :11])
 
 
 def test_plan_uses_the_moving_average_where_there_is_one():
     averaged, raw = (policy(ema=ema, initial_noise_scale=0.0).eval() for ema in (True, False))
-    assert torch.equal(averaged.plan(columns(1, 3)), raw.plan(columns(1, 3)))
+    assert torch.equal(averaged.sample_actions(columns(1, 3)), raw.sample_actions(columns(1, 3)))
     for planner in (averaged, raw):
         torch.nn.init.constant_(planner.denoiser.head.bias, 0.5)
-    assert not torch.equal(averaged.plan(columns(1, 3)), raw.plan(columns(1, 3)))
+    assert not torch.equal(averaged.sample_actions(columns(1, 3)), raw.sample_actions(columns(1, 3)))
     assert raw.ema is None
     assert not any(key.startswith("ema.") for key in raw.state_dict())
 
@@ -82,7 +84,9 @@ def test_selected_actions_are_the_plans_tokens_from_the_current_frame_on():
     actions = [planner.select_action(frame) for frame in frames]
 
     def plan(*indices: int) -> torch.Tensor:
-        return planner.plan({key: torch.stack([frames[i][key] for i in indices], dim=1) for key in OBSERVATIONS})
+        return planner.sample_actions(
+            {key: torch.stack([frames[i][key] for i in indices], dim=1) for key in OBSERVATIONS}
+        )
 
     first, second = plan(0, 0, 0), plan(6, 7, 8)  # at the start the history is copies of the first frame
     for index, action in enumerate(actions):
@@ -96,7 +100,7 @@ def test_chunk_takes_whole_histories_or_single_frames():
     planner = policy(initial_noise_scale=0.0, n_action_steps=10).eval()
     history = columns(2, 3)
     chunk = planner.predict_action_chunk(history)
-    torch.testing.assert_close(chunk, planner.plan(history)[:, 2:])
+    torch.testing.assert_close(chunk, planner.sample_actions(history)[:, 2:])
     chunks = [planner.predict_action_chunk({key: history[key][:, frame] for key in history}) for frame in range(3)]
     torch.testing.assert_close(chunks[-1], chunk)
 
@@ -183,7 +187,9 @@ def test_checkpoint_brings_back_the_same_plans(tmp_path, network):
     saved.save_pretrained(tmp_path)
     loaded: Any = CopolicyPolicy.from_pretrained(tmp_path, strict=True)
     generator = [torch.Generator().manual_seed(0) for _ in range(2)]
-    assert torch.equal(saved.eval().plan(columns(2, 3), generator[0]), loaded.plan(columns(2, 3), generator[1]))
+    assert torch.equal(
+        saved.eval().sample_actions(columns(2, 3), generator[0]), loaded.sample_actions(columns(2, 3), generator[1])
+    )
     assert loaded.config == saved.config
     assert loaded.ema.decay == saved.ema.decay
 

@@ -7,14 +7,14 @@ from diffusers.schedulers.scheduling_dpmsolver_multistep import DPMSolverMultist
 
 from copolicy.dataset.exceptions import UnknownNameError
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.diffusion import PlanDiffusion
-from lerobot_policy_copolicy.copolicy.fast.sampler_table import SamplerTable, trailing_timesteps
+from lerobot_policy_copolicy.copolicy.diffusion import ActionDiffusion
+from lerobot_policy_copolicy.copolicy.fast.sampler_coefficients import SamplerCoefficients, trailing_timesteps
 
 PREDICTIONS = ("epsilon", "sample", "v_prediction")
 
 
-def diffusion(**settings) -> PlanDiffusion:
-    return PlanDiffusion(CopolicyConfig(device="cpu", **settings))
+def diffusion(**settings) -> ActionDiffusion:
+    return ActionDiffusion(CopolicyConfig(device="cpu", **settings))
 
 
 def network(actions: torch.Tensor, step: torch.Tensor | int) -> torch.Tensor:
@@ -23,12 +23,12 @@ def network(actions: torch.Tensor, step: torch.Tensor | int) -> torch.Tensor:
     return (1.3 * actions + 0.01 * step).sin() + 0.4 * actions.flip(-1)
 
 
-def both(process: PlanDiffusion, noise: torch.Tensor, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
+def both(process: ActionDiffusion, noise: torch.Tensor, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
     """The plan by the scheduler, and the plan by the table."""
     generators = [torch.Generator().manual_seed(seed) for _ in range(2)]
     plain = process.sample(network, noise, generators[0])
-    steps = process.table.steps
-    table = process.table.sample(
+    steps = process.coefficients.steps
+    table = process.coefficients.sample(
         lambda index, actions: network(actions, steps[index].timestep), noise, noise.shape[1], generators[1]
     )
     assert torch.equal(generators[0].get_state(), generators[1].get_state())
@@ -42,7 +42,7 @@ def test_table_is_the_scheduler(sampler, prediction_type, num_inference_steps):
     process = diffusion(sampler=sampler, prediction_type=prediction_type, num_inference_steps=num_inference_steps)
     noise = torch.randn(5, 12, 4, generator=torch.Generator().manual_seed(1))
     plain, table = both(process, noise)
-    assert len(process.table.steps) == num_inference_steps
+    assert len(process.coefficients.steps) == num_inference_steps
     assert plain.abs().max() > 0.3
     torch.testing.assert_close(table, plain, atol=2e-5, rtol=0)
 
@@ -69,7 +69,7 @@ def test_noise_is_drawn_for_the_whole_plan(tokens):
     noise, generators = torch.randn(2, 12, 4), [torch.Generator().manual_seed(0) for _ in range(2)]
     # A network that treats every token alone.
     whole, part = (
-        process.table.sample(lambda index, actions: 0.5 * actions, noise, wanted, generator)
+        process.coefficients.sample(lambda index, actions: 0.5 * actions, noise, wanted, generator)
         for wanted, generator in zip((12, tokens), generators, strict=True)
     )
     assert torch.equal(part, whole[:, :tokens])
@@ -89,7 +89,7 @@ def test_dpm_solver_clips_as_thresholding_at_one_does(num_inference_steps):
         sample_max_value=1.0,
     )
     other.set_timesteps(num_inference_steps)
-    assert other.timesteps.tolist() == [step.timestep for step in process.table.steps]
+    assert other.timesteps.tolist() == [step.timestep for step in process.coefficients.steps]
     noise = torch.randn(3, 12, 4)
     actions = noise
     for step in other.timesteps:
@@ -102,7 +102,7 @@ def test_an_error_of_the_first_step_does_not_grow():
     """Two per cent of error in the predicted noise of the last training step are a plan forty times too large."""
     plan = torch.rand(4, 12, 4) - 0.5
     process = diffusion(prediction_type="epsilon", sampler="dpmsolver++", num_inference_steps=5)
-    steps, kept = process.table.steps, process.scheduler.alphas_cumprod
+    steps, kept = process.coefficients.steps, process.scheduler.alphas_cumprod
     sizes = []
 
     def nearly_perfect(index: int, actions: torch.Tensor) -> torch.Tensor:
@@ -110,7 +110,7 @@ def test_an_error_of_the_first_step_does_not_grow():
         share = kept[steps[index].timestep]
         return (actions - share.sqrt() * plan) / (1 - share).sqrt() * 1.02
 
-    sampled = process.table.sample(nearly_perfect, torch.randn(4, 12, 4), 12)
+    sampled = process.coefficients.sample(nearly_perfect, torch.randn(4, 12, 4), 12)
     assert max(sizes) < 1.2
     assert (sampled - plan).abs().mean() < 0.1
 
@@ -136,7 +136,7 @@ def test_the_scheduler_of_one_plan_forgets_the_one_before():
 def test_unknown_names_are_told():
     kept = torch.linspace(1.0, 0.0, 100)
     with pytest.raises(UnknownNameError, match=r"^unknown sampler 'euler'; available: ddim, ddpm, dpmsolver\+\+$"):
-        SamplerTable("euler", "epsilon", kept, [99], 1.0)
+        SamplerCoefficients("euler", "epsilon", kept, [99], 1.0)
     for sampler in ("ddpm", "ddim", "dpmsolver++"):
         with pytest.raises(UnknownNameError, match=r"^unknown prediction_type 'score'; available: epsilon, sample"):
-            SamplerTable(sampler, "score", kept, [99, 49], 1.0)
+            SamplerCoefficients(sampler, "score", kept, [99, 49], 1.0)

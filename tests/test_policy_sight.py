@@ -14,7 +14,7 @@ from copolicy.train.cli import main as train
 from lerobot_policy_copolicy.copolicy.training_data import require_same_rate
 from lerobot_policy_copolicy.env import TableCarryingEnvConfig
 
-SIZES = "have what no policy sees: the size of each obstacle, where they differ (120,60 px)"
+SIZES = "have a property that no policy observes: the size of each obstacle, where they differ (120,60 px)"
 
 
 def test_training_says_it_and_the_checkpoint_keeps_it(copied_table, tmp_path, capsys):

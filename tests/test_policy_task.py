@@ -95,9 +95,9 @@ def test_another_task_trains_on_its_scaled_numbers_alone(peg, tmp_path, capsys):
 
     loaded_again = Checkpoint(out)
     assert loaded_again.task == "peg"
-    assert loaded_again.conditions.physics == peg.settings_type()
+    assert loaded_again.conditions.settings == peg.settings_type()
     assert main([f"--policy.path={trained(out)}", *flags(data, tmp_path / "on", steps=1)[:2], "--steps=1"]) == 0
-    assert Checkpoint(out).conditions.physics == peg.settings_type()
+    assert Checkpoint(out).conditions.settings == peg.settings_type()
     assert main(["export", str(out), "--out", str(tmp_path / "model"), "--json"]) == 0
     assert json.loads((tmp_path / "model" / "config.json").read_text(encoding="utf-8"))["task"] == "peg"
 
@@ -155,7 +155,7 @@ def test_every_backend_plans_for_players_of_one_number_each(peg, backend, networ
     for settings in ({"planner": "plain"}, {"backend": backend}):
         more: dict[str, Any] = {**network, **settings}
         planner = lively_policy(task="peg", **more)
-        plans.append(planner.plan(columns(3, 3, task="peg"), torch.Generator().manual_seed(0)))
+        plans.append(planner.sample_actions(columns(3, 3, task="peg"), torch.Generator().manual_seed(0)))
     assert plans[0].shape == (3, 12, 2)
     torch.testing.assert_close(*plans, atol=1e-5, rtol=1e-5)
 
@@ -167,7 +167,7 @@ def test_features_and_symmetries_of_a_task_are_used(rope):
     batch = {**columns(2, 3, task="rope"), ACTION: torch.full((2, 12, 2), 8.0)}
     learner.train()
     seen = []
-    learner.diffusion.noised = lambda actions: (
+    learner.diffusion.add_noise = lambda actions: (
         seen.append(actions) or (actions, torch.zeros(2, dtype=torch.long), actions)
     )
     learner(batch)
@@ -178,7 +178,7 @@ def test_features_and_symmetries_of_a_task_are_used(rope):
 
 def test_actions_are_planned_in_the_units_of_the_task(rope):
     planner = lively_policy(task="rope", observation_features="absolute")
-    plan = planner.plan(columns(20, 3, task="rope"), torch.Generator().manual_seed(0))
+    plan = planner.sample_actions(columns(20, 3, task="rope"), torch.Generator().manual_seed(0))
     assert plan.min() >= 0
     assert 4 < plan.max() <= 8
     scale = ActionScale(rope.spec)

@@ -14,13 +14,13 @@ from safetensors import safe_open
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder, load_policy, pretrained_folder
 from copolicy.collect.cli import main as collect
-from copolicy.collect.demonstration.film import demonstrate
+from copolicy.collect.demonstration.video import demonstrate
 from copolicy.collect.play.session_run import prepared
-from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.session import Balance
+from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.session import BalancedSchedule
 from copolicy.dataset.exceptions import FileFormatError, MissingExtraError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.tasks.table.features import environment_state, state_vector
 from copolicy.tasks.table.maps import MAP_SETS
@@ -140,15 +140,15 @@ def test_with_a_simulated_partner_it_finishes_an_easy_map(shipped):
     np.testing.assert_array_equal(track.episode.actions, again.episode.actions)
 
 
-@pytest.mark.parametrize("pilots", [("scripted", "policy:pretrained"), ("policy:pretrained", "scripted")])
-def test_it_plays_on_the_robots_seat_in_real_time(tmp_path, pilots):
+@pytest.mark.parametrize("players", [("scripted", "policy:pretrained"), ("policy:pretrained", "scripted")])
+def test_it_plays_on_the_robots_seat_in_real_time(tmp_path, players):
     """In whichever order the two are named: it learned the robot's half of the plans."""
-    specs = tuple(map(PilotSpec.parse, pilots))
-    with prepared(settings(tmp_path, pilots=specs, episodes=1, headless=True)) as application:
+    specs = tuple(map(PlayerSpec.parse, players))
+    with prepared(settings(tmp_path, players=specs, episodes=1, headless=True)) as application:
         game = application.game
         assert game.seats()[0].spec.kind == "policy"
-        game.maps = (SHORT_MAP,)
-        game.balance = Balance(game.maps, 1, 0, "P01", swap=False, seating=int(pilots[0] == "scripted"))
+        game.scenarios = (SHORT_MAP,)
+        game.schedule = BalancedSchedule(game.scenarios, 1, 0, "P01", swap=False, seating=int(players[0] == "scripted"))
         application.run()
     (recorded,) = tmp_path.rglob("*.mcap")
     episode = read_episode(recorded)

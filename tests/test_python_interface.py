@@ -18,7 +18,7 @@ from copolicy.dataset.files.listing import distinct_files
 from copolicy.evaluate import compare_episodes, coplan_episodes, success
 from copolicy.evaluate.cli import main as evaluate
 
-ROOMS = ("copolicy.dataset", "copolicy.collect", "copolicy.evaluate")
+ROOMS = tuple(f"copolicy.{room}" for room in ("dataset", "collect", "convert", "train", "evaluate", "cards"))
 HEAVY = ("torch", "lerobot", "datasets", "pandas", "matplotlib", "pymunk", "pygame", "scipy", "pyarrow")
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from copolicy.dataset.exceptions import OutputExistsError, RunError
 from copolicy.dataset.files.lock import lock
-from copolicy.train.quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
+from copolicy.train.quickstart_chain import LOG_FILE, Step, remove_record, run_chain
 
 
 def _rules(out: Path) -> Step:
@@ -25,13 +25,13 @@ def test_a_line_a_step_and_everything_else_in_the_log(tmp_path, capfd):
     said = capfd.readouterr()
     assert said.out == ""
     first, *lines = said.err.splitlines()
-    assert first == f"Everything that the commands say is in {out / LOG_FILE}"
+    assert first == f"The commands' output is in {out / LOG_FILE}"
     assert [line.rpartition(": ")[0] for line in lines] == ["[1/2] Print the rules", "[2/2] Recover recordings"]
     log = (out / LOG_FILE).read_text(encoding="utf-8")
     assert "$ copolicy-dataset check --rules\ntimestamp" in log
     assert f"$ copolicy-collect recover {tmp_path / 'recordings'}\n" in log
     (out / "summary.json").touch()
-    forget_chain(out)
+    remove_record(out)
     with pytest.raises(OutputExistsError):
         run_chain(out, [_rules(out)])
 
@@ -42,12 +42,12 @@ def test_a_failure_shows_the_end_of_the_log_and_the_next_try_goes_on(tmp_path, c
     with pytest.raises(RunError) as failure:
         run_chain(out, steps)
     assert str(failure.value) == (
-        f"this command ended with status 2: copolicy-collect recover {tmp_path / 'missing'}; what it said is in "
-        f"{out / LOG_FILE}; the same call again goes on from there"
+        f"this command ended with status 2: copolicy-collect recover {tmp_path / 'missing'}; its output is in "
+        f"{out / LOG_FILE}; the same call again continues from there"
     )
     shown = [line for line in capfd.readouterr().err.splitlines() if line.startswith("    ")]
     assert shown == [
-        f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found nothing there"
+        f"    copolicy-collect: {tmp_path / 'missing'}: expected a folder of recordings, found no such file or folder"
     ]
 
     (out / "rules").write_text("of the step that was done", encoding="utf-8")
@@ -79,7 +79,7 @@ def test_a_folder_of_something_else_or_at_work_is_left_alone(tmp_path):
     (out / "notes.txt").unlink()
     with (out / ".quickstart.lock").open("wb") as file:
         assert lock(file)
-        with pytest.raises(RunError, match="found another quickstart at work"):
+        with pytest.raises(RunError, match="found another quickstart running in it"):
             run_chain(out, [_rules(out)])
     run_chain(out, [_rules(out)])
     assert json.loads((out / ".quickstart.json").read_text(encoding="utf-8")) == ["copolicy-dataset check --rules"]

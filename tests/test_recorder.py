@@ -1,4 +1,4 @@
-"""Recording: what the file holds for other programs, and what is left when a recording does not end well."""
+"""Recording: content of the file, and the file after a recording that did not end with `finish`."""
 
 import math
 import re
@@ -23,8 +23,8 @@ from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError, ShapeError
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 
@@ -86,7 +86,7 @@ def test_a_finished_recording_has_its_name_and_nothing_beside_it(finished):
 def test_other_programs_decode_it_by_its_own_schemas(finished):
     path, world, _ = finished
     messages = decoded(path)
-    assert {topic: len(found) for topic, found in messages.items()} == {
+    assert {topic: len(topic_messages) for topic, topic_messages in messages.items()} == {
         "/table/state": 96,
         "/player/0/action": 95,
         "/player/1/action": 95,
@@ -366,10 +366,10 @@ def test_a_killed_process_loses_at_most_a_second_of_its_part(tmp_path):
     with pytest.raises(FileFormatError, match="expected an intact and complete MCAP file, found its end at byte"):
         read_episode(part)
     assert read_metadata(part)["episode"]["episode_uuid"] == "killed"
-    found = []
+    messages = []
     with pytest.raises(EndOfFile):
-        found.extend(records(part, Message))
-    states = [record for record in found if record.channel_id == 1]
+        messages.extend(records(part, Message))
+    states = [record for record in messages if record.channel_id == 1]
     assert len(states) == 81
 
 
@@ -393,18 +393,18 @@ def test_nothing_about_the_machine_or_its_user_is_recorded(tmp_path, monkeypatch
 
 
 def test_a_long_recording_is_on_the_disk_not_in_memory(tmp_path):
-    """Positions for the route class (16 bytes a step) and the index of the chunks (one a second) are all that stays."""
+    """Only positions for the route class (16 bytes a step) and the index of chunks (one a second) stay in memory."""
     steps = 3000
     with recorder(tmp_path / "episode.mcap") as recording:
         carry(recording, 100)
         tracemalloc.start()
         try:
             carry(recording, steps)
-            kept, _ = tracemalloc.get_traced_memory()
+            memory, _ = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()
         recording.finish(False, "timeout")
-    assert kept < 200 * steps
+    assert memory < 200 * steps
 
 
 @pytest.mark.parametrize(

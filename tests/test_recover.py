@@ -1,4 +1,4 @@
-"""What a crash left behind: recovered up to the last complete step, marked, verified, and nothing deleted."""
+"""Recovery of incomplete recordings: up to the last complete step, marked, verified, and nothing deleted."""
 
 import hashlib
 import json
@@ -25,8 +25,8 @@ from copolicy.collect.recording.recover import recover, recover_file
 from copolicy.collect.recording.wall_clock import WallClockAnchor
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
-from copolicy.dataset.recording.log import read_episode, read_metadata
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming, PlayerInput, TableState
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld
 
@@ -55,8 +55,8 @@ def finished(path, steps=95):
     return read_episode(path)
 
 
-def broken_off(path, truth_path, chunks):
-    """What would be on the disk of a recording after so many of its chunks."""
+def truncated(path, truth_path, chunks):
+    """Writes the beginning of a recording, up to a number of chunks."""
     content = truth_path.read_bytes()
     begins = [begin for begin, _ in damage.record_spans(content) if content[begin] == 0x06]
     path.write_bytes(content[: begins[chunks]])
@@ -70,23 +70,23 @@ def whole(tmp_path_factory):
 
 
 def messages(path, message, channel_topic):
-    found, channels = [], {}
+    decoded, channels = [], {}
     with path.open("rb") as file:
         for record in StreamReader(file).records:
             if isinstance(record, Channel):
                 channels[record.id] = record.topic
             elif isinstance(record, Message) and channels[record.channel_id] == channel_topic:
-                found.append((record.log_time, record.sequence, message.FromString(record.data)))
-    return found
+                decoded.append((record.log_time, record.sequence, message.FromString(record.data)))
+    return decoded
 
 
 def test_a_broken_recording_becomes_an_episode_up_to_its_last_complete_step(tmp_path, whole):
     truth_path, truth = whole
-    part = broken_off(tmp_path / "episode.mcap.part", truth_path, 3)  # start event, steps 0-26, 27-53
+    part = truncated(tmp_path / "episode.mcap.part", truth_path, 3)  # start event, steps 0-26, 27-53
     before = part.read_bytes()
-    (found,) = recover(tmp_path)
+    (recovery,) = recover(tmp_path)
     output = tmp_path / "episode.recovered.mcap"
-    assert (found.status, found.output, found.steps) == ("recovered", output, 53)
+    assert (recovery.status, recovery.output, recovery.steps) == ("recovered", output, 53)
     assert part.read_bytes() == before
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["episode.mcap.part", "episode.recovered.mcap"]
     episode = read_episode(output)
@@ -105,21 +105,21 @@ def test_a_broken_recording_becomes_an_episode_up_to_its_last_complete_step(tmp_
     assert len(episode.meta.route_class) == len(MAP.obstacles)
 
 
-def test_the_file_says_what_it_was_made_from(tmp_path, whole):
-    part = broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+def test_the_recovery_record_describes_the_source(tmp_path, whole):
+    part = truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     recover(tmp_path)
     metadata = read_metadata(tmp_path / "episode.recovered.mcap")
-    told = metadata["recovery"]
-    assert told["source"] == "episode.mcap.part"
-    assert told["source_sha256"] == hashlib.sha256(part.read_bytes()).hexdigest()
-    assert (told["source_bytes"], told["steps"]) == (str(part.stat().st_size), "53")
-    assert told["stopped_by"].startswith("expected an intact and complete MCAP file, found its end at byte")
+    summary = metadata["recovery"]
+    assert summary["source"] == "episode.mcap.part"
+    assert summary["source_sha256"] == hashlib.sha256(part.read_bytes()).hexdigest()
+    assert (summary["source_bytes"], summary["steps"]) == (str(part.stat().st_size), "53")
+    assert summary["stopped_by"].startswith("expected an intact and complete MCAP file, found its end at byte")
     assert metadata["consent"] == {"consent_id": "C-1", "license": "CC-BY-4.0"}
 
 
 def test_every_topic_is_copied_with_its_times_up_to_the_same_step(tmp_path, whole):
     truth_path, _ = whole
-    broken_off(tmp_path / "episode.mcap.part", truth_path, 4)  # the event at step 61 closed a chunk
+    truncated(tmp_path / "episode.mcap.part", truth_path, 4)  # the event at step 61 closed a chunk
     recover(tmp_path)
     output = tmp_path / "episode.recovered.mcap"
     for topic, message, count in (
@@ -144,17 +144,19 @@ def test_every_topic_is_copied_with_its_times_up_to_the_same_step(tmp_path, whol
 def test_a_part_of_an_earlier_version_is_recovered_without_what_it_did_not_record(tmp_path, whole):
     truth_path, truth = whole
     earlier = tmp_path / "earlier.mcap"
-    kept = {record.id for record in library_records(truth_path) if isinstance(record, Channel) and not later(record)}
+    channel_ids = {
+        record.id for record in library_records(truth_path) if isinstance(record, Channel) and not later(record)
+    }
     records = [
         record
         for record in library_records(truth_path)
         if not (isinstance(record, Channel) and later(record))
-        and not (isinstance(record, Message) and record.channel_id not in kept)
+        and not (isinstance(record, Message) and record.channel_id not in channel_ids)
     ]
     write(records, earlier, chunk_size=8192)
     episode = read_episode(earlier)
     assert (episode.states == truth.states).all()
-    part = broken_off(tmp_path / "episode.mcap.part", earlier, 3)
+    part = truncated(tmp_path / "episode.mcap.part", earlier, 3)
     recover(tmp_path)
     output = part.with_name("episode.recovered.mcap")
     recovered = read_episode(output)
@@ -170,7 +172,7 @@ def later(channel: Channel) -> bool:
     return channel.topic.startswith(("/scene/transform", "/scene/solid/"))
 
 
-def test_what_happened_in_the_session_is_not_forgotten(tmp_path):
+def test_events_of_the_session_are_recovered(tmp_path):
     """A kill while the players look at the result, in a practice episode."""
     path = tmp_path / "episode.mcap"
     world = TableWorld(MAP)
@@ -211,17 +213,17 @@ def test_an_episode_of_one_device_is_flagged_after_a_crash_too(tmp_path):
 
 
 def test_a_second_run_does_nothing(tmp_path, whole):
-    broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     recover(tmp_path)
     output = tmp_path / "episode.recovered.mcap"
     content, modified = output.read_bytes(), output.stat().st_mtime_ns
-    (found,) = recover(tmp_path, finished=True)
-    assert (found.status, found.output, found.steps) == ("already_recovered", output, 53)
+    (recovery,) = recover(tmp_path, finished=True)
+    assert (recovery.status, recovery.output, recovery.steps) == ("already_recovered", output, 53)
     assert (output.read_bytes(), output.stat().st_mtime_ns) == (content, modified)
 
 
 def test_a_name_that_is_taken_is_not_overwritten(tmp_path, whole):
-    part = broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    part = truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     output = tmp_path / "episode.recovered.mcap"
     output.write_bytes(whole[0].read_bytes())
     with pytest.raises(OutputExistsError, match=re.escape(str(output))):
@@ -230,18 +232,22 @@ def test_a_name_that_is_taken_is_not_overwritten(tmp_path, whole):
 
 
 def test_what_an_interrupted_run_left_is_started_anew(tmp_path, whole):
-    broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     (tmp_path / "episode.recovered.mcap.unfinished").write_bytes(b"half")
-    (found,) = recover(tmp_path)
-    assert found.status == "recovered"
+    (recovery,) = recover(tmp_path)
+    assert recovery.status == "recovered"
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["episode.mcap.part", "episode.recovered.mcap"]
 
 
 def test_a_complete_file_that_only_lacks_its_name_keeps_its_result(tmp_path, whole):
     truth_path, truth = whole
     (tmp_path / "episode.mcap.part").write_bytes(truth_path.read_bytes())
-    (found,) = recover(tmp_path)
-    assert (found.status, found.steps, found.detail) == ("recovered", 95, "it was complete but for its name")
+    (recovery,) = recover(tmp_path)
+    assert (recovery.status, recovery.steps, recovery.detail) == (
+        "recovered",
+        95,
+        "it was complete except for its name",
+    )
     episode = read_episode(tmp_path / "episode.recovered.mcap")
     assert episode.final_state.tobytes() == truth.final_state.tobytes()
     meta = episode.meta
@@ -250,22 +256,22 @@ def test_a_complete_file_that_only_lacks_its_name_keeps_its_result(tmp_path, who
 
 def test_parts_in_folders_below_are_found(tmp_path, whole):
     (tmp_path / "a" / "b").mkdir(parents=True)
-    broken_off(tmp_path / "a" / "b" / "one.mcap.part", whole[0], 3)
-    assert [one.source.name for one in recover(tmp_path)] == ["one.mcap.part"]
+    truncated(tmp_path / "a" / "b" / "one.mcap.part", whole[0], 3)
+    assert [recovery.source.name for recovery in recover(tmp_path)] == ["one.mcap.part"]
     assert (tmp_path / "a" / "b" / "one.recovered.mcap").exists()
 
 
 @pytest.mark.parametrize("chunks", [0, 1])
 def test_a_recording_without_a_complete_step_stays_as_it_is(tmp_path, whole, chunks):
-    broken_off(tmp_path / "episode.mcap.part", whole[0], chunks)
-    (found,) = recover(tmp_path)
-    assert (found.status, found.detail) == ("empty", "it ends before the first complete step")
+    truncated(tmp_path / "episode.mcap.part", whole[0], chunks)
+    (recovery,) = recover(tmp_path)
+    assert (recovery.status, recovery.detail) == ("empty", "it ends before the first complete step")
     assert [entry.name for entry in tmp_path.iterdir()] == ["episode.mcap.part"]
 
 
 def test_an_empty_file_is_no_problem(tmp_path):
     (tmp_path / "episode.mcap.part").touch()
-    assert [(one.status, one.detail) for one in recover(tmp_path)] == [("empty", "0 bytes")]
+    assert [(recovery.status, recovery.detail) for recovery in recover(tmp_path)] == [("empty", "0 bytes")]
 
 
 def _edited(path, old, new):
@@ -276,20 +282,20 @@ def _edited(path, old, new):
 
 def test_metadata_that_is_not_what_was_written_is_refused(tmp_path, whole):
     """No check sum of the format covers metadata in a file without an end: the digest at the start does."""
-    part = broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    part = truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     _edited(part, b"P01-a", b"P01-b")
-    (found,) = recover(tmp_path)
-    assert found.status == "damaged"
-    assert found.detail == f"{part}: expected the metadata that was written at the start, found another"
+    (recovery,) = recover(tmp_path)
+    assert recovery.status == "damaged"
+    assert recovery.detail == f"{part}: expected the metadata that was written at the start, found another"
     assert [entry.name for entry in tmp_path.iterdir()] == ["episode.mcap.part"]
 
 
 def test_a_map_that_is_not_what_was_written_is_refused(tmp_path, whole):
-    part = broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    part = truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     _edited(part, b'"obstacle_size": 50', b'"obstacle_size": 51')
-    (found,) = recover(tmp_path)
-    assert "expected the start of a recording of this task: metadata and map, found damage" in found.detail
-    assert "an attachment that fails its check sum" in found.detail
+    (recovery,) = recover(tmp_path)
+    assert "expected the start of a recording of this task: metadata and map, found damage" in recovery.detail
+    assert "an attachment that fails its check sum" in recovery.detail
 
 
 def test_other_files_are_refused(tmp_path):
@@ -297,21 +303,21 @@ def test_other_files_are_refused(tmp_path):
     part.write_bytes(b"not an MCAP file at all")
     with pytest.raises(FileFormatError, match="metadata and map, found a text file"):
         recover_file(part)
-    with pytest.raises(FileFormatError, match="expected a folder of recordings, found nothing there"):
+    with pytest.raises(FileFormatError, match="expected a folder of recordings, found no such file or folder"):
         recover(tmp_path / "none")
 
 
 def test_damage_within_a_recording_ends_the_episode_before_it(tmp_path, whole):
     truth_path, truth = whole
-    part = broken_off(tmp_path / "episode.mcap.part", truth_path, 5)
+    part = truncated(tmp_path / "episode.mcap.part", truth_path, 5)
     content = bytearray(part.read_bytes())
     chunks = [begin for begin, _ in damage.record_spans(truth_path.read_bytes()) if content[begin : begin + 1] == b"\6"]
     third = chunks[2]
     content[third + 200] ^= 1  # in the chunk of steps 27-53
     part.write_bytes(content)
-    (found,) = recover(tmp_path)
-    assert (found.status, found.steps) == ("recovered", 26)
-    assert "expected an intact and complete MCAP file, found damage (" in found.detail
+    (recovery,) = recover(tmp_path)
+    assert (recovery.status, recovery.steps) == ("recovered", 26)
+    assert "expected an intact and complete MCAP file, found damage (" in recovery.detail
     assert read_episode(tmp_path / "episode.recovered.mcap").actions.tobytes() == truth.actions[:26].tobytes()
 
 
@@ -321,11 +327,11 @@ def test_damaged_finished_recordings_are_reported_and_only_on_request_recovered(
     content = truth_path.read_bytes()
     path.write_bytes(content[:-20])
     assert recover(tmp_path) == []
-    (found,) = recover(tmp_path, finished=True)
-    assert (found.status, found.output) == ("damaged", None)
-    assert found.detail.startswith(f"{path}: expected an intact and complete MCAP file")
-    (found,) = recover(tmp_path, damaged=True)
-    assert (found.status, found.steps) == ("recovered", 95)
+    (recovery,) = recover(tmp_path, finished=True)
+    assert (recovery.status, recovery.output) == ("damaged", None)
+    assert recovery.detail.startswith(f"{path}: expected an intact and complete MCAP file")
+    (recovery,) = recover(tmp_path, damaged=True)
+    assert (recovery.status, recovery.steps) == ("recovered", 95)
     assert path.read_bytes() == content[:-20]
     episode = read_episode(tmp_path / "episode.recovered.mcap")
     assert episode.actions.tobytes() == truth.actions.tobytes()
@@ -357,8 +363,8 @@ def test_a_recording_that_runs_is_left_alone(tmp_path):
     assert process.stdout is not None
     with process:
         assert process.stdout.readline() == "recorded\n"
-        (found,) = recover(tmp_path)
-        assert (found.status, found.detail) == ("running", "another process is recording it")
+        (recovery,) = recover(tmp_path)
+        assert (recovery.status, recovery.detail) == ("running", "another process is recording it")
         assert [entry.name for entry in tmp_path.iterdir()] == ["episode.mcap.part"]
         process.communicate("\n", timeout=60)
     assert len(read_episode(path).actions) == 100
@@ -366,14 +372,14 @@ def test_a_recording_that_runs_is_left_alone(tmp_path):
 
 
 def test_the_command_says_what_became_of_each_file(tmp_path, whole, capsys):
-    broken_off(tmp_path / "one.mcap.part", whole[0], 3)
+    truncated(tmp_path / "one.mcap.part", whole[0], 3)
     (tmp_path / "two.mcap.part").touch()
     assert main(["recover", str(tmp_path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["recovered"], told["damaged"]) == (1, 0)
-    assert list(told["files"]) == ["one.mcap.part", "two.mcap.part"]
-    assert told["files"]["one.mcap.part"].startswith("recovered as one.recovered.mcap, 53 steps: expected an intact")
-    assert told["files"]["two.mcap.part"] == "empty: 0 bytes"
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["recovered"], summary["damaged"]) == (1, 0)
+    assert list(summary["files"]) == ["one.mcap.part", "two.mcap.part"]
+    assert summary["files"]["one.mcap.part"].startswith("recovered as one.recovered.mcap, 53 steps: expected an intact")
+    assert summary["files"]["two.mcap.part"] == "empty: 0 bytes"
     (tmp_path / "three.mcap").write_bytes(b"not an MCAP file at all")
     assert main(["recover", str(tmp_path)]) == 1
     printed = capsys.readouterr().out
@@ -430,13 +436,13 @@ def test_the_study_sees_wrong_numbers_and_other_exceptions(tmp_path):
 def test_a_kill_costs_at_most_a_second_of_the_running_episode(tmp_path):
     """A sample of tests/benchmarks/kill.py."""
     kills = list(kill.study(3, 1, tmp_path, 0.5, 2.5, at_once=1))
-    assert all(one.handed > 0 for one in kills)
-    assert max(one.lost for one in kills) <= 30
-    assert Counter((one.touched, one.unreadable) for one in kills) == {(0, 0): 3}
+    assert all(kill_result.handed > 0 for kill_result in kills)
+    assert max(kill_result.lost for kill_result in kills) <= 30
+    assert Counter((kill_result.touched, kill_result.unreadable) for kill_result in kills) == {(0, 0): 3}
 
 
 def test_metadata_of_the_source_stays_in_order(tmp_path, whole):
-    broken_off(tmp_path / "episode.mcap.part", whole[0], 3)
+    truncated(tmp_path / "episode.mcap.part", whole[0], 3)
     recover(tmp_path)
     with (tmp_path / "episode.recovered.mcap").open("rb") as file:
         names = [record.name for record in StreamReader(file).records if isinstance(record, Metadata)]

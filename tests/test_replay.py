@@ -1,4 +1,4 @@
-"""A recording again: in the window, as films and pictures, checked, and in Rerun."""
+"""Replay: window, video, GIF, contact sheet, verification and Rerun."""
 
 import json
 import math
@@ -14,12 +14,12 @@ from PIL import Image, ImageSequence
 from straight_carry import record
 
 from copolicy.collect.cli import main
-from copolicy.collect.replay.film import write_gif, write_video
 from copolicy.collect.replay.playback import Playback
 from copolicy.collect.replay.sheet import draw_sheet, write_sheet
-from copolicy.collect.replay.track import read_track, sampled
+from copolicy.collect.replay.track import frame_positions, read_track
 from copolicy.collect.replay.verify import verify
-from copolicy.collect.replay.view import SIZE, ReplayView, Shown
+from copolicy.collect.replay.video import write_gif, write_video
+from copolicy.collect.replay.view import SIZE, ReplayView, ViewOptions
 from copolicy.collect.replay.viewer import Viewer
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, MissingExtraError, OutputExistsError
@@ -53,7 +53,7 @@ def test_a_track_has_every_state_force_and_event(track):
     assert track.forces_at(track.steps) == (0.0, 0.0, 0.0, 0.0)
     thetas = np.array([pose[2] for pose in track.poses])
     assert track.interaction == pytest.approx(interaction_force(thetas[1:], track.episode.actions))
-    assert [(one.step, one.kind, one.detail) for one in track.moments] == [(40, "pause", "focus lost")]
+    assert [(event.step, event.kind, event.detail) for event in track.events] == [(40, "pause", "focus lost")]
 
 
 def test_between_two_states_the_table_is_between_them(track):
@@ -66,7 +66,7 @@ def test_between_two_states_the_table_is_between_them(track):
 
 @pytest.mark.parametrize(("fps", "speed", "stride"), [(30, 1.0, 1.0), (60, 1.0, 0.5), (30, 4.0, 4.0), (12, 1.0, 2.5)])
 def test_frames_of_a_film_are_evenly_spaced_and_end_at_the_end(track, fps, speed, stride):
-    positions = sampled(track, fps, speed)
+    positions = frame_positions(track, fps, speed)
     assert np.allclose(np.diff(positions[:-1]), stride)
     assert positions[-1] == track.steps
     assert positions[-2] < track.steps
@@ -75,7 +75,7 @@ def test_frames_of_a_film_are_evenly_spaced_and_end_at_the_end(track, fps, speed
 def test_a_recording_that_broke_off_is_sent_to_recover(recording, tmp_path):
     part = tmp_path / "episode.mcap.part"
     part.write_bytes(recording.read_bytes()[:3000])
-    with pytest.raises(FileFormatError, match=r"found one that broke off \(copolicy-collect recover helps\)"):
+    with pytest.raises(FileFormatError, match=r"found an unfinished one \(see copolicy-collect recover\)"):
         read_track(part)
 
 
@@ -117,9 +117,9 @@ def test_speed_has_ends():
 def test_the_picture_shows_the_table_where_it_is(track):
     surface = pygame.Surface(SIZE, depth=32)
     view = ReplayView(track)
-    view.draw(surface, Playback(track.steps), Shown(trails=False, forces=False, hint=False))
+    view.draw(surface, Playback(track.steps), ViewOptions(trails=False, forces=False, hint=False))
     start = pixels(surface).copy()
-    view.draw(surface, Playback(track.steps, position=track.steps), Shown(trails=False, forces=False, hint=False))
+    view.draw(surface, Playback(track.steps, position=track.steps), ViewOptions(trails=False, forces=False, hint=False))
     end = pixels(surface)
     x, y, _ = track.poses[0]
     board = (round(y) + 60, round(x))
@@ -135,10 +135,10 @@ def test_each_switch_changes_the_picture(track, switch):
     surface = pygame.Surface(SIZE, depth=32)
     view = ReplayView(track)
     playback = Playback(track.steps, position=60.0)
-    view.draw(surface, playback, Shown())
+    view.draw(surface, playback, ViewOptions())
     before = pixels(surface).copy()
-    value = "saved" if switch == "message" else not getattr(Shown(), switch)
-    view.draw(surface, playback, replace(Shown(), **{switch: value}))
+    value = "saved" if switch == "message" else not getattr(ViewOptions(), switch)
+    view.draw(surface, playback, replace(ViewOptions(), **{switch: value}))
     assert (pixels(surface) != before).any()
 
 
@@ -147,7 +147,7 @@ def test_any_size_of_window_is_drawn(track, size):
     surface = pygame.Surface(size, depth=32)
     view = ReplayView(track)
     for position in (0.0, 33.3, track.steps):
-        view.draw(surface, Playback(track.steps, position=position), Shown(help=True))
+        view.draw(surface, Playback(track.steps, position=position), ViewOptions(help=True))
     assert len(np.unique(pixels(surface).reshape(-1, 3), axis=0)) > 20
 
 
@@ -196,9 +196,9 @@ def test_keys_play_step_and_change_speed(viewer, track):
     press(viewer, pygame.K_f)
     press(viewer, pygame.K_h)
     viewer.draw()
-    assert (viewer.shown.trails, viewer.shown.forces, viewer.shown.help) == (False, False, True)
+    assert (viewer.options.trails, viewer.options.forces, viewer.options.help) == (False, False, True)
     press(viewer, pygame.K_ESCAPE)
-    assert (viewer.shown.help, viewer.open) == (False, True)
+    assert (viewer.options.help, viewer.open) == (False, True)
     press(viewer, pygame.K_ESCAPE)
     assert not viewer.open
 
@@ -238,10 +238,10 @@ def test_a_picture_is_saved_beside_the_recording_and_none_overwritten(recording,
     viewer = Viewer(read_track(path), clock)
     for _ in range(2):
         press(viewer, pygame.K_s)
-    assert viewer.shown.message == "saved mine_step_0000-2.png"
+    assert viewer.options.message == "saved mine_step_0000-2.png"
     clock.now = 10.0
     viewer.advance(0.0)
-    assert viewer.shown.message == ""
+    assert viewer.options.message == ""
     assert sorted(entry.name for entry in tmp_path.iterdir()) == [
         "mine.mcap", "mine_step_0000-2.png", "mine_step_0000.png",
     ]  # fmt: skip
@@ -270,13 +270,13 @@ def frames_of(path):
 
 def test_a_video_shows_every_step(track, tmp_path):
     path = tmp_path / "out" / "episode.mp4"
-    told = write_video(track, path, speed=8.0, width=301)
+    result = write_video(track, path, speed=8.0, width=301)
     frames = frames_of(path)
-    assert len(frames) == told["pictures"] == math.ceil(track.steps / 8) + 1 + 30
+    assert len(frames) == result["pictures"] == math.ceil(track.steps / 8) + 1 + 30
     assert frames[0].shape == (220, 300, 3)
     assert (np.abs(frames[0].astype(int) - frames[-1]).max(axis=2) > 60).sum() > 200
     drawn = pygame.Surface((300, 220), depth=32)
-    ReplayView(track).draw(drawn, Playback(track.steps, position=0.0, speed=8.0), Shown(hint=False))
+    ReplayView(track).draw(drawn, Playback(track.steps, position=0.0, speed=8.0), ViewOptions(hint=False))
     assert np.abs(pixels(drawn).astype(int) - frames[0]).mean() < 6
     assert [entry.name for entry in path.parent.iterdir()] == ["episode.mp4"]
     with pytest.raises(OutputExistsError):
@@ -285,18 +285,18 @@ def test_a_video_shows_every_step(track, tmp_path):
 
 def test_a_gif_runs_for_ever_at_its_speed(track, tmp_path):
     path = tmp_path / "episode.gif"
-    told = write_gif(track, path, speed=8.0, width=240)
+    result = write_gif(track, path, speed=8.0, width=240)
     with Image.open(path) as image:
         assert (image.size, image.info["loop"]) == ((240, 176), 0)
         duration = sum(frame.info["duration"] for frame in ImageSequence.Iterator(image))
-    assert duration / 1000 == pytest.approx(told["seconds"], rel=0.05)
+    assert duration / 1000 == pytest.approx(result["seconds"], rel=0.05)
 
 
 def test_a_sheet_has_pictures_from_start_to_end(track, tmp_path):
-    told = write_sheet(track, tmp_path / "sheet.png", frames=7, width=900)
-    assert (told["steps"][0], told["steps"][-1], len(told["steps"])) == (0, track.steps, 7)
+    result = write_sheet(track, tmp_path / "sheet.png", frames=7, width=900)
+    assert (result["steps"][0], result["steps"][-1], len(result["steps"])) == (0, track.steps, 7)
     surface = pygame.image.load(tmp_path / "sheet.png")
-    assert list(surface.get_size()) == told["size"]
+    assert list(surface.get_size()) == result["size"]
     drawn, _ = draw_sheet(track, 7, 900)
     assert (pixels(surface) == pixels(drawn)).all()
     with pytest.raises(OutputExistsError):
@@ -371,9 +371,9 @@ def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
         PATH=fake_ffmpeg(tmp_path / "bin"),
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
-    told = json.loads(run.stdout)["video"]
+    result = json.loads(run.stdout)["video"]
     size, *command = out.read_text(encoding="utf-8").split()
-    assert int(size) == told["pictures"] * 300 * 220 * 3
+    assert int(size) == result["pictures"] * 300 * 220 * 3
     assert command[command.index("-s") + 1] == "300x220"
     failing = fake_ffmpeg(tmp_path / "bad", fails=True)
     run = run_without(["av"], "replay", recording, "--out", tmp_path / "b.mp4", "--speed", "8", PATH=failing)
@@ -411,13 +411,13 @@ def test_pictures_need_no_display(recording, tmp_path):
 
 
 def test_a_recording_of_this_world_is_reproduced(track):
-    told = verify(track)
-    assert told["reproduced"]
-    assert told["exit_status"] == 0
-    assert told["max_drift_px"] < 1e-9
-    assert told["max_drift_rad"] < 1e-12
-    assert told["first_step_beyond"] is None
-    assert told["recorded_end"] == told["simulated_end"] == f"goal after {track.steps} steps"
+    result = verify(track)
+    assert result["reproduced"]
+    assert result["exit_status"] == 0
+    assert result["max_drift_px"] < 1e-9
+    assert result["max_drift_rad"] < 1e-12
+    assert result["first_step_beyond"] is None
+    assert result["recorded_end"] == result["simulated_end"] == f"goal after {track.steps} steps"
 
 
 def test_the_bound_of_the_angular_acceleration_is_the_recorded_one(tmp_path):
@@ -425,29 +425,29 @@ def test_the_bound_of_the_angular_acceleration_is_the_recorded_one(tmp_path):
     eighth = Physics(angular_acceleration_limit=math.pi / 8)
     path = record(tmp_path / "eighth.mcap", 90, eighth, config, push=(1.0, 0.2, -1.0, 0.3))
     track = read_track(path)
-    told = verify(track)
-    assert (told["angular_limit"], told["reproduced"]) == (math.pi / 8, True)
-    told = verify(track, "pi/2")
-    assert (told["reproduced"], told["exit_status"]) == (False, 1)
-    assert told["max_drift_rad"] > 0.01
-    assert 0 < told["first_step_beyond"] < 90
+    result = verify(track)
+    assert (result["angular_limit"], result["reproduced"]) == (math.pi / 8, True)
+    result = verify(track, "pi/2")
+    assert (result["reproduced"], result["exit_status"]) == (False, 1)
+    assert result["max_drift_rad"] > 0.01
+    assert 0 < result["first_step_beyond"] < 90
 
 
 def test_a_state_that_the_actions_do_not_lead_to_is_found(track):
     states = track.episode.states.copy()
     states[50:, 0] += 0.02
     bent = replace(track, episode=replace(track.episode, states=states))
-    told = verify(bent)
-    assert (told["reproduced"], told["first_step_beyond"]) == (False, 50)
-    assert told["max_drift_px"] == pytest.approx(0.02)
+    result = verify(bent)
+    assert (result["reproduced"], result["first_step_beyond"]) == (False, 50)
+    assert result["max_drift_px"] == pytest.approx(0.02)
     assert verify(bent, limit_px=0.05)["reproduced"]
 
 
 def test_an_end_that_the_world_does_not_see_is_found(track):
     meta = replace(track.episode.meta, termination_reason="collision_obstacle")
-    told = verify(replace(track, episode=replace(track.episode, meta=meta)))
-    assert told["max_drift_px"] < 1e-9
-    assert (told["reproduced"], told["simulated_end"]) == (False, f"goal after {track.steps} steps")
+    result = verify(replace(track, episode=replace(track.episode, meta=meta)))
+    assert result["max_drift_px"] < 1e-9
+    assert (result["reproduced"], result["simulated_end"]) == (False, f"goal after {track.steps} steps")
 
 
 @pytest.mark.parametrize(

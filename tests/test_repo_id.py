@@ -1,4 +1,4 @@
-"""Names of repositories: our rules are those of the Hub's client, and hold before anything is made."""
+"""Names of repositories are checked by the rules of the Hub's client before any work."""
 
 import itertools
 import random
@@ -22,11 +22,11 @@ def _accepted_by_the_client(text: str) -> bool:
         validate_repo_id(text)
     except HFValidationError:
         return False
-    return "/" in text  # a user is wanted here
+    return "/" in text  # a user is required here
 
 
 def _names():
-    """Every short name of the characters that the rules are about, and many long and random ones."""
+    """All short names of the characters in the rules, and many long and random ones."""
     for length in range(1, 4):
         yield from (f"u/{''.join(name)}" for name in itertools.product("aA0_.-", repeat=length))
         yield from (f"{''.join(name)}/n" for name in itertools.product("a_.-", repeat=length))
@@ -58,10 +58,10 @@ def test_the_rules_are_those_of_the_hubs_client():
         ("m" * 97 + "/a", "at most 96 characters each"),
     ],
 )
-def test_the_rule_that_is_broken_is_named(text, reason):
+def test_the_violated_rule_is_named(text, reason):
     with pytest.raises(InvalidValueError) as error:
         checked_repo_id(text)
-    assert str(error.value) == f"--repo-id: expected USER/NAME as the Hub takes it ({reason}), found {text!r}"
+    assert str(error.value) == f"--repo-id: expected USER/NAME that the Hub accepts ({reason}), found {text!r}"
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -80,22 +80,22 @@ def test_the_rule_that_is_broken_is_named(text, reason):
         (dataset, ["check", "--revision", "main"]),
     ],
 )
-def test_every_command_refuses_it_before_it_looks_at_anything(command, arguments, name, tmp_path, capsys):
+def test_every_command_refuses_an_invalid_name_first(command, arguments, name, tmp_path, capsys):
     places = {"here": tmp_path / "there is nothing here", "out": tmp_path / "out"}
     assert command([*(part.format(**places) for part in arguments), name]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "expected USER/NAME as the Hub takes it (" in error
+    assert "expected USER/NAME that the Hub accepts (" in error
     assert error.endswith(f"found {name!r}\n")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("flag", ["dataset.repo_id", "policy.repo_id"])
 @pytest.mark.parametrize("name", [name for name in REFUSED if name != "table"])
-def test_training_refuses_it_before_lerobot_is_loaded(flag, name, capsys):
+def test_training_refuses_an_invalid_name_before_importing_lerobot(flag, name, capsys):
     assert train([f"--{flag}={name}"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(f"copolicy-train: --{flag}: expected USER/NAME as the Hub takes it (")
+    assert error.startswith(f"copolicy-train: --{flag}: expected USER/NAME that the Hub accepts (")
     assert error.count("\n") == 1
 
 

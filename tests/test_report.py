@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow.parquet as parquet
 import pytest
 from playwright.sync_api import expect
-from report_page import column, picture
+from report_page import canvas_pixels, column
 
 from copolicy.cards.cli import main
 from copolicy.cards.facts import DatasetFacts
@@ -15,7 +15,7 @@ from copolicy.cards.facts import DatasetFacts
 EPISODES = 30
 
 
-def test_the_top_says_that_pairs_are_simulated(visit, report):
+def test_simulated_pairs_are_named_at_the_top(visit, report):
     page = visit.open(report)
     assert page.title() == "Simulated <i>pairs</i>"
     assert page.locator("h1").inner_text() == "Simulated <i>pairs</i>"
@@ -29,17 +29,17 @@ def test_filters_choose_episodes_for_the_whole_page(visit, report, report_set):
     page = visit.open(report)
     episodes = DatasetFacts.read(report_set).episodes
     pair = episodes[0]["pair_id"]
-    chosen = [episode for episode in episodes if episode["pair_id"] == pair]
-    assert 0 < len(chosen) < EPISODES
+    selected = [episode for episode in episodes if episode["pair_id"] == pair]
+    assert 0 < len(selected) < EPISODES
     page.get_by_role("combobox", name="Pair", exact=True).select_option(pair)
-    expect(page.locator("#filter-count")).to_have_text(f"{len(chosen)} of {EPISODES} episodes")
+    expect(page.locator("#filter-count")).to_have_text(f"{len(selected)} of {EPISODES} episodes")
     assert set(column(page, 2)) == {pair}
     assert page.locator("#pair-table tbody tr").count() == 1
-    assert page.locator("#tiles strong").first.inner_text() == str(len(chosen))
-    page.get_by_role("searchbox", name="Find").fill(f"#{chosen[0]['episode_index']} {chosen[0]['map_id']}")
-    assert column(page, 1) == [str(chosen[0]["episode_index"])]
+    assert page.locator("#tiles strong").first.inner_text() == str(len(selected))
+    page.get_by_role("searchbox", name="Find").fill(f"#{selected[0]['episode_index']} {selected[0]['map_id']}")
+    assert column(page, 1) == [str(selected[0]["episode_index"])]
     page.get_by_role("searchbox", name="Find").fill("nothing has this name")
-    expect(page.locator("#episode-count")).to_have_text("No episode fits what is chosen above.")
+    expect(page.locator("#episode-count")).to_have_text("No episode matches the filters above.")
     page.get_by_role("button", name="Show all").click()
     expect(page.locator("#filter-count")).to_have_text(f"{EPISODES} of {EPISODES} episodes")
 
@@ -77,12 +77,15 @@ def test_it_fits_a_narrow_screen(visit, report, tmp_path):
 def test_dark_colours_are_a_choice(visit, report):
     page = visit.open(report)
     page.emulate_media(color_scheme="light")
-    light, panel = page.evaluate("getComputedStyle(document.body).backgroundColor"), picture(page, "#panels canvas")
+    light, panel = (
+        page.evaluate("getComputedStyle(document.body).backgroundColor"),
+        canvas_pixels(page, "#panels canvas"),
+    )
     for name in ("light", "dark"):
         page.locator("#theme").click()
         expect(page.locator("#theme")).to_have_text(f"Colours: {name}")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") != light
-    assert picture(page, "#panels canvas") != panel
+    assert canvas_pixels(page, "#panels canvas") != panel
 
 
 def test_every_control_has_a_name(visit, report):

@@ -9,8 +9,8 @@ import pyarrow.parquet as parquet
 import pytest
 
 from copolicy.cards.cli import main
+from copolicy.cards.episode_frames import read_frames
 from copolicy.cards.facts import DatasetFacts
-from copolicy.cards.frames import read_frames
 from copolicy.cards.report.payload import FRAME_SCALES, build_payload
 from copolicy.dataset.exceptions import FileFormatError
 
@@ -23,13 +23,13 @@ def test_frames_survive_their_packing(report_set):
     values = np.frombuffer(base64.b64decode(payload["frames"]), "<i2").reshape(-1, len(FRAME_SCALES))
     table = values / list(FRAME_SCALES.values())
     for row, frames in zip(payload["episodes"], read_frames(facts), strict=True):
-        part = table[row["from"] : row["from"] + row["frames"]]
-        np.testing.assert_allclose(part[:, :2], frames.states[:, :2], atol=0.0251)
-        np.testing.assert_allclose(np.cos(part[:, 2]), frames.states[:, 2], atol=1e-4)
-        np.testing.assert_allclose(np.sin(part[:, 2]), frames.states[:, 3], atol=1e-4)
-        np.testing.assert_allclose(part[:, 3:7], frames.actions, atol=2e-5)
+        columns = table[row["from"] : row["from"] + row["frames"]]
+        np.testing.assert_allclose(columns[:, :2], frames.states[:, :2], atol=0.0251)
+        np.testing.assert_allclose(np.cos(columns[:, 2]), frames.states[:, 2], atol=1e-4)
+        np.testing.assert_allclose(np.sin(columns[:, 2]), frames.states[:, 3], atol=1e-4)
+        np.testing.assert_allclose(columns[:, 3:7], frames.actions, atol=2e-5)
         assert frames.interaction is not None
-        np.testing.assert_allclose(part[:, 7], frames.interaction, atol=3e-5)
+        np.testing.assert_allclose(columns[:, 7], frames.interaction, atol=3e-5)
 
 
 def test_a_page_of_376_episodes_is_under_10_mb(report, report_set):
@@ -39,7 +39,7 @@ def test_a_page_of_376_episodes_is_under_10_mb(report, report_set):
     assert 376 * per_episode < 10e6
 
 
-def test_a_large_data_set_shows_fewer_frames_and_says_so(report_set):
+def test_a_large_data_set_shows_fewer_frames_and_states_it(report_set):
     facts = DatasetFacts.read(report_set)
     limit = facts.info["total_frames"] * len(FRAME_SCALES) - 1  # a byte less than half of what all take
     payload = build_payload(facts, "table", frame_bytes=limit)
@@ -48,7 +48,7 @@ def test_a_large_data_set_shows_fewer_frames_and_says_so(report_set):
     assert [row["frames"] for row in payload["episodes"]] == [-(-e["length"] // 3) for e in facts.episodes]
 
 
-def test_a_report_is_not_overwritten_unless_asked(report_set, tmp_path, capsys):
+def test_a_report_is_overwritten_on_request_only(report_set, tmp_path, capsys):
     out = tmp_path / "page.html"
     out.write_text("kept", encoding="utf-8")
     assert main(["report", str(report_set), "--out", str(out)]) == 2
@@ -58,7 +58,7 @@ def test_a_report_is_not_overwritten_unless_asked(report_set, tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
-def test_findings_that_are_not_there_are_named(report_set, tmp_path, capsys):
+def test_a_missing_file_of_findings_is_named(report_set, tmp_path, capsys):
     missing = tmp_path / "check.json"
     assert main(["report", str(report_set), "--out", str(tmp_path / "page.html"), "--findings", str(missing)]) == 2
     expected = f"{missing}: expected a file with the output of `copolicy-dataset check --json`, found none\n"

@@ -5,15 +5,15 @@ import re
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from report_page import picture
+from report_page import canvas_pixels
 
+from copolicy.cards.episode_frames import read_frames
 from copolicy.cards.facts import DatasetFacts
-from copolicy.cards.frames import read_frames
 
 EPISODES = 5
 
 
-def test_an_episode_plays_by_keyboard_alone(visit, report, report_set):
+def test_an_episode_plays_by_keyboard(visit, report, report_set):
     page = visit.open(report)
     open_first = page.get_by_role("button", name=re.compile(r"^Open Episode 0,"))
     open_first.focus()
@@ -22,7 +22,7 @@ def test_an_episode_plays_by_keyboard_alone(visit, report, report_set):
     expect(player).to_be_visible()
     expect(page.locator("#player-facts")).to_contain_text("simulated pair · pair ")
     frames = DatasetFacts.read(report_set).episodes[0]["length"]
-    start = picture(page, "#stage")
+    start = canvas_pixels(page, "#stage")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#player-readout")).to_contain_text(f"0.1 of {(frames - 1) / 10:.1f} s")
     page.keyboard.press("Shift+ArrowRight")
@@ -31,9 +31,9 @@ def test_an_episode_plays_by_keyboard_alone(visit, report, report_set):
     expect(page.locator("#scrub")).to_have_attribute(
         "aria-valuetext", f"{(frames - 1) / 10:.1f} of {(frames - 1) / 10:.1f} seconds"
     )
-    assert picture(page, "#stage") != start
+    assert canvas_pixels(page, "#stage") != start
     page.keyboard.press("Home")
-    assert picture(page, "#stage") == start
+    assert canvas_pixels(page, "#stage") == start
     page.keyboard.press(" ")
     expect(page.locator("#play")).to_have_attribute("aria-label", "Pause")
     expect(page.locator("#player-readout")).to_contain_text(re.compile(r"^0\.[2-9] of"))

@@ -32,7 +32,7 @@ def test_findings_and_statistics_are_shown(visit, report):
     expect(rows.nth(1)).to_contain_text("one split only")
 
 
-def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
+def test_commands_that_were_not_run_are_stated(visit, report_set, tmp_path, capsys):
     root = Path(
         shutil.copytree(report_set, tmp_path / "table", ignore=shutil.ignore_patterns("copolicy_*.json", "*.html"))
     )
@@ -41,12 +41,12 @@ def test_what_was_not_run_is_said(visit, report_set, tmp_path, capsys):
     assert summary["findings"] == "copolicy-dataset check was not run"
     assert summary["statistics"] == "copolicy-dataset stats was not run"
     page = visit.open(root / "report.html")
-    expect(page.locator("#finding-list")).to_contain_text("copolicy-dataset check was not run on this data set")
-    for place in ("#statistic-list", "#route-statistics"):
-        expect(page.locator(place)).to_contain_text("copolicy-dataset stats was not run on this data set")
+    expect(page.locator("#finding-list")).to_contain_text("There are no stored findings of copolicy-dataset check")
+    for selector in ("#statistic-list", "#route-statistics"):
+        expect(page.locator(selector)).to_contain_text("copolicy-dataset stats was not run on this data set")
 
 
-def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
+def test_routes_are_shown_with_human_routes(visit, report_set, tmp_path):
     root = Path(shutil.copytree(report_set, tmp_path / "table"))
     document = route_document(["LL", "LR", "RR", "RL"] * 10, EPISODES)
     (root / STATISTICS_FILE).write_text(json.dumps(document), encoding="utf-8")
@@ -54,7 +54,7 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     routes = document["statistics"]["routes"]
     page = visit.open(root / "report.html", width=375)
     section = page.locator("#route-mix")
-    expect(section).to_contain_text("The episodes are of simulated pairs.")
+    expect(section).to_contain_text("The episodes were played by simulated pairs.")
     expect(section).not_to_contain_text("stale")
     figures = section.locator("figure")
     assert figures.count() == 3
@@ -62,12 +62,12 @@ def test_routes_are_shown_beside_those_of_people(visit, report_set, tmp_path):
     distance = routes["human_distance_2_obstacles"]
     low, high = distance["interval"]
     expect(figures.nth(1)).to_contain_text(f"2 obstacles: {distance['value']:.3f} bits ({low:.3f} to {high:.3f})")
-    expect(figures.nth(1)).to_contain_text("40 episodes of simulated pairs, 171 of people.")
+    expect(figures.nth(1)).to_contain_text("40 episodes of simulated pairs, 171 human demonstrations.")
     label = figures.nth(1).locator("svg").get_attribute("aria-label")
     assert label is not None
     human = distance["details"]["human"]["counts"]
-    word = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
-    assert f"RL 10 here, {human[word]} of people" in label
+    human_label = "RL" if distance["details"]["reading"] == "as labelled" else "LR"
+    assert f"RL 10 in this data set, {human[human_label]} of people" in label
 
     ((name, entry),) = routes["route_entropy"]["details"]["configurations"].items()
     cells = section.locator("#configuration-table tbody tr").first.locator("th, td").all_inner_texts()
@@ -96,9 +96,9 @@ def test_statistics_of_other_episodes_are_called_stale(visit, report_set, tmp_pa
     (root / STATISTICS_FILE).write_text(json.dumps(route_document(["RL"] * 6, EPISODES - 1)), encoding="utf-8")
     assert main(["report", str(root), "--overwrite"]) == 0
     page = visit.open(root / "report.html")
-    doubt = f"These statistics are stale. They were computed when the data set had {EPISODES - 1} episodes; it has"
-    for place in ("#route-statistics", "#statistic-list"):
-        expect(page.locator(place)).to_contain_text(doubt)
+    note = f"These statistics are stale. They were computed when the data set had {EPISODES - 1} episodes; it has"
+    for selector in ("#route-statistics", "#statistic-list"):
+        expect(page.locator(selector)).to_contain_text(note)
 
 
 def test_findings_about_another_content_are_called_stale(visit, report_set, tmp_path, capsys):

@@ -55,8 +55,8 @@ def test_everything_that_differs_is_named_with_its_place_and_line(tmp_path):
 
 
 def test_a_key_that_is_there_twice(tmp_path):
-    assert said(tmp_path, "name: a\nname: b\n") == ["name (line 2): is there twice"]
-    with pytest.raises(FileFormatError, match="the key 'name' twice in one mapping"):
+    assert said(tmp_path, "name: a\nname: b\n") == ["name (line 2): duplicate key"]
+    with pytest.raises(FileFormatError, match="duplicate key 'name' in one mapping"):
         document(tmp_path, '{"name": "a", "name": "b"}', "a.json")
 
 
@@ -66,7 +66,7 @@ def test_a_key_that_is_there_twice(tmp_path):
         ("a: &b [1]\nc: *b\n", "an alias (*name), which is not read in line 2"),
         ("a: [1\n", "expected ',' or ']', but got '<stream end>' in line 2"),
         ("a: !!python/object/apply:os.system [echo]\n", "could not determine a constructor for the tag"),
-        ("", "nothing in it"),
+        ("", "an empty file"),
         ("- 1\n", "found a list"),
     ],
 )

@@ -34,13 +34,13 @@ MARKS = ScenarioSet("peg", "lab", "3", (Mark(1), Mark(2), Mark(3)), (1, 2, 1), {
 
 def test_weights_and_splits():
     assert [mark.place for mark in MARKS.scheduled] == [1, 2, 2, 3]
-    test = MARKS.part("test")
+    test = MARKS.for_split("test")
     assert [mark.place for mark in test.scenarios] == [3, 1]
     assert (test.label, test.digest, test.describe()["from"]) == ("lab#test", MARKS.digest, "file")
     with pytest.raises(UnknownNameError, match="unknown split of lab 'train'; available: test"):
-        MARKS.part("train")
+        MARKS.for_split("train")
     with pytest.raises(UnknownNameError, match="available: none"):
-        test.part("test")
+        test.for_split("test")
 
 
 def test_the_digest_sees_scenarios_weights_and_splits_and_no_name():

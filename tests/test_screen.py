@@ -20,7 +20,7 @@ from copolicy.collect.screen.dialogs import (
 from copolicy.collect.screen.hud import Hud, SeatStatus, draw_hud
 from copolicy.collect.screen.outline_view import letterbox
 from copolicy.collect.sdl import pygame
-from copolicy.dataset.outline import between
+from copolicy.dataset.outline import interpolate_pose
 from copolicy.tasks.table.artist.table_view import TableView
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -54,8 +54,8 @@ def test_everything_stands_where_it_is_at_any_size(size):
         ((960.0 - 40.0, 180.0 - 40.0), palette.mix(palette.GREEN, palette.FLOOR, 0.62)),
         ((1100.0, 525.0), palette.FLOOR),
     ):
-        found = _colour(surface, view.to_screen(point))
-        assert _close(found, colour), (point, found, colour)
+        drawn = _colour(surface, view.to_screen(point))
+        assert _close(drawn, colour), (point, drawn, colour)
     assert sum(_colour(surface, view.to_screen((600.0, 450.0)))) < 320, "an obstacle is dark"
 
 
@@ -107,7 +107,7 @@ def test_nothing_is_drawn_beside_the_world():
 
 @pytest.mark.parametrize(("start", "end", "middle"), [(0.1, 0.3, 0.2), (6.2, 0.1, 6.2 + (0.1 - 6.2 + 2 * math.pi) / 2)])
 def test_a_pose_between_two_turns_the_shorter_way(start, end, middle):
-    x, y, theta = between((0.0, 10.0, start), (2.0, 20.0, end), 0.5)
+    x, y, theta = interpolate_pose((0.0, 10.0, start), (2.0, 20.0, end), 0.5)
     assert (x, y) == (1.0, 15.0)
     assert theta == pytest.approx(middle)
 
@@ -123,7 +123,7 @@ def test_dialogues_stay_in_the_window(size):
     surface = _surface(size)
     canvas = Canvas(surface)
     seats = (SeatStatus("a pad with a rather long name", (0.5, 0.5)), SeatStatus("keys", lost=True))
-    hud = Hud("P01   episode 1 of 36", 0.5, 12.3, 33.3, -12.0, seats, -0.8, late=3)
+    hud = Hud("P01   episode 1 of 36", 0.5, 12.3, 33.3, -12.0, seats, -0.8, late_ticks=3)
     for draw in (
         lambda: draw_hud(canvas, hud),
         lambda: draw_dialog(canvas, "A title", [Line("a line of text " * 9)], ["one", "two"] * 3, 1, hint="how"),

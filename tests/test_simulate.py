@@ -1,4 +1,4 @@
-"""Simulated recordings: reproducible, balanced, marked for what they are."""
+"""Simulated recordings: reproducible, balanced, marked as simulated."""
 
 import json
 import os
@@ -22,7 +22,7 @@ from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.collect.simulate.schedule import balanced_schedule
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, OutputExistsError, UnknownNameError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import RUNNING
 from copolicy.tasks.table.agents import PAIRS
 from copolicy.tasks.table.map_config import MapConfig
@@ -61,7 +61,7 @@ def run(path, config, physics=None):
         ((), SHORT, "timeout"),
     ],
 )
-def test_every_end_is_recorded_for_what_it_is(tmp_path, obstacles, physics, reason):
+def test_every_outcome_is_recorded(tmp_path, obstacles, physics, reason):
     config = MapConfig((240.0, 300.0, 3.14), (700.0, 300.0), obstacles)
     result = run(tmp_path / "one.mcap", config, physics)
     episode = read_episode(tmp_path / "one.mcap")
@@ -90,9 +90,9 @@ def numbers(folder):
 
 
 def test_equal_seeds_give_equal_bytes_for_one_and_two_workers(tmp_path):
-    one = simulate(tmp_path / "one", 4, 5, workers=1, physics=SHORT, started_ns=STARTED_NS)
-    two = simulate(tmp_path / "two", 4, 5, workers=2, physics=SHORT, started_ns=STARTED_NS)
-    later = simulate(tmp_path / "later", 3, 5, workers=1, physics=SHORT)
+    one = simulate(tmp_path / "one", 4, 5, workers=1, settings=SHORT, started_ns=STARTED_NS)
+    two = simulate(tmp_path / "two", 4, 5, workers=2, settings=SHORT, started_ns=STARTED_NS)
+    later = simulate(tmp_path / "later", 3, 5, workers=1, settings=SHORT)
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == [f"episode_{i:06d}.mcap" for i in range(4)]
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
@@ -102,14 +102,14 @@ def test_equal_seeds_give_equal_bytes_for_one_and_two_workers(tmp_path):
 
 
 def test_other_seeds_give_other_episodes(tmp_path):
-    simulate(tmp_path / "one", 2, 5, workers=1, physics=SHORT)
-    simulate(tmp_path / "two", 2, 6, workers=1, physics=SHORT)
+    simulate(tmp_path / "one", 2, 5, workers=1, settings=SHORT)
+    simulate(tmp_path / "two", 2, 6, workers=1, settings=SHORT)
     assert not set(numbers(tmp_path / "one").values()) & set(numbers(tmp_path / "two").values())
 
 
-def test_episodes_say_where_they_come_from(tmp_path):
+def test_metadata_of_simulated_episodes(tmp_path):
     pair = sorted(PAIRS)[0]
-    summary = simulate(tmp_path, 3, 1, "unseen", workers=1, orientations=True, pairs=[pair], physics=SHORT)
+    summary = simulate(tmp_path, 3, 1, "unseen", workers=1, orientations=True, pairs=[pair], settings=SHORT)
     assert (summary["episodes"], summary["success_rate"]) == (3, 0.0)
     assert summary["termination_reasons"] == {"timeout": 3}
     assert summary["bytes"] == sum(path.stat().st_size for path in tmp_path.iterdir())
@@ -165,7 +165,7 @@ def test_wrong_calls_say_what_is_wrong_and_write_nothing(tmp_path, arguments, er
 @pytest.mark.parametrize(
     "error", [OutputExistsError("a.mcap"), UnknownNameError("pair", "S99", PAIRS), InvalidValueError("a", "b", 3)]
 )
-def test_an_error_of_ours_survives_the_way_out_of_a_worker_process(error):
+def test_errors_can_be_pickled(error):
     arrived = pickle.loads(pickle.dumps(error))
     assert (type(arrived), str(arrived), arrived.exit_status) == (type(error), str(error), 2)
 
@@ -250,7 +250,7 @@ def test_either_a_recipe_or_a_number_of_episodes(tmp_path, capsys, flags, text):
     assert not (tmp_path / "out").exists()
 
 
-def test_an_unknown_recipe_lists_those_there_are(tmp_path, capsys):
+def test_an_unknown_recipe_lists_the_known_ones(tmp_path, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(["simulate", "--out", str(tmp_path / "out"), "--recipe", "pairs-sim-375"])
     assert stopped.value.code == 2
@@ -266,7 +266,7 @@ def test_an_unknown_recipe_lists_those_there_are(tmp_path, capsys):
         (["--start-noise", "1"], "1.0"), (["--clearance", "2"], "2.0"),
     ],
 )  # fmt: skip
-def test_what_a_recipe_decides_is_not_asked_for_beside_it(tmp_path, capsys, flag, found):
+def test_flags_that_a_recipe_decides_are_refused(tmp_path, capsys, flag, found):
     assert main(["simulate", "--out", str(tmp_path / "out"), "--recipe", "pairs-sim-376", *flag]) == 2
     assert capsys.readouterr().err == (
         f"copolicy-collect: {flag[0]}: expected nothing beside --recipe pairs-sim-376, which decides it, "
@@ -320,7 +320,7 @@ def test_start_noise_moves_the_starts_and_says_so(tmp_path):
     assert len(starts) == 6
 
 
-def test_a_displaced_start_touches_nothing_and_gives_up_on_a_hopeless_scale():
+def test_a_displaced_start_has_no_contact_and_is_unchanged_for_a_large_scale():
     config = MAP_SETS["training"][6]
     rng = np.random.default_rng(0)
     for _ in range(50):

@@ -5,7 +5,7 @@ import pytest
 from disk_order import inodes, record_disk_order
 
 from copolicy.dataset.exceptions import OutputExistsError
-from copolicy.dataset.files.staging import about, new_file, new_folder, replace_json, replacement, require_new
+from copolicy.dataset.files.staging import named_errors, new_file, new_folder, replace_json, replacement, require_new
 
 
 def names(folder):
@@ -42,7 +42,7 @@ def test_an_error_leaves_nothing(tmp_path, error):
 
 
 @pytest.mark.parametrize("place", range(2))
-def test_a_link_that_leads_nowhere_is_something(tmp_path, place):
+def test_a_broken_link_is_not_overwritten(tmp_path, place):
     paths = [tmp_path / "first", tmp_path / "second"]
     require_new(*paths)
     paths[place].symlink_to(tmp_path / "nowhere")
@@ -51,7 +51,7 @@ def test_a_link_that_leads_nowhere_is_something(tmp_path, place):
     require_new(*paths, overwrite=True)
 
 
-def test_what_is_there_stays(tmp_path):
+def test_an_existing_path_is_not_overwritten(tmp_path):
     (tmp_path / "set").mkdir()
     with pytest.raises(OutputExistsError) as error, new_folder(tmp_path / "set"):
         pytest.fail("not reached")
@@ -59,19 +59,19 @@ def test_what_is_there_stays(tmp_path):
     assert str(error.value) == expected
 
 
-def test_what_appears_meanwhile_stays_too(tmp_path):
+def test_a_path_created_during_the_block_is_not_overwritten(tmp_path):
     with pytest.raises(OutputExistsError):
         build_beside_another(tmp_path / "set")
     assert names(tmp_path) == ["set"]
 
 
-def test_a_broken_link_is_something(tmp_path):
+def test_a_broken_link_counts_as_an_existing_path(tmp_path):
     (tmp_path / "set").symlink_to(tmp_path / "nowhere")
     with pytest.raises(OutputExistsError), new_folder(tmp_path / "set"):
         pytest.fail("not reached")
 
 
-def test_what_a_killed_process_left_goes_where_the_name_is_fixed(tmp_path):
+def test_leftovers_under_a_fixed_suffix_are_deleted(tmp_path):
     (tmp_path / ".set.merging").mkdir()
     (tmp_path / ".set.merging" / "half").write_text("", encoding="utf-8")
     with new_folder(tmp_path / "set", "merging") as partial:
@@ -81,7 +81,7 @@ def test_what_a_killed_process_left_goes_where_the_name_is_fixed(tmp_path):
     assert names(tmp_path / "set") == []
 
 
-def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+def test_a_folder_is_synced_before_it_is_renamed(tmp_path, monkeypatch):
     order = record_disk_order(monkeypatch)
     with new_folder(tmp_path / "set") as partial:
         (partial / "data").mkdir(parents=True)
@@ -92,7 +92,7 @@ def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch)
     assert set(order[place + 1 :]) == inodes(tmp_path)
 
 
-def test_so_is_a_single_file(tmp_path, monkeypatch):
+def test_a_file_is_synced_before_it_is_renamed(tmp_path, monkeypatch):
     order = record_disk_order(monkeypatch)
     with new_file(tmp_path / "one") as partial:
         partial.write_text("x", encoding="utf-8")
@@ -100,7 +100,7 @@ def test_so_is_a_single_file(tmp_path, monkeypatch):
 
 
 class FixedNameError(OSError):
-    """As PyAV's errors: the name of the file cannot be changed."""
+    """Like PyAV's errors, with a read-only file name."""
 
     filename = property(lambda self: self.name)  # pyright: ignore[reportAssignmentType]
 
@@ -109,7 +109,7 @@ class FixedNameError(OSError):
         self.name = name
 
 
-def test_an_error_that_keeps_its_name_is_raised_anew_with_the_known_one(tmp_path):
+def test_an_error_with_a_read_only_file_name_is_replaced(tmp_path):
     with (
         pytest.raises(OSError, match=r"No space left on device") as caught,
         replacement(tmp_path / "film.mp4") as partial,
@@ -118,11 +118,11 @@ def test_an_error_that_keeps_its_name_is_raised_anew_with_the_known_one(tmp_path
     assert caught.value.filename == str(tmp_path / "film.mp4")
 
 
-def test_an_error_of_a_network_library_keeps_its_words(tmp_path):
+def test_an_error_of_a_network_library_keeps_its_message(tmp_path):
     class RemoteError(OSError):
         pass
 
-    with pytest.raises(RemoteError) as caught, about(tmp_path / "run"):
+    with pytest.raises(RemoteError) as caught, named_errors(tmp_path / "run"):
         raise RemoteError("404 Client Error")
     assert (caught.value.errno, caught.value.filename) == (None, None)
 

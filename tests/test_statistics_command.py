@@ -111,7 +111,7 @@ def test_damage_is_one_line(folder, tmp_path, capsys):
     assert main(["stats", str(tmp_path)]) == 2
     assert capsys.readouterr().err == (
         f"copolicy-dataset: {tmp_path}: expected a LeRobot v3 data set with meta/info.json, found none, "
-        f"but one in {folder}\n"
+        f"but a data set in {folder}\n"
     )
     (path,) = (folder / "data").glob("*/*.parquet")
     table = parquet.read_table(path)
@@ -140,7 +140,7 @@ def test_files_of_the_original_program(tmp_path, upstream):
     raw = str(upstream / "examples_scripted" / "raw")
     assert convert(["upstream", raw, "--out", str(root), "--repo-id", "local/t"]) == 0
     data, _ = read_trajectories(root)
-    known = [(row.route_class, route_class(data.path(n), row.map_config)) for n, row in enumerate(data.rows)]
+    known = [(row.route_class, route_class(data.path(n), row.scenario)) for n, row in enumerate(data.rows)]
     assert all(column == word for (column, word), row in zip(known, data.rows, strict=True) if row.success)
     assert main(["stats", str(root)]) == 0
     document = json.loads((root / STATISTICS_FILE).read_text(encoding="utf-8"))
@@ -162,7 +162,7 @@ def test_the_summary_is_one_line_a_value():
         "human_reference": {"routes": {}},
     }
     lines = list(_lines(summary(document)))
-    assert "  name  0.5 [0.4, 0.6] bits; by chance 0.1 [0, 0.2], p = 0.01" in lines
+    assert "  name  0.5 [0.4, 0.6] bits; null 0.1 [0, 0.2], p = 0.01" in lines
     assert "  none  - (too few)" in lines
     assert "  left_out  2 discarded" in lines
 

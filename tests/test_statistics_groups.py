@@ -3,8 +3,8 @@ import pytest
 from constructed_pairs import FREE, ONE, carried, row, still, trajectories
 
 from copolicy.dataset.statistics.energy_distance import energy_coefficient, energy_statistics, episode_distances
-from copolicy.dataset.statistics.pair_share import explained, pair_share_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap, circular_shift, exchangeable, permuted_within
+from copolicy.dataset.statistics.variance_explained import eta_squared, eta_squared_statistics
 from copolicy.dataset.statistics.visitation import Grid, visitation_statistics
 from copolicy.tasks.table.scene_outline import TableOutline
 
@@ -66,7 +66,7 @@ def test_visitation_of_eight_cells_alike_is_three_bits():
 
 def test_cells_in_an_obstacle_are_not_free():
     outline = TableOutline()
-    assert Grid.over(outline).free(outline.fixed(ONE)[2:]).sum() == 48 * 24 - 4
+    assert Grid.from_outline(outline).free(outline.fixed(ONE)[2:]).sum() == 48 * 24 - 4
 
 
 def test_pairs_on_separate_cells_diverge_by_a_bit_and_alike_by_none():
@@ -143,15 +143,15 @@ def test_splits_are_compared_where_there_are_some():
     estimates = energy_statistics(data, np.random.default_rng(0))
     assert estimates["energy_between_splits"].value == pytest.approx(1.0)
     assert "energy_between_halves" not in estimates
-    assert estimates["energy_between_pairs"].note == "there is only one"
+    assert estimates["energy_between_pairs"].note == "there is only one part"
 
 
 def test_explained_share_of_known_values():
     pairs, strata = np.array([0, 0, 1, 1]), np.zeros(4, dtype=int)
-    assert explained(np.array([[1.0], [1], [3], [3]]), pairs, strata) == pytest.approx(1.0)
-    assert explained(np.array([[1.0], [3], [1], [3]]), pairs, strata) == pytest.approx(0.0)
+    assert eta_squared(np.array([[1.0], [1], [3], [3]]), pairs, strata) == pytest.approx(1.0)
+    assert eta_squared(np.array([[1.0], [3], [1], [3]]), pairs, strata) == pytest.approx(0.0)
     # Means 1 and 3, deviations of 1 about them: 1 of 2.
-    assert explained(np.array([[0.0], [2], [2], [4]]), pairs, strata) == pytest.approx(0.5)
+    assert eta_squared(np.array([[0.0], [2], [2], [4]]), pairs, strata) == pytest.approx(0.5)
 
 
 def test_routes_that_each_pair_always_takes_are_the_pairs():
@@ -159,7 +159,7 @@ def test_routes_that_each_pair_always_takes_are_the_pairs():
     data = trajectories(
         [(carried(words[n % 2], ONE), None) for n in range(40)], [row(pair_id="AB"[n % 2]) for n in range(40)]
     )
-    estimate = pair_share_statistics(data, _bootstrap(data), np.random.default_rng(0))["route_between_pair_share"]
+    estimate = eta_squared_statistics(data, _bootstrap(data), np.random.default_rng(0))["route_between_pair_share"]
     assert estimate.value == pytest.approx(1.0)
     assert estimate.null is not None
     assert estimate.null.p == pytest.approx(1 / 1000)
@@ -172,7 +172,7 @@ def test_routes_by_the_toss_of_a_coin_are_not_the_pairs():
         [(carried("LR"[rng.integers(2)], ONE), None) for _ in range(60)],
         [row(pair_id="ABCDE"[n % 5]) for n in range(60)],
     )
-    estimate = pair_share_statistics(data, _bootstrap(data), rng)["route_between_pair_share"]
+    estimate = eta_squared_statistics(data, _bootstrap(data), rng)["route_between_pair_share"]
     assert estimate.null is not None
     assert estimate.null.p > 0.05
     assert estimate.null.mean == pytest.approx(4 / 59, abs=0.02)  # (pairs - 1) / (episodes - 1)
@@ -182,7 +182,7 @@ def test_the_share_of_durations_is_that_of_their_variance():
     rng = np.random.default_rng(7)
     rows = [row(pair_id="AB"[n % 2], duration_s=10 + 2 * (n % 2) + rng.standard_normal()) for n in range(400)]
     data = trajectories([(still(5), None)] * 400, rows)
-    estimates = pair_share_statistics(data, _bootstrap(data), rng)
+    estimates = eta_squared_statistics(data, _bootstrap(data), rng)
     estimate = estimates["duration_between_pair_share"]
     assert estimate.interval is not None
     assert estimate.interval[0] < 0.5 < estimate.interval[1]  # 1 / (1 + 1)
@@ -191,7 +191,7 @@ def test_the_share_of_durations_is_that_of_their_variance():
 
 def test_one_pair_has_nobody_to_be_compared_with():
     data = trajectories([(carried("L", ONE), None)] * 6, [row()] * 6)
-    estimates = pair_share_statistics(data, _bootstrap(data), np.random.default_rng(0))
-    assert estimates["route_between_pair_share"].note == "no configuration was carried by two pairs"
+    estimates = eta_squared_statistics(data, _bootstrap(data), np.random.default_rng(0))
+    assert estimates["route_between_pair_share"].note == "no configuration has episodes of two pairs"
     estimates = visitation_statistics(data, _bootstrap(data), np.random.default_rng(0))
     assert estimates["visitation_divergence_between_pairs"].note == "one pair only"

@@ -3,7 +3,7 @@ import pytest
 from constructed_pairs import ONE, TWO, carried, carried_set, row, still, trajectories
 from diptest import diptest
 
-from copolicy.dataset.statistics.neighbours import neighbour_statistics
+from copolicy.dataset.statistics.action_variance import variance_statistics
 from copolicy.dataset.statistics.path_modes import count_modes, path_mode_statistics, resample_path
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.tasks.table.statistics.steering_dip import decision_zone, dip_statistics, dip_tests, steering
@@ -55,7 +55,7 @@ def test_the_action_variance_ratio_is_the_share_of_noise(noise):
         signal = np.tile(((states[:, :1] - 600) / 400 * 0.5), (1, 4))
         episodes.append((states, signal + noise * rng.standard_normal((200, 4))))
     data = trajectories(episodes, [row()] * 40)
-    estimates = neighbour_statistics(data, _bootstrap(data), rng)
+    estimates = variance_statistics(data, _bootstrap(data), rng)
     truth = noise**2 / (0.25 / 3 + noise**2)
     assert estimates["action_variance_ratio"].value == pytest.approx(truth, abs=0.03)
     assert estimates["action_variance_ratio_player_1"].value == pytest.approx(truth, abs=0.03)
@@ -67,7 +67,7 @@ def test_the_action_variance_ratio_is_the_share_of_noise(noise):
 def test_actions_that_do_not_depend_on_the_state_have_ratio_one():
     rng = np.random.default_rng(3)
     data = trajectories([(carried("L", ONE), rng.uniform(-1, 1, (120, 4))) for _ in range(30)], [row()] * 30)
-    assert neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"].value == pytest.approx(
+    assert variance_statistics(data, _bootstrap(data), rng)["action_variance_ratio"].value == pytest.approx(
         1.0, abs=0.05
     )
 
@@ -78,7 +78,7 @@ def test_frames_of_one_episode_count_once_and_never_for_their_own():
     rng = np.random.default_rng(4)
     level = rng.uniform(-1, 1, (30, 4))
     data = trajectories([(carried("L", ONE), np.tile(level[n], (120, 1))) for n in range(30)], [row()] * 30)
-    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    estimate = variance_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
     assert estimate.value == pytest.approx(1.0, abs=0.1)
 
 
@@ -94,7 +94,7 @@ def test_noise_that_lasts_counts_as_noise():
             noise[step] = kept * noise[step - 1] + np.sqrt(1 - kept**2) * noise[step]
         episodes.append((states, 0.2 * offset / offsets.std() + 0.2 * noise))
     data = trajectories(episodes, [row()] * 40)
-    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    estimate = variance_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
     assert estimate.interval is not None
     assert estimate.interval[0] < 0.5 < estimate.interval[1]
     assert estimate.value == pytest.approx(0.5, abs=0.06)
@@ -110,7 +110,7 @@ def test_a_signal_between_neighbours_is_no_noise():
         states[:, 0], states[:, 1] = np.linspace(240, 960, 60), 300 + offset
         episodes.append((states, np.full((60, 4), offset / 200)))
     data = trajectories(episodes, [row()] * 20)
-    estimate = neighbour_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
+    estimate = variance_statistics(data, _bootstrap(data), rng)["action_variance_ratio"]
     among = estimate.details["among_episodes"]
     assert among["2"] < among["4"] < among["8"]
     assert among["8"] > 0.05
@@ -119,7 +119,7 @@ def test_a_signal_between_neighbours_is_no_noise():
 
 def test_without_enough_other_episodes_there_is_no_ratio():
     data = trajectories([(still(20), None)] * 8, [row()] * 8)
-    estimate = neighbour_statistics(data, _bootstrap(data), np.random.default_rng(0))["action_variance_ratio"]
+    estimate = variance_statistics(data, _bootstrap(data), np.random.default_rng(0))["action_variance_ratio"]
     assert estimate.value is None
     assert estimate.note == "no goal and obstacles with 9 episodes"
 

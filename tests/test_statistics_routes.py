@@ -7,9 +7,9 @@ from constructed_pairs import FREE, ONE, TWO, carried, carried_set, row, traject
 
 from copolicy.dataset.statistics.entropy import entropy, jensen_shannon, miller_madow, simpson
 from copolicy.dataset.statistics.resampling import Bootstrap
-from copolicy.dataset.statistics.route_entropy import route_statistics, word_entropy
+from copolicy.dataset.statistics.route_entropy import label_entropy, route_statistics
 from copolicy.tasks.table.statistics.human_routes import human_distance, human_route_entropy, human_routes
-from copolicy.tasks.table.statistics.routes import route_statistics as routes_of_tables
+from copolicy.tasks.table.statistics.route_statistics import route_statistics as routes_of_tables
 
 
 def _routes(data):
@@ -51,7 +51,7 @@ def test_nine_in_ten_intervals_or_more_hold_the_true_entropy(shares):
     for _ in range(200):
         counts = rng.multinomial(60, shares)
         words = Counter({f"{place:02b}": int(count) for place, count in enumerate(counts) if count})
-        low, high = word_entropy(words, 2 if len(shares) > 2 else 1, rng, replicates=300)["interval"]
+        low, high = label_entropy(words, 2 if len(shares) > 2 else 1, rng, replicates=300)["interval"]
         hits += low <= truth + 1e-9 and truth - 1e-9 <= high
     assert hits >= 180
 
@@ -65,7 +65,7 @@ def test_the_correction_removes_most_of_the_bias_of_ten_episodes():
 
 
 def test_a_single_word_leaves_room_for_one_that_was_not_seen():
-    entry = word_entropy(Counter({"L": 10}), 1, np.random.default_rng(0))
+    entry = label_entropy(Counter({"L": 10}), 1, np.random.default_rng(0))
     assert entry["entropy_bits"] == 0
     assert entry["interval"][1] == pytest.approx(float(entropy(np.array([1 - 0.05**0.1, 0.05**0.1]))))
 

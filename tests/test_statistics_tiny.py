@@ -28,10 +28,10 @@ def _data(lengths, success=True, obstacles=True, pairs=1, idle=False, still=Fals
         rows.append(
             EpisodeRow(
                 episode_uuid=f"u{index}", pair_id=f"P{index % pairs}", map_id="m", source="simulated", success=success,
-                duration_s=length / 10, route_class=route, map_config=config, split="train",
+                duration_s=length / 10, route_class=route, scenario=config, split="train",
             )
         )  # fmt: skip
-    return Trajectories.of(parts, rows, 10)
+    return Trajectories.from_episodes(parts, rows, 10)
 
 
 @pytest.mark.parametrize("lengths", [[2], [3], [2, 2], [4], [2, 2, 2], [30]], ids=str)

@@ -119,7 +119,7 @@ def test_a_pad_that_is_listed_twice_does_not_get_both_seats(teleoperator, listed
 
     player = threading.Thread(target=presses)
     player.start()
-    with pytest.raises(DeviceNotConnectedError, match="found none on another pad: Pad was pressed together"):
+    with pytest.raises(DeviceNotConnectedError, match="found none on another gamepad: Pad was pressed together"):
         pair.connect(calibrate=False)
     player.join()
     assert not pair.is_connected
@@ -181,10 +181,10 @@ def test_nobody_presses(teleoperator, sticks):
 
 def test_too_few_pads(teleoperator):
     stick = VirtualJoystick()
-    with pytest.raises(DeviceNotConnectedError, match="copolicy_pair: expected two pads, found 1 plugged in"):
+    with pytest.raises(DeviceNotConnectedError, match="copolicy_pair: expected two gamepads, found 1 plugged in"):
         teleoperator().connect()
     second = VirtualJoystick()
-    with pytest.raises(DeviceNotConnectedError, match="copolicy_pair: expected a pad number 5, found 2 plugged in"):
+    with pytest.raises(DeviceNotConnectedError, match="copolicy_pair: expected a gamepad number 5, found 2 plugged in"):
         teleoperator(join=False, human_pad=5).connect()
     stick.unplug()
     second.unplug()
@@ -195,7 +195,7 @@ def test_an_unplugged_pad_is_an_error_and_not_a_zero_force(teleoperator, sticks)
     pair.connect(calibrate=False)
     sticks[1].unplug()
     with pytest.raises(
-        DeviceNotConnectedError, match=r"copolicy_pair: the pad of the human seat \(Pad\) was unplugged"
+        DeviceNotConnectedError, match=r"copolicy_pair: the gamepad of the human seat \(Pad\) was unplugged"
     ):
         pair.get_action()
     assert not pair.is_connected
@@ -260,7 +260,7 @@ def test_connecting_calibrates_a_make_once(teleoperator, sticks, tmp_path):
 def test_a_stick_that_is_not_turned_keeps_the_usual_values(teleoperator, sticks, caplog):
     pair = teleoperator(join=False, timeout_s=0.2)
     pair.connect()
-    assert "human seat: not turned round in time, the usual range is assumed" in caplog.messages
+    assert "human seat: not turned round in time, the default range is used" in caplog.messages
     assert not pair.is_calibrated
     assert pair.is_connected
 
@@ -268,7 +268,7 @@ def test_a_stick_that_is_not_turned_keeps_the_usual_values(teleoperator, sticks,
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"robot_pad": 1}, "robot_pad, human_pad: expected two different pads, from 0, found (1, 1)"),
+        ({"robot_pad": 1}, "robot_pad, human_pad: expected two different gamepads, from 0, found (1, 1)"),
         ({"timeout_s": 0.0}, "timeout_s: expected a positive number, found 0.0"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Texts, names and terminals of other encodings."""
+"""Texts, file names and terminals with other encodings."""
 
 import io
 import os
@@ -12,26 +12,26 @@ from versioned_data_set import simulated_data_set
 from copolicy.dataset.cli import main
 from copolicy.dataset.command_line.commands import add_command, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.files.text_files import read_older_text, read_text
+from copolicy.dataset.files.text_files import read_legacy_text, read_text
 
 
-def test_a_byte_order_mark_is_no_letter(tmp_path):
+def test_a_byte_order_mark_is_removed(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_bytes(b"\xef\xbb\xbfh\xc3\xa9llo")
     assert read_text(path) == "héllo"
 
 
-def test_a_text_in_another_encoding_is_named(tmp_path):
+def test_a_text_in_another_encoding_is_refused(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_bytes("héllo".encode("latin-1"))
     with pytest.raises(FileFormatError) as error:
         read_text(path)
-    assert str(error.value) == f"{path}: expected a text in UTF-8, found the byte 0xe9 at position 1"
-    assert read_older_text(path) == "héllo"
+    assert str(error.value) == f"{path}: expected UTF-8 text, found the byte 0xe9 at position 1"
+    assert read_legacy_text(path) == "héllo"
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-8"])
-def test_a_change_log_survives_a_release_whatever_its_encoding(tmp_path, encoding, capsys):
+def test_a_change_log_in_another_encoding_survives_a_release(tmp_path, encoding, capsys):
     root = simulated_data_set(tmp_path / "set")
     (root / "CHANGELOG.md").write_bytes("# Änderungen\n\n## [Unreleased]\n- Café\n".encode(encoding))
     assert main(["release", str(root), "--bump", "minor", "--notes", "first"]) == 0
@@ -41,7 +41,7 @@ def test_a_change_log_survives_a_release_whatever_its_encoding(tmp_path, encodin
     assert "## [0.1.0]" in text
 
 
-def test_a_terminal_that_lacks_a_letter_stops_nothing(monkeypatch):
+def test_characters_that_the_terminal_cannot_encode_are_escaped(monkeypatch):
     parser, commands = command_parser("tool", "A tool.")
     add_command(commands, "do", lambda arguments: {"success": "50 ± 3 %", "file": os.fsdecode(b"a\xff")}, "does", "x")
     printed = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="strict")

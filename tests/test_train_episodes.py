@@ -14,7 +14,7 @@ from training_table import flags, lerobot_train, mark_discarded, windows
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.train.cli import main
-from copolicy.train.episode_choice import chosen_episodes, resumed_episodes
+from copolicy.train.episode_choice import resumed_episodes, selected_episodes
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 from lerobot_policy_copolicy.copolicy.training_data import prepare_training
 
@@ -48,8 +48,8 @@ def test_an_empty_mark_excludes_nothing_and_the_marks_are_read_by_episode(copied
     for path in (copied_table / "meta" / "episodes").glob("*/*.parquet"):
         table = pq.ParquetFile(path).read().drop_columns(["discarded"])
         pq.write_table(table.append_column("discarded", pa.array([None, True, None, False, None, None])), path)
-    assert chosen_episodes(_meta(copied_table), None) == [0, 2, 3, 4, 5]
-    assert chosen_episodes(_meta(copied_table), [1, 5]) == [5]
+    assert selected_episodes(_meta(copied_table), None) == [0, 2, 3, 4, 5]
+    assert selected_episodes(_meta(copied_table), [1, 5]) == [5]
 
 
 @pytest.mark.parametrize("value", ["False", 0.5, [False]])
@@ -58,7 +58,7 @@ def test_a_mark_that_is_neither_true_nor_false_is_refused(copied_table, value):
         table = pq.ParquetFile(path).read().drop_columns("discarded")
         pq.write_table(table.append_column("discarded", pa.array([value] * table.num_rows)), path)
     with pytest.raises(RunError, match="expected true or false in the episode column discarded, found "):
-        chosen_episodes(_meta(copied_table), None)
+        selected_episodes(_meta(copied_table), None)
 
 
 @pytest.mark.parametrize("mark", ["robot_type", "action", "file"])
@@ -66,18 +66,18 @@ def test_a_set_of_ours_without_its_columns_is_refused_unless_episodes_are_named(
     _strip(copied_table, mark)
     meta = _meta(copied_table)
     with pytest.raises(RunError) as caught:
-        chosen_episodes(meta, None)
+        selected_episodes(meta, None)
     line = str(caught.value)
     assert "its episode columns were lost, as by LeRobot's delete_episodes; copolicy-dataset restores them" in line
     assert "--dataset.episodes=[0,1,...]" in line
-    assert chosen_episodes(meta, [0, 4]) == [0, 4]
+    assert selected_episodes(meta, [0, 4]) == [0, 4]
     with pytest.raises(RunError, match="its episode columns were lost"):
         resumed_episodes(meta, [0, 4], [0, 4])  # numbers of a set that LeRobot has renumbered
 
 
 def test_a_foreign_set_trains_as_it_is(copied_table):
     _strip(copied_table, "none")
-    assert chosen_episodes(_meta(copied_table), None) == list(range(6))
+    assert selected_episodes(_meta(copied_table), None) == list(range(6))
 
 
 def test_copolicy_train_refuses_a_stripped_set_before_the_first_step(copied_table, tmp_path, capsys):
@@ -98,19 +98,17 @@ def test_a_resumed_run_keeps_its_episodes_less_what_was_excluded_since(copied_ta
     mark_discarded(copied_table, (4,))  # 2 was taken back since, which the run never saw
     capsys.readouterr()
     assert main([f"--config_path={output}", "--resume=true", "--steps=3"]) == 0
-    assert "Resuming with 4 of the 5 episodes that the run began with; excluded since: [4]" in capsys.readouterr().err
+    assert "Resuming with 4 of the 5 episodes of the run; excluded since: [4]" in capsys.readouterr().err
     assert _settings(output, 3)["dataset"]["episodes"] == [0, 1, 3, 5]
     with_flag = [f"--config_path={output}", "--resume=true", "--steps=4", "--dataset.episodes=[4,5]"]
     assert main(with_flag) == 0
-    assert "Resuming with 1 of the 2 episodes that --dataset.episodes names; excluded since: [4]" in (
-        capsys.readouterr().err
-    )
+    assert "Resuming with 1 of the 2 episodes of --dataset.episodes; excluded since: [4]" in (capsys.readouterr().err)
 
 
 def test_a_run_without_a_list_of_its_episodes_says_so(random_table, caplog):
     with caplog.at_level(logging.INFO):
         assert resumed_episodes(_meta(random_table), None, None) == list(range(6))
-    assert "the checkpoint does not say which ones the run began with" in caplog.text
+    assert "the checkpoint does not record those of the run" in caplog.text
 
 
 def test_a_fresh_run_records_all_of_its_episodes(random_table, tmp_path):

@@ -83,7 +83,7 @@ def test_it_plans_as_the_checkpoint_does(checkpoint, tmp_path):
     assert main(["export", str(checkpoint), "--out", str(out)]) == 0
     batch = {STATE: torch.rand(3, 3, 7), ENVIRONMENT_STATE: torch.rand(3, 3, 11), HUMAN_ACTION: torch.rand(3, 3, 2)}
     noise = torch.randn(3, 12, 4)
-    plans = [Checkpoint(folder).policy.plan(batch, noise=noise) for folder in (checkpoint, out)]
+    plans = [Checkpoint(folder).policy.sample_actions(batch, noise=noise) for folder in (checkpoint, out)]
     assert torch.equal(plans[0], plans[1])
     assert plans[0].std() > 0.05
 

@@ -15,8 +15,8 @@ from training_table import LENGTHS, flags, lerobot_train, mark_discarded, weight
 
 from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.train.cli import main
-from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError, require_finite_frames, unusable_rows
-from copolicy.train.finite_training import guarded, link_last_checkpoint
+from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError, non_finite_rows, require_finite_frames
+from copolicy.train.finite_training import guarded_functions, link_last_checkpoint
 from copolicy.train.finite_weights import non_finite_weight
 from copolicy.train.memory_training import CheckedStream
 
@@ -79,12 +79,12 @@ def test_more_of_them_are_counted_and_an_empty_row_is_found(copied_table):
 @pytest.mark.parametrize("kind", [pa.list_(pa.float32()), pa.list_(pa.float32(), 2), pa.large_list(pa.float64())])
 def test_rows_of_lists(kind):
     column = pa.array([[0, 1], [float("nan"), 1], None, [1, None], [2, 3]], kind)
-    assert unusable_rows(column).tolist() == [False, True, True, True, False]
-    assert unusable_rows(column.slice(3)).tolist() == [True, False]
+    assert non_finite_rows(column).tolist() == [False, True, True, True, False]
+    assert non_finite_rows(column.slice(3)).tolist() == [True, False]
 
 
 def test_a_number_that_float32_cannot_hold_is_infinite_in_training():
-    assert unusable_rows(pa.array([1.0, 1e300], pa.float64())).tolist() == [False, True]
+    assert non_finite_rows(pa.array([1.0, 1e300], pa.float64())).tolist() == [False, True]
 
 
 def test_a_foreign_column_may_hold_what_it_likes(copied_table):
@@ -271,7 +271,7 @@ def _tracker(loss: float, gradient: float):
 def test_loss_and_gradient_are_looked_at_after_each_step(tmp_path, loss, gradient, scaler, stopped):
     names = ("update_policy", "save_checkpoint", "update_last_checkpoint", "make_policy")
     functions = dict.fromkeys(names, lambda *_, **__: "done")
-    update = guarded(SimpleNamespace(output_dir=tmp_path), functions)["update_policy"]  # pyright: ignore[reportArgumentType]
+    update = guarded_functions(SimpleNamespace(output_dir=tmp_path), functions)["update_policy"]  # pyright: ignore[reportArgumentType]
     arguments = {"accelerator": SimpleNamespace(scaler=scaler)}
     if stopped is None:
         assert update(_tracker(loss, gradient), None, **arguments) == "done"
@@ -285,7 +285,7 @@ def test_any_policy_is_looked_at_before_it_is_saved(tmp_path, gathered):
     saved = []
     names = ("update_policy", "update_last_checkpoint", "make_policy")
     functions = {**dict.fromkeys(names, lambda *_, **__: None), "save_checkpoint": lambda **call: saved.append(call)}
-    save = guarded(SimpleNamespace(output_dir=tmp_path), functions)["save_checkpoint"]  # pyright: ignore[reportArgumentType]
+    save = guarded_functions(SimpleNamespace(output_dir=tmp_path), functions)["save_checkpoint"]  # pyright: ignore[reportArgumentType]
     policy = torch.nn.Linear(2, 2)
     save(checkpoint_dir=tmp_path / "000001", step=1, policy=policy)
     assert len(saved) == 1

@@ -46,13 +46,13 @@ def truncate(path: Path) -> None:
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text("{", encoding="utf-8"),
-            "{root}/meta/info.json: expected LeRobot's data set information, found no JSON",
+            "{root}/meta/info.json: expected LeRobot's data set information, found invalid JSON",
         ),
         (
             lambda root: (root / "meta" / "info.json").write_text(
                 '{"codebase_version": "v2.1", "total_frames": 1, "total_episodes": 1}', encoding="utf-8"
             ),
-            "{root}/meta/info.json: expected codebase_version v3.x, found v2.1, an older one",
+            "{root}/meta/info.json: expected codebase_version v3.x, found v2.1; LeRobot converts this older version",
         ),
         (
             lambda root: truncate(root / "data" / "chunk-000" / "file-000.parquet"),
@@ -129,7 +129,7 @@ def test_episodes_whose_frames_are_others_are_named(copied_table, column, change
         table = pq.ParquetFile(path).read()
         values = pa.array(change(table.column(column).to_pylist()))
         pq.write_table(table.set_column(table.column_names.index(column), column, values), path)
-    with pytest.raises(FileFormatError, match="expected episodes that follow each other") as caught:
+    with pytest.raises(FileFormatError, match="expected consecutive episodes") as caught:
         check_local_dataset(copied_table)
     assert found in str(caught.value)
 

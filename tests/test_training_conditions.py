@@ -18,12 +18,12 @@ from untrained_policy import save_untrained_policy
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
 from copolicy.collect.play.command import _angular_limit
-from copolicy.collect.play.settings import PilotSpec
-from copolicy.collect.rollout import Start
+from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.evaluate.human_study.plan import StudyPlan
-from copolicy.evaluate.study_flags import protocol_of
+from copolicy.evaluate.study_flags import study_protocol
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
@@ -116,7 +116,7 @@ def test_a_mixture_is_recorded_with_its_counts_and_is_no_physics(copied_table, c
 
 def test_what_a_checkpoint_does_not_say_is_assumed_and_said(old, tmp_path):
     conditions = training_conditions(old)
-    assert (conditions.fps, conditions.physics) == (10, Physics())
+    assert (conditions.fps, conditions.settings) == (10, Physics())
     assert conditions.notes == (
         "the checkpoint does not say its rate; 10 frames a second are assumed",
         "the checkpoint does not say its physics; angular acceleration up to pi/2 rad/s^2 is assumed",
@@ -172,13 +172,13 @@ def _arguments(**values) -> Namespace:
 def test_policies_that_learned_under_different_physics_need_a_decision():
     usual, slow = TrainingConditions(10, Physics()), TrainingConditions(30, SLOW)
     with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected a choice"):
-        protocol_of(_arguments(), [("one", usual), ("other", slow)])
-    protocol = protocol_of(_arguments(angular_limit="pi/8"), [("one", usual), ("other", slow)])
-    assert protocol.physics == Physics(math.pi / 8, 2000)
+        study_protocol(_arguments(), [("one", usual), ("other", slow)])
+    protocol = study_protocol(_arguments(angular_limit="pi/8"), [("one", usual), ("other", slow)])
+    assert protocol.settings == Physics(math.pi / 8, 2000)
     assert protocol.fps == 10
-    assert protocol.told_otherwise == ("--angular-limit pi/8: one learned with 1.571 rad/s^2",)
+    assert protocol.contradictions == ("--angular-limit pi/8: one learned with 1.571 rad/s^2",)
     with pytest.raises(InvalidValueError, match=r"^fps: expected a divisor of 30"):
-        protocol_of(_arguments(), [("one", TrainingConditions(25, Physics()))])
+        study_protocol(_arguments(), [("one", TrainingConditions(25, Physics()))])
 
 
 def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
@@ -191,7 +191,7 @@ def test_partner_and_human_plan_take_them_from_the_checkpoint(fast, tmp_path):
     plan = tmp_path / "plan.json"
     robots = [f"A={fast}", f"B={fast}"]
     assert evaluate(["human", "plan", *robots, "--participants", "1", "--out", str(plan)]) == 0
-    assert StudyPlan.read(plan).physics.angular_acceleration_limit == math.pi / 8
+    assert StudyPlan.read(plan).world_settings.angular_acceleration_limit == math.pi / 8
 
 
 class _Fast:
@@ -207,7 +207,7 @@ class _Fast:
 def test_a_policy_of_30_hz_at_a_seat_acts_anew_at_every_step():
     agent, worlds = PolicyAgent(_Fast(), real_time=True), np.array([0])
     world = TableWorld(MAP_SETS["training"][0])
-    agent.begin(0, [Start(world.map_config, 0, world.observation)])
+    agent.begin(0, [EpisodeStart(world.map_config, 0, world.observation)])
     forces = []
     for _ in range(3):
         agent.wait(10)
@@ -220,14 +220,14 @@ def test_a_policy_of_30_hz_at_a_seat_acts_anew_at_every_step():
 
 
 def test_play_takes_the_limit_of_the_policy_at_the_table(fast, old, caplog):
-    robot, person = PilotSpec("policy", str(fast)), PilotSpec("keyboard")
+    robot, person = PlayerSpec("policy", str(fast)), PlayerSpec("keyboard")
     assert _angular_limit((robot, person), None) == math.pi / 8
     assert _angular_limit((person, person), None) == math.pi / 2
     assert not [record for record in caplog.records if record.levelname == "WARNING"]
     assert _angular_limit((robot, person), "pi/2") == math.pi / 2
-    assert "learned with 0.3927 rad/s^2" in caplog.text
-    with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected a choice"):
-        _angular_limit((robot, PilotSpec("policy", str(old))), None)
+    assert "trained with 0.3927 rad/s^2" in caplog.text
+    with pytest.raises(InvalidValueError, match=r"^--angular-limit: expected one value"):
+        _angular_limit((robot, PlayerSpec("policy", str(old))), None)
 
 
 def test_an_environment_of_another_rate_is_refused(fast, caplog):

@@ -1,11 +1,11 @@
-"""The newest checkpoint of a run is found with links and without."""
+"""The newest checkpoint of a run is found with and without links."""
 
 import shutil
 from pathlib import Path
 
 import pytest
 
-from copolicy.cards.checkpoint import Checkpoint as CardCheckpoint
+from copolicy.cards.checkpoint_facts import CheckpointFacts
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.policies.training_run import find_policy_folder
@@ -44,16 +44,16 @@ def _no_link(last: Path) -> None:
     ],
     ids=["none", "broken link", "text file", "empty folder", "copy of an earlier checkpoint"],
 )
-def test_a_run_copied_without_links_is_found_by_its_highest_number(run, make_last):
+def test_the_highest_number_is_used_in_a_run_copied_without_links(run, make_last):
     last = run / "checkpoints" / "last"
     make_last(last)
     expected = run / "checkpoints" / "1000000" / "pretrained_model"
     for path in (run, run / "checkpoints", last, last / "pretrained_model"):
         assert checkpoint_folder(path) == expected
-        assert CardCheckpoint.read(path).folder == expected
+        assert CheckpointFacts.read(path).folder == expected
 
 
-def test_a_link_is_followed_and_a_checkpoint_that_is_named_is_taken(run):
+def test_links_and_checkpoint_paths_are_followed(run):
     (run / "checkpoints" / "last").symlink_to("999998")
     for path in (run, run / "checkpoints", run / "checkpoints" / "last", run / "checkpoints" / "999998"):
         assert (checkpoint_folder(path) / "model.safetensors").read_bytes() == b"999998"
@@ -65,13 +65,13 @@ def test_a_copied_last_alone_is_a_checkpoint(tmp_path):
     assert checkpoint_folder(tmp_path / "checkpoints" / "last") == expected
 
 
-def test_other_files_can_be_asked_for(run):
+def test_the_required_files_can_be_given(run):
     assert find_policy_folder(run, ("train_config.json",)) is None
     (run / "checkpoints" / "999998" / "pretrained_model" / "train_config.json").touch()
     assert find_policy_folder(run, ("train_config.json",)) == run / "checkpoints" / "999998" / "pretrained_model"
 
 
-def test_no_checkpoint_at_all(tmp_path):
+def test_a_run_without_checkpoints_gives_none(tmp_path):
     (tmp_path / "checkpoints").mkdir()
     with pytest.raises(FileFormatError, match=r"expected a checkpoint folder with config.json and model.safetensors"):
         checkpoint_folder(tmp_path)

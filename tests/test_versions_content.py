@@ -21,7 +21,7 @@ from versioned_data_set import (
 )
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.json_file import converted as as_type
+from copolicy.dataset.files.json_file import convert_json as as_type
 from copolicy.dataset.lerobot_folder.exclusions import exclude
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.digests import Content, EpisodeContent, digest, encode
@@ -38,7 +38,7 @@ def dataset(converted, tmp_path) -> Path:
     return Path(shutil.copytree(converted, tmp_path / "table"))
 
 
-def test_no_two_values_share_their_bytes():
+def test_different_values_have_different_bytes():
     values = [
         None, True, False, 0, 1, -1, 10, 1.0, 0.0, -0.0, math.inf, "", "1", "1.0", b"", b"1", [], [[]], [None], {},
         ["a", "b"], ["ab"], ["a", ["b"]], {"a": 1}, {"a": {"b": 1}}, {"a": None}, [1, 2], [12], "None", ["", "a"],
@@ -46,7 +46,7 @@ def test_no_two_values_share_their_bytes():
     assert len({encode(value) for value in values}) == len(values)
 
 
-def test_what_is_equal_has_the_same_bytes():
+def test_equal_values_have_the_same_bytes():
     other_nan = struct.unpack("<d", struct.pack("<Q", 0x7FF8000000000123))[0]
     assert encode({"b": 1, "a": (1, 2)}) == encode({"a": [1, 2], "b": 1})
     assert encode(other_nan) == encode(math.nan)
@@ -55,7 +55,7 @@ def test_what_is_equal_has_the_same_bytes():
 
 
 def test_the_algorithm_is_the_documented_one():
-    """Worked out by hand from the docstrings; another value means another algorithm and asks for another prefix."""
+    """Computed by hand from the docstrings; another value means another algorithm, which needs a new prefix."""
     episode = EpisodeContent("uuid", "0" * 64, 3, {}, {})
     content = Content(10, "table", {"action": {"dtype": "float32", "shape": [4]}}, ["Carry."], (episode,))
     features = b"d1:s6:actiond2:s5:dtypes7:float32s5:shapel1:i1:4"
@@ -73,14 +73,14 @@ def test_the_algorithm_is_the_documented_one():
     assert as_type(json.loads(json.dumps(asdict(content))), Content, "a content", "text") == content
 
 
-def test_layout_does_not_matter(dataset, converted):
+def test_the_hash_ignores_the_storage_layout(dataset, converted):
     cut_differently(dataset)
     assert not (dataset / FRAMES).exists()
     assert read_content(dataset) == read_content(converted)
 
 
 @pytest.mark.parametrize("kind", [pa.list_(pa.float32()), pa.large_list(pa.float32()), pa.list_(pa.float64())])
-def test_the_type_that_holds_the_numbers_does_not_matter(dataset, converted, kind):
+def test_the_hash_ignores_the_stored_number_type(dataset, converted, kind):
     def change(table: pa.Table) -> pa.Table:
         values = pa.array(table.column("action").to_pylist(), kind)
         return table.set_column(table.schema.get_field_index("action"), "action", values)
@@ -89,7 +89,7 @@ def test_the_type_that_holds_the_numbers_does_not_matter(dataset, converted, kin
     assert read_content(dataset).hash == read_content(converted).hash
 
 
-def test_what_describes_or_follows_does_not_matter(dataset, converted):
+def test_the_hash_ignores_descriptions_and_derived_values(dataset, converted):
     (dataset / "README.md").write_text("other", encoding="utf-8")
     (dataset / "meta" / "stats.json").write_text("{}", encoding="utf-8")
     (dataset / "meta" / "copolicy.json").unlink()
@@ -122,12 +122,12 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_all_else_matters(dataset, converted, change):
+def test_every_other_change_changes_the_hash(dataset, converted, change):
     CHANGES[change](dataset)
     assert read_content(dataset).hash != read_content(converted).hash
 
 
-def test_an_episode_has_the_same_digest_wherever_it_stands(dataset, converted):
+def test_the_digest_of_an_episode_ignores_its_position(dataset, converted):
     keep_episodes(dataset, [5, 2])
     before = {episode.episode_uuid: episode for episode in read_content(converted).episodes}
     after = read_content(dataset).episodes
@@ -135,7 +135,7 @@ def test_an_episode_has_the_same_digest_wherever_it_stands(dataset, converted):
     assert all(before[episode.episode_uuid] == episode for episode in after)
 
 
-def test_a_task_is_known_by_its_sentence(dataset, converted):
+def test_a_task_is_hashed_by_its_sentence(dataset, converted):
     def renumber(table: pa.Table) -> pa.Table:
         return table.set_column(0, "task_index", pa.array([7], pa.int64()))
 
@@ -166,7 +166,7 @@ DAMAGES = {
     ),
     "twice": (
         lambda root: change_table(root, EPISODES, lambda t: t.set_column(7, "episode_uuid", pa.array(["a"] * 6))),
-        r"episodes: expected an episode_uuid of its own for each episode, found 6 with 'a'",
+        r"episodes: expected a unique episode_uuid for each episode, found 6 with 'a'",
     ),
     "a frame less": (
         lambda root: change_table(root, FRAMES, lambda table: table.slice(1)),
@@ -192,7 +192,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_what_contradicts_itself_is_refused(dataset, damage):
+def test_inconsistent_data_sets_are_refused(dataset, damage):
     change, message = DAMAGES[damage]
     change(dataset)
     with pytest.raises(FileFormatError, match=message):

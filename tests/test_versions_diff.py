@@ -14,8 +14,8 @@ from versioned_data_set import (
 )
 
 from copolicy.dataset.cli import main
+from copolicy.dataset.versions.diff_inputs import compare_statistics
 from copolicy.dataset.versions.release import release
-from copolicy.dataset.versions.sources import compare_statistics
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def diff(capsys, a: object, b: object) -> tuple[int, dict]:
     return status, json.loads(capsys.readouterr().out)
 
 
-def test_the_same_content_is_the_same(converted, dataset, capsys):
+def test_equal_content_is_reported_as_same(converted, dataset, capsys):
     cut_differently(dataset)
     status, found = diff(capsys, converted, dataset)
     assert (status, found["same"]) == (0, True)
@@ -49,7 +49,7 @@ def test_the_same_content_is_the_same(converted, dataset, capsys):
     assert found["episodes_changed"] == {}
 
 
-def test_every_kind_of_change_is_told(converted, dataset, capsys):
+def test_every_kind_of_change_is_reported(converted, dataset, capsys):
     names = uuids(converted)
     set_value(dataset, FRAMES, "action[3]", 0, 0.123)
     set_value(dataset, EPISODES, "pair_id", 0, "pair-9")
@@ -77,13 +77,13 @@ def test_a_folder_is_compared_with_its_releases(dataset, capsys):
     assert (status, list(found["episodes_changed"].values())) == (1, [["pair_id"]])
 
 
-def test_the_text_names_each_change_and_the_step_it_asks_for(converted, dataset, capsys):
+def test_the_text_names_each_change_and_its_bump(converted, dataset, capsys):
     set_value(dataset, EPISODES, "pair_id", 0, "pair-9")
     assert main(["diff", str(converted), str(dataset)]) == 1
     text = capsys.readouterr().out
     first = uuids(converted)[0]
     assert f"1 episode with other values of pair_id: {first} (patch)" in text
-    assert "not compared: stored on one side at most" in text
+    assert "not compared: not stored for both data sets" in text
 
 
 def test_stored_statistics_are_compared(converted, dataset, capsys):
@@ -99,7 +99,7 @@ def test_stored_statistics_are_compared(converted, dataset, capsys):
     assert diff(capsys, dataset, converted)[1]["statistics"] is None
 
 
-def test_a_value_that_one_side_lacks_differs():
+def test_a_missing_value_differs():
     assert compare_statistics({"a": 1, "nan": float("nan")}, {"b": 2, "nan": float("nan")}) == {
         "a": (1, None),
         "b": (None, 2),
@@ -115,9 +115,9 @@ def test_a_value_that_one_side_lacks_differs():
             "{}/nothing",
             "{}/nothing: expected a folder, FOLDER@data-x.y.z, or U/N[@REVISION] on the Hub, found none of them",
         ),
-        ("lab/table", "lab/table: asking the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"),
+        ("lab/table", "lab/table: querying the Hub: the Hub's client is offline (HF_HUB_OFFLINE is set)"),
     ],
 )  # fmt: skip
-def test_trouble_is_no_difference(converted, capsys, name, message):
+def test_an_error_has_status_2(converted, capsys, name, message):
     assert main(["diff", str(converted), name.format(converted)]) == 2
     assert capsys.readouterr().err == f"copolicy-dataset: {message.format(converted)}\n"

@@ -19,11 +19,11 @@ from copolicy.dataset.cli import main
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.meta_files import MANIFEST_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.exclusions import exclude
-from copolicy.dataset.publication.data_version import DataVersion, newest
+from copolicy.dataset.publication.data_version import DataVersion, newest_version
 from copolicy.dataset.versions.content import read_content
 from copolicy.dataset.versions.difference import Change
 from copolicy.dataset.versions.manifest import Manifest
-from copolicy.dataset.versions.release import release, with_release
+from copolicy.dataset.versions.release import changelog_with_release, release
 from copolicy.dataset.versions.release_record import ReleaseRecord, read_release
 
 DAY = datetime.date(2026, 3, 1)
@@ -52,7 +52,7 @@ def released(released_once, tmp_path) -> Path:
     return Path(shutil.copytree(released_once, tmp_path / "table"))
 
 
-def test_the_command_says_what_it_made(dataset, capsys):
+def test_the_summary_of_the_command(dataset, capsys):
     assert main(["release", str(dataset), "--bump", "minor", "--notes", "Examples.", "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary == {
@@ -71,11 +71,11 @@ def test_the_manifest_names_every_file(released):
     manifest = Manifest.read(released / MANIFEST_FILE)
     files = {path.relative_to(released).as_posix() for path in released.rglob("*") if path.is_file()}
     assert set(manifest.files) == files - {MANIFEST_FILE}
-    assert manifest.differences(Manifest.of_folder(released)) == []
+    assert manifest.differences(Manifest.from_folder(released)) == []
     assert manifest.files["README.md"].size == (released / "README.md").stat().st_size
 
 
-def test_a_manifest_names_what_differs(released):
+def test_a_manifest_lists_differences(released):
     manifest = Manifest.read(released / MANIFEST_FILE)
     (released / "README.md").write_text("other", encoding="utf-8")
     (released / "meta" / "stats.json").unlink()
@@ -85,7 +85,7 @@ def test_a_manifest_names_what_differs(released):
     (released / ".cache" / "x").write_text("", encoding="utf-8")
     (released / "raw").mkdir()
     (released / "raw" / "one.mcap").write_text("", encoding="utf-8")
-    assert manifest.differences(Manifest.of_folder(released)) == [
+    assert manifest.differences(Manifest.from_folder(released)) == [
         "README.md has other content",
         "meta/stats.json is missing",
         "notes/routes.png is not in the manifest",
@@ -130,7 +130,7 @@ def test_a_bump_smaller_than_the_change_is_refused(released, change):
         release(released, "major", "Again.", DAY)
 
 
-def test_added_episodes_ask_for_minor(dataset, tmp_path):
+def test_added_episodes_require_minor(dataset, tmp_path):
     whole = shutil.copytree(dataset, tmp_path / "whole")
     keep_episodes(dataset, [0, 1, 2, 3])
     release(dataset, "major", "Four.", DAY)
@@ -145,7 +145,7 @@ def test_added_episodes_ask_for_minor(dataset, tmp_path):
     assert record.content_hash == read_content(whole).hash
 
 
-def test_the_change_log_keeps_a_changelog(released):
+def test_the_change_log_follows_keep_a_changelog(released):
     set_value(released, EPISODES, "pair_id", 2, "pair-9")
     text = (
         (released / "CHANGELOG.md")
@@ -166,8 +166,8 @@ def test_the_change_log_keeps_a_changelog(released):
     assert sum(line.startswith("- 1 episode with other values of pair_id: ") for line in lines) == 1
 
 
-def test_a_hand_written_head_of_the_change_log_stays():
-    text = with_release(
+def test_a_hand_written_head_of_the_change_log_is_kept():
+    text = changelog_with_release(
         "# Our table\nBy us.\n", "1.0.0", "2026-03-01", "N.", [Change("major", "task 'a' removed")], "h"
     )
     assert text == (
@@ -175,7 +175,7 @@ def test_a_hand_written_head_of_the_change_log_stays():
     )
 
 
-def test_earlier_releases_stay_known(released):
+def test_earlier_releases_can_be_read(released):
     first = read_release(released)
     set_value(released, EPISODES, "pair_id", 2, "pair-9")
     release(released, "patch", "Corrected.", DAY)
@@ -186,8 +186,8 @@ def test_earlier_releases_stay_known(released):
 
 
 @pytest.mark.parametrize("renames", range(5))
-def test_a_release_that_breaks_off_can_be_run_again(released, monkeypatch, renames):
-    """The power fails after this many of the files are in place."""
+def test_an_interrupted_release_can_be_repeated(released, monkeypatch, renames):
+    """Simulates a power failure after this many files were renamed."""
     set_value(released, EPISODES, "pair_id", 2, "pair-9")
     really_replace, done = os.replace, []
 
@@ -205,18 +205,18 @@ def test_a_release_that_breaks_off_can_be_run_again(released, monkeypatch, renam
     monkeypatch.setattr(os, "replace", really_replace)
     assert release(released, "patch", "Corrected.", DAY).version == "1.0.1"
     assert (released / "CHANGELOG.md").read_text(encoding="utf-8").count("## [1.0.1]") == 1
-    assert Manifest.read(released / MANIFEST_FILE).differences(Manifest.of_folder(released)) == []
+    assert Manifest.read(released / MANIFEST_FILE).differences(Manifest.from_folder(released)) == []
     assert not list(released.rglob("*.part"))
 
 
 @pytest.mark.parametrize("notes", ["", "  \n", "Fine.\n## [9.9.9]"])
-def test_notes_that_would_spoil_the_change_log_are_refused(dataset, notes):
-    with pytest.raises(InvalidValueError, match=r"--notes: expected a text without headings of its own"):
+def test_notes_with_headings_are_refused(dataset, notes):
+    with pytest.raises(InvalidValueError, match=r"--notes: expected a text without lines that begin with '## '"):
         release(dataset, "major", notes, DAY)
     assert not (dataset / "CHANGELOG.md").exists()
 
 
-def test_a_record_that_contradicts_itself_is_refused(released):
+def test_an_inconsistent_record_is_refused(released):
     path = released / RELEASE_FILE
     fields = json.loads(path.read_text(encoding="utf-8"))
     fields["content"]["episodes"][0]["digest"] = "0" * 64
@@ -225,14 +225,14 @@ def test_a_record_that_contradicts_itself_is_refused(released):
         ReleaseRecord.read(path)
     path.write_text("{", encoding="utf-8")
     with pytest.raises(
-        FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found no JSON"
+        FileFormatError, match=r"expected the record of a release \(copolicy-release-1\), found invalid JSON"
     ):
         read_release(released)
 
 
 def test_versions_are_ordered_by_number():
-    assert newest(["v3.0", "data-1.9.0", "data-1.10.0", "data-draft", "1.11.0"]) == DataVersion(1, 10, 0)
-    assert newest(["v3.0"]) is None
+    assert newest_version(["v3.0", "data-1.9.0", "data-1.10.0", "data-draft", "1.11.0"]) == DataVersion(1, 10, 0)
+    assert newest_version(["v3.0"]) is None
     assert DataVersion.parse("data-1.2.3").tag == "data-1.2.3"
     with pytest.raises(InvalidValueError, match=r"data version: expected x.y.z or data-x.y.z, found '1.2'"):
         DataVersion.parse("1.2")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.versions.frames import video_digest
+from copolicy.dataset.versions.frame_digests import video_digest
 
 FPS = 10
 
@@ -25,7 +25,7 @@ def encode(path: Path, seed: int, frames: int) -> Path:
 
 
 def join(path: Path, parts: list[Path]) -> Path:
-    """One file after the other without encoding anew, as LeRobot joins the videos of episodes."""
+    """Joins files without encoding again, as LeRobot joins the videos of episodes."""
     with av.open(str(path), "w") as container, av.open(str(parts[0])) as first:
         stream = container.add_stream_from_template(first.streams.video[0])
         offset = 0
@@ -43,7 +43,7 @@ def join(path: Path, parts: list[Path]) -> Path:
     return path
 
 
-def test_an_episode_has_the_same_digest_in_a_file_of_its_own_and_in_a_joined_one(tmp_path):
+def test_joining_videos_keeps_the_digest(tmp_path):
     one, two = encode(tmp_path / "one.mp4", 1, 12), encode(tmp_path / "two.mp4", 2, 7)
     joined = join(tmp_path / "joined.mp4", [one, two])
     assert video_digest(joined, 0, 1.2, FPS) == video_digest(one, 0, 1.2, FPS)
@@ -52,14 +52,14 @@ def test_an_episode_has_the_same_digest_in_a_file_of_its_own_and_in_a_joined_one
     assert video_digest(one, 0, 1.1, FPS) != video_digest(one, 0, 1.2, FPS)
 
 
-def test_a_file_in_the_place_of_another_has_a_digest_of_its_own(tmp_path):
+def test_a_replaced_file_has_a_new_digest(tmp_path):
     path, other = encode(tmp_path / "one.mp4", 1, 12), encode(tmp_path / "two.mp4", 2, 12)
     before, expected = (video_digest(file, 0, 1.2, FPS) for file in (path, other))
     other.replace(path)
     assert video_digest(path, 0, 1.2, FPS) == expected != before
 
 
-def test_what_is_no_video_is_named(tmp_path):
+def test_a_file_that_is_not_a_video_is_refused(tmp_path):
     (tmp_path / "x.mp4").write_bytes(b"no video")
     with pytest.raises(FileFormatError, match=r"x.mp4: expected a video, found"):
         video_digest(tmp_path / "x.mp4", 0, 1, FPS)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
-from copolicy.dataset.outline import placed
+from copolicy.dataset.outline import to_scene
 from copolicy.dataset.task import Outcome
+from copolicy.tasks.table.geometry import CIRCLE_CENTRE, TRIANGLE, image_size
 from copolicy.tasks.table.interaction import interaction_force
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
-from copolicy.tasks.table.outline import CIRCLE_CENTRE, TRIANGLE, image_size
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.reward import reward
 from copolicy.tasks.table.world import Contact, TableWorld
@@ -98,8 +98,8 @@ def test_interaction_force_along_the_physical_axis_is_what_the_table_transmits()
 
 def test_robot_end_is_on_the_right_at_zero_and_theta_turns_counter_clockwise():
     tip = (sum(u for u, _ in TRIANGLE) / 4, 0.0)
-    assert placed((600.0, 300.0, 0.0), tip)[0] > 600 > placed((600.0, 300.0, 0.0), CIRCLE_CENTRE)[0]
-    assert placed((600.0, 300.0, math.pi / 2), tip)[1] < 300
+    assert to_scene((600.0, 300.0, 0.0), tip)[0] > 600 > to_scene((600.0, 300.0, 0.0), CIRCLE_CENTRE)[0]
+    assert to_scene((600.0, 300.0, math.pi / 2), tip)[1] < 300
     world = TableWorld(EMPTY)
     world.reset((600.0, 300.0, 0.0))
     world.step((0.0, -1.0, 0.0, 1.0))  # the robot on the right pushes up

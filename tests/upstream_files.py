@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.convert.upstream.episode import UpstreamOptions
+from copolicy.convert.upstream.build_episode import UpstreamOptions
 from copolicy.convert.upstream.processed import read_processed
 from copolicy.convert.upstream.raw import read_raw
 from copolicy.tasks.table.map_config import MapConfig
@@ -36,8 +36,8 @@ def processed(examples: Path, number: int, options=OPTIONS):
     return read_processed(examples / "processed_npz" / f"ep_{number}" / f"ep_{number}.npz", options)
 
 
-def held(steps: int) -> np.ndarray:
-    """Random forces `(steps, 4)`, each held for a while."""
+def random_forces(steps: int) -> np.ndarray:
+    """Random forces `(steps, 4)`, each repeated for six steps."""
     return np.repeat(np.random.default_rng(0).uniform(-1, 1, (steps // 6 + 1, 4)), 6, axis=0)[:steps]
 
 
@@ -78,16 +78,16 @@ def write_raw(
 
 def write_store(folder: Path, states, actions):
     """The 10 Hz store of one episode, in double precision and without compression."""
-    kept = np.arange(0, len(actions), 3)
+    rows = np.arange(0, len(actions), 3)
     pose = np.column_stack((states[:, :2], np.cos(states[:, 2]), np.sin(states[:, 2]), states[:, 3:]))
     obstacles = np.array([*CONFIG.obstacles, (0, 0), (0, 0), (0, 0)])[:3].ravel()
-    setting = np.tile([*CONFIG.start, *CONFIG.goal, *obstacles], (len(kept), 1))
-    past = np.vstack((np.zeros(4), actions[kept[1:] - 1]))
+    setting = np.tile([*CONFIG.start, *CONFIG.goal, *obstacles], (len(rows), 1))
+    past = np.vstack((np.zeros(4), actions[rows[1:] - 1]))
     arrays = {
-        "data/obs": np.hstack((pose[kept + 1], setting)),
-        "data/action": actions[kept],
+        "data/obs": np.hstack((pose[rows + 1], setting)),
+        "data/action": actions[rows],
         "data/past_action": past,
-        "meta/episode_ends": np.array([len(kept)]),
+        "meta/episode_ends": np.array([len(rows)]),
     }
     for name, array in arrays.items():
         (folder / name).mkdir(parents=True)

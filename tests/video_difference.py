@@ -1,4 +1,4 @@
-"""What is different where two data sets should hold the same encoded video."""
+"""Describes the difference of two data sets that should hold the same encoded videos."""
 
 from pathlib import Path
 
@@ -9,27 +9,28 @@ from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
 from copolicy.dataset.lerobot_folder.references import video_features, video_span
 
 
-def video_difference(found: Path, expected: Path) -> str:
+def video_difference(actual: Path, expected: Path) -> str:
     """A line for each episode whose video has other bytes: which packets, and by how much the images differ.
 
     Packets that differ from some packet on, with images that hardly differ, are the encoder's; images that differ where
     nothing moves are the drawing's.
     """
-    first, second = LeRobotFolder.open(found), LeRobotFolder.open(expected)
+    first, second = LeRobotFolder.open(actual), LeRobotFolder.open(expected)
     lines = []
-    for row, other in zip(first.episodes.to_pylist(), second.episodes.to_pylist(), strict=True):
+    for row, expected_row in zip(first.episodes.to_pylist(), second.episodes.to_pylist(), strict=True):
         for key in video_features(first.info):
             packets, images = _clip(first, row, key)
-            others, expected_images = _clip(second, other, key)
-            differ = [place for place, pair in enumerate(zip(packets, others, strict=False)) if pair[0] != pair[1]]
-            if not differ and len(packets) == len(others):
+            expected_packets, expected_images = _clip(second, expected_row, key)
+            pairs = zip(packets, expected_packets, strict=False)
+            differ = [index for index, (packet, expected_packet) in enumerate(pairs) if packet != expected_packet]
+            if not differ and len(packets) == len(expected_packets):
                 continue
             distances = [np.abs(a - b).max() for a, b in zip(images, expected_images, strict=False)]
-            sizes = [(len(packets[place]), len(others[place])) for place in differ[:3]]
+            sizes = [(len(packets[index]), len(expected_packets[index])) for index in differ[:3]]
             lines.append(
-                f"episode {row['episode_index']}, {key}: {len(differ)} of {len(packets)} packets differ ({len(others)} "
-                f"expected), the first {differ[:3]} of {sizes} bytes; images by up to {max(distances)} of 255 levels, "
-                f"the first at {int(np.argmax(np.array(distances) > 0))}"
+                f"episode {row['episode_index']}, {key}: {len(differ)} of {len(packets)} packets differ "
+                f"({len(expected_packets)} expected), the first {differ[:3]} of {sizes} bytes; images by up to "
+                f"{max(distances)} of 255 levels, the first at {int(np.argmax(np.array(distances) > 0))}"
             )
     return "\n".join(lines)
 

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Watch and measure a rollout of two agents
-# Anyone can sit at a seat: a policy, a scripted player, an earlier recording. Here the policy that comes with the
-# package acts for the robot, and a scripted partner that never gives in for the human. No person takes part.
+# An agent is a policy, a scripted player or an earlier recording. Here the policy that comes with the package acts at
+# the robot's seat, and a scripted partner that never yields at the human's. No person takes part.
 
 # %%
 from pathlib import Path
@@ -13,7 +13,7 @@ from copolicy.collect import make_agent, run_episodes
 from copolicy.dataset import get_task
 from copolicy.dataset.outline_figure import draw_fixed, show_whole
 
-PICTURES = Path("outputs/examples")
+FIGURES = Path("outputs/examples")
 EPISODES = 4
 
 robot = make_agent("policy:pretrained")
@@ -21,17 +21,17 @@ with_policy = run_episodes(robot, "scripted:stubborn", maps="unseen", limit=EPIS
 with_nothing = run_episodes("nothing", "scripted:stubborn", maps="unseen", limit=EPISODES)
 
 # %% [markdown]
-# ## How did it go?
-# An `Episode` has states, actions, and in `meta` how it ended. Success alone says little: a stubborn partner carries
-# the table to the goal beside a robot that does nothing, too. Time and interaction force differ.
+# ## Outcomes
+# An `Episode` has states, actions, and in `meta` its outcome. The success rate alone says little: a stubborn partner
+# also reaches the goal with a robot that does nothing. Time and interaction force differ.
 
 # %%
 task = get_task("table")
 for name, episodes in (("policy", with_policy), ("nothing", with_nothing)):
     seconds = np.mean([episode.meta.duration_s for episode in episodes])
     force = np.mean([np.abs(task.interaction(episode.states, episode.actions)).mean() for episode in episodes])
-    arrived = sum(episode.meta.success for episode in episodes)
-    print(f"{name:8} {arrived} of {len(episodes)} at the goal, {seconds:5.1f} s, interaction force {force:.2f}")
+    successes = sum(episode.meta.success for episode in episodes)
+    print(f"{name:8} {successes} of {len(episodes)} at the goal, {seconds:5.1f} s, interaction force {force:.2f}")
 
 # %% [markdown]
 # ## Paths
@@ -43,5 +43,5 @@ for axes, episodes, name in zip(panels, (with_policy, with_nothing), ("policy", 
     axes.plot(*episodes[0].path.T)
     show_whole(axes, task.outline)
     axes.set_title(f"robot: {name}, {episodes[0].meta.map_id}")
-PICTURES.mkdir(parents=True, exist_ok=True)
-figure.savefig(PICTURES / "rollouts.png")
+FIGURES.mkdir(parents=True, exist_ok=True)
+figure.savefig(FIGURES / "rollouts.png")

@@ -1,7 +1,8 @@
 # %% [markdown]
 # # Explore a data set
-# Open this file as a notebook (VS Code, PyCharm, Spyder, `jupytext --to ipynb`), or run it. It takes the data set of
-# `uv run copolicy-quickstart`: simulated pairs, no person took part. Name a folder or `USER/NAME` of the Hub instead.
+# Open this file as a notebook (VS Code, PyCharm, Spyder, `jupytext --to ipynb`), or run it. It reads the data set of
+# `uv run copolicy-quickstart` (simulated pairs, no person took part). Set `PATH` to another folder or to `USER/NAME`
+# on the Hub.
 
 # %%
 from collections import Counter
@@ -14,14 +15,14 @@ from copolicy.dataset import load_dataset
 from copolicy.dataset.outline_figure import draw_fixed, label_colours, show_whole
 
 PATH = "outputs/quickstart/dataset"
-PICTURES = Path("outputs/examples")
+FIGURES = Path("outputs/examples")
 
 dataset = load_dataset(PATH)
 print(dataset)
 
 # %% [markdown]
-# ## One row an episode
-# Who did what with whom, and how it ended: a pandas table of everything that `EpisodeMeta` names.
+# ## One row per episode
+# The episode columns (`EpisodeMeta`) as a pandas table: pair, map, source, outcome.
 
 # %%
 table = dataset.table.to_pandas()
@@ -41,12 +42,12 @@ above.plot(seconds, speed)
 above.set_ylabel("speed, px/s")
 below.plot(seconds, episode.interaction)
 below.set(xlabel="s", ylabel="interaction force")
-PICTURES.mkdir(parents=True, exist_ok=True)
-figure.savefig(PICTURES / "episode.png")
+FIGURES.mkdir(parents=True, exist_ok=True)
+figure.savefig(FIGURES / "episode.png")
 
 # %% [markdown]
-# ## Ways past the obstacles of one map
-# The map that most episodes have, with every episode's path in the colour of its route class.
+# ## Routes around the obstacles of one map
+# The most frequent map, with the path of every episode in the colour of its route class.
 
 # %%
 scenario, count = Counter(episode.scenario for episode in dataset.episodes).most_common(1)[0]
@@ -58,11 +59,11 @@ for episode in members:
     axes.plot(*episode.path.T, color=colours[episode.columns["route_class"]], linewidth=1)
 show_whole(axes, dataset.task.outline)
 axes.set_title(f"episodes of one map: {count}, source: {', '.join(sorted(set(table['source'])))}")
-figure.savefig(PICTURES / "routes.png")
+figure.savefig(FIGURES / "routes.png")
 
 # %% [markdown]
-# ## Is it sound?
-# The rules of `copolicy-dataset check`, as a list of findings.
+# ## Checks
+# The findings of `copolicy-dataset check`.
 
 # %%
 from copolicy.dataset import check_dataset  # noqa: E402

@@ -23,11 +23,11 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 import numpy as np
 
 from copolicy.collect.recording.recorder import EpisodeRecorder
-from copolicy.convert.lerobot.frames import frame_columns
+from copolicy.convert.lerobot.frame_columns import frame_columns
 from copolicy.convert.lerobot.prepare import Conversion
 from copolicy.convert.recordings import convert_recordings
 from copolicy.dataset.episode import EpisodeMeta
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.tasks.table.features import FEATURES, TASK
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.world import TableWorld

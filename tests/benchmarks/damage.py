@@ -21,7 +21,7 @@ from copolicy.collect.simulate.episode_job import record_episode
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.tasks.table.maps import MAP_SETS
 
 RESULT_COLUMNS = (

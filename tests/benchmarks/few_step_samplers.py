@@ -30,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from copolicy.dataset.command_line.commands import progress_bar
-from copolicy.evaluate.coplan.rollouts import Outcome, coplan
+from copolicy.evaluate.coplan.rollouts import EpisodeResult, coplan
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.routes import route_class
@@ -41,9 +41,9 @@ SAMPLERS = [(name, steps) for name in ("ddim", "dpmsolver++") for steps in (10, 
 SUCCESS_MARGIN, ENTROPY_MARGIN = 0.02, 0.1
 
 
-def route_entropy(outcomes: Sequence[Outcome]) -> float | None:
+def route_entropy(outcomes: Sequence[EpisodeResult]) -> float | None:
     """Entropy in bits of the routes that reached the goal on one map; None with fewer than two."""
-    routes = Counter(route_class(one.path, one.map_config) for one in outcomes if one.success and one.path is not None)
+    routes = Counter(route_class(one.path, one.scenario) for one in outcomes if one.success and one.path is not None)
     total = sum(routes.values())
     if total < 2:
         return None
@@ -51,14 +51,14 @@ def route_entropy(outcomes: Sequence[Outcome]) -> float | None:
     return -sum(share * math.log2(share) for share in shares) + (len(routes) - 1) / (2 * total * math.log(2))
 
 
-def success_share(outcomes: Sequence[Outcome]) -> float:
+def success_share(outcomes: Sequence[EpisodeResult]) -> float:
     """Share of the episodes that reached the goal."""
     return sum(outcome.success for outcome in outcomes) / len(outcomes)
 
 
-def by_map(outcomes: Sequence[Outcome]) -> list[list[Outcome]]:
+def by_map(outcomes: Sequence[EpisodeResult]) -> list[list[EpisodeResult]]:
     """The repeats of each map, in the order of the maps."""
-    groups: dict[int, list[Outcome]] = {}
+    groups: dict[int, list[EpisodeResult]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.map_index, []).append(outcome)
     return [groups[index] for index in sorted(groups)]
@@ -76,11 +76,11 @@ def paired(differences: Sequence[float]) -> dict[str, float | int | None]:
     }
 
 
-def compare(outcomes: Sequence[Outcome], reference: Sequence[Outcome]) -> dict:
+def compare(outcomes: Sequence[EpisodeResult], reference: Sequence[EpisodeResult]) -> dict:
     """One sampler against the reference, map by map."""
     pairs = list(zip(by_map(outcomes), by_map(reference), strict=True))
     success = paired([success_share(ours) - success_share(theirs) for ours, theirs in pairs])
-    entropies = [(route_entropy(a), route_entropy(b)) for a, b in pairs if a[0].map_config.obstacles]
+    entropies = [(route_entropy(a), route_entropy(b)) for a, b in pairs if a[0].scenario.obstacles]
     known = [(ours, theirs) for ours, theirs in entropies if ours is not None and theirs is not None]
     entropy = paired([ours - theirs for ours, theirs in known])
     accepted = (
@@ -138,7 +138,7 @@ def main() -> None:
     for sampler, steps in (REFERENCE, *SAMPLERS):
         sampling = {"sampler": sampler, "num_inference_steps": steps, "backend": arguments.backend, **settings}
         policy = Checkpoint(arguments.checkpoint, settings=sampling)
-        policy.n_action_steps = policy.wanted = 8  # as many as the study executes
+        policy.n_action_steps = policy.n_predicted_actions = 8  # as many as the study executes
         begin = time.perf_counter()
         with progress_bar(len(maps) * arguments.repeats, "episodes") as bar:
             outcomes = coplan(

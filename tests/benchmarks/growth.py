@@ -27,7 +27,7 @@ from pathlib import Path
 import psutil
 
 from copolicy.collect.simulate.command import simulate
-from copolicy.dataset.recording.log import read_episode, read_metadata
+from copolicy.dataset.recording.reader import read_episode, read_metadata
 
 PART = 1000
 _CONVERT = "from copolicy.convert.cli import main; raise SystemExit(main())"

@@ -1,6 +1,6 @@
 """SIGKILL at random moments of a real-time recording: how much of the running episode is gone, and nothing else.
 
-Each run starts `copolicy-collect play --headless` with two scripted pilots, which records at 30 Hz, episode after
+Each run starts `copolicy-collect play --headless` with two scripted players, which records at 30 Hz, episode after
 episode, and tells through a pipe each step that it has handed to the recorder and the digest of each file that it has
 finished. Then it is killed, the folder recovered, and what was told compared with what is there.
 
@@ -26,11 +26,11 @@ import numpy as np
 
 from copolicy.collect.play import trial
 from copolicy.collect.play.session_run import play
-from copolicy.collect.play.settings import PilotSpec, PlaySettings
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
 from copolicy.collect.recording.recorder import EpisodeRecorder
 from copolicy.collect.recording.recover import recover
 from copolicy.dataset.command_line.commands import progress
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task_spec import RECORD_HZ
 from copolicy.tasks.table.physics import Physics
 
@@ -65,9 +65,9 @@ class ShortEpisodes(PlaySettings):
     """A session whose episodes end early, so that kills also fall on beginnings and ends."""
 
     @property
-    def physics(self) -> Physics:
+    def world_settings(self) -> Physics:
         """With another limit."""
-        return replace(super().physics, step_limit=EPISODE_STEPS)
+        return replace(super().world_settings, step_limit=EPISODE_STEPS)
 
 
 class TellingRecorder(EpisodeRecorder):
@@ -90,8 +90,8 @@ class TellingRecorder(EpisodeRecorder):
 def record_until_killed(folder: Path) -> None:
     """The child: a session in real time that is never complete."""
     trial.EpisodeRecorder = TellingRecorder
-    pilots = (PilotSpec.parse("scripted"), PilotSpec.parse("scripted"))
-    play(ShortEpisodes(pair="K01", out=folder, pilots=pilots, episodes=1000, headless=True, countdown_s=0.0))
+    players = (PlayerSpec.parse("scripted"), PlayerSpec.parse("scripted"))
+    play(ShortEpisodes(pair="K01", out=folder, players=players, episodes=1000, headless=True, countdown_s=0.0))
 
 
 def kill_once(folder: Path, after_s: float) -> Kill:

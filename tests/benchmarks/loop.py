@@ -82,9 +82,9 @@ def measure(minutes: float, windowed: bool, size: str) -> dict:
     from virtual_joystick import VirtualJoystick
 
     from copolicy.collect.play.application import Application
-    from copolicy.collect.play.phase import To
+    from copolicy.collect.play.phase import NextPhase
     from copolicy.collect.play.session_run import prepared
-    from copolicy.collect.play.settings import PilotSpec, PlaySettings
+    from copolicy.collect.play.settings import PlayerSpec, PlaySettings
     from copolicy.collect.sdl import pygame
 
     pygame.display.init()
@@ -92,19 +92,19 @@ def measure(minutes: float, windowed: bool, size: str) -> dict:
     width, height = (int(side) for side in size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         settings = PlaySettings(
-            pair="bench", out=Path(folder) / "out", pilots=(PilotSpec("joystick"), PilotSpec("joystick")),
+            pair="bench", out=Path(folder) / "out", players=(PlayerSpec("joystick"), PlayerSpec("joystick")),
             episodes=100_000, headless=not windowed, window=(width, height), countdown_s=0.0, mute=True,
             config_folder=Path(folder),
         )  # fmt: skip
         with prepared(settings) as application:
             if windowed:
-                for pad in application.game.roster.pads:
-                    application.game.roster.give(pad)
-                application = Application(application.game, application._window, To.READY)
+                for pad in application.game.roster.gamepads:
+                    application.game.roster.assign(pad)
+                application = Application(application.game, application._window, NextPhase.READY)
             hands = _Hands(application, pads, minutes * 60)
             hands.start()
             application.run()
-            pictures = application.pictures
+            pictures = application.frames
         hands.join()
         return _read(settings.out, hands) | {"minutes": minutes, "pictures_a_second": round(pictures / minutes / 60, 1)}
 
@@ -133,7 +133,7 @@ class _Hands(threading.Thread):
                 pad.move(0.0, push if phase == "Running" else 0.0)
                 pad.axis(4, 2 * (count % _CODES) / _CODES - 1)
             self.set_ns[count] = time.monotonic_ns()
-            if phase in ("Ready", "Result", "Paused") and count % 50 == 0:
+            if phase in ("Ready", "ResultPhase", "Paused") and count % 50 == 0:
                 pads[0].button(0, count % 100 == 0)
             time.sleep(max(0.0, begin + count / _HZ - time.monotonic()))
         game.stop = "end of the benchmark"

@@ -79,12 +79,12 @@ def measure(plans: dict[str, Callable[[], object]], rounds: int, clock: Callable
 
 
 def planned(name: str, batch: dict[str, torch.Tensor], actions: int | None, made: CopolicyPolicy) -> Callable:
-    """A call that makes one plan, after saying once how long the first one took."""
+    """A call that samples once, after printing once how long the first one took."""
     begin = time.perf_counter()
-    made.plan(batch, actions=actions)
+    made.sample_actions(batch, actions=actions)
     if made.config.planner != "plain":
         print(f"first plan, with its tables: {1e3 * (time.perf_counter() - begin):7.1f} ms  {name}")
-    return lambda: made.plan(batch, actions=actions)
+    return lambda: made.sample_actions(batch, actions=actions)
 
 
 def one_plan(rounds: int, clock: Callable[[], float]) -> None:
@@ -159,10 +159,10 @@ def batches(rounds: int, clock: Callable[[], float]) -> None:
             for tables in (1, 2, 4, 8, 16, 32, 84):
                 batch = histories(tables)
                 made = {name: policy(preset, 5, **FEW, backend=name) for name in ("torch", "onnx", "numba", "auto")}
-                made["auto"].plan(batch, actions=actions)
+                made["auto"].sample_actions(batch, actions=actions)
                 (chosen,) = made.pop("auto").planned_with
                 plans: dict[str, Callable[[], object]] = {
-                    name: partial(planner.plan, batch, actions=actions) for name, planner in made.items()
+                    name: partial(planner.sample_actions, batch, actions=actions) for name, planner in made.items()
                 }
                 took = measure(plans, rounds, clock)
                 medians = " ".join(f"{statistics.median(values):>8.1f}" for values in took.values())

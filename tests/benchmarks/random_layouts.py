@@ -48,7 +48,7 @@ def main() -> None:
         outcomes = coplan(Checkpoint(policy), maps, Physics(step_limit=2000))
         rates = {"all": success_rate([outcome.success for outcome in outcomes])}
         for size in (1, 2, 3):
-            chosen = [o.success for o in outcomes if len(o.map_config.obstacles) == size]
+            chosen = [o.success for o in outcomes if len(o.scenario.obstacles) == size]
             rates[f"{size} obstacles"] = success_rate(chosen)
         shown = [
             f"{name} {100 * rate['mean']:.1f} ± {100 * rate['standard_error']:.1f} % of {rate['episodes']}"

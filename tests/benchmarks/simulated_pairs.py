@@ -1,13 +1,13 @@
-"""What simulated pairs do: success, time, routes beside people's, disagreement, leading, rests, slips, clearance.
+"""What simulated pairs do: success, time, routes beside people's, disagreement, leading, pauses, slips, clearance.
 
     uv run python tests/benchmarks/simulated_pairs.py                           records pairs-sim-376 for it, minutes
     uv run python tests/benchmarks/simulated_pairs.py --recordings recordings/pairs-sim-376
 
-The habits of the pilots were tuned on these very aggregates (time, clearance, shares of the human route labels), so
+The profiles of the players were tuned on these very aggregates (time, clearance, shares of the human route labels), so
 agreement with people is a fit, not a finding; nothing here was measured on people but the labels.
 
-What the pilots meant is read by letting them act once more on the recorded states; their actions must come out bit for
-bit, so recordings of other pilots are refused.
+The chosen routes are read by letting the players act once more on the recorded states; their actions must come out bit
+for bit, so recordings of other players are refused.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from copolicy.collect.simulate.recipes import RECIPES, Recipe
 from copolicy.dataset import clock
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.statistics.estimate import Estimate
 from copolicy.dataset.statistics.leadership import leadership_statistics
 from copolicy.dataset.statistics.resampling import Bootstrap
@@ -40,10 +40,10 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75)
 
 @dataclass(frozen=True)
 class Carried:
-    """One episode and what its players had in mind."""
+    """One episode with the routes that its players chose at the start."""
 
     episode: Episode
-    wanted: tuple[str, str]
+    chosen: tuple[str, str]
     changes: tuple[int, int]
     pauses: int
     slips: int
@@ -51,7 +51,7 @@ class Carried:
     @property
     def disagreed(self) -> bool:
         """Whether the two began with different routes."""
-        return self.wanted[0] != self.wanted[1]
+        return self.chosen[0] != self.chosen[1]
 
     @property
     def clearance(self) -> float:
@@ -64,16 +64,16 @@ class Carried:
 
 
 def carried(path: Path, recipe: Recipe) -> Carried:
-    """An episode whose pilots act once more on what they saw."""
+    """An episode, with the routes and changes of its players, who act once more on the recorded states."""
     episode = read_episode(path)
-    pilots = simulated_pair(episode.map_config, episode.meta.pair_id, episode.meta.seed, recipe.clearance)
-    wanted = (pilots[0].intention.route.sides, pilots[1].intention.route.sides)
-    again = np.array([np.concatenate([pilot.act(state) for pilot in pilots]) for state in episode.states])
-    if not np.array_equal(again, episode.actions):
-        raise SystemExit(f"{path}: expected actions of the pilots of this version and recipe, found others")
-    changes = (pilots[0].intention.changes, pilots[1].intention.changes)
-    pauses, slips = (sum(getattr(pilot.hand, name) for pilot in pilots) for name in ("pauses", "slips"))
-    return Carried(episode, wanted, changes, pauses, slips)
+    players = simulated_pair(episode.map_config, episode.meta.pair_id, episode.meta.seed, recipe.clearance)
+    chosen = (players[0].route_choice.route.sides, players[1].route_choice.route.sides)
+    repeated = np.array([np.concatenate([player.act(state) for player in players]) for state in episode.states])
+    if not np.array_equal(repeated, episode.actions):
+        raise SystemExit(f"{path}: expected actions of the players of this version and recipe, found others")
+    changes = (players[0].route_choice.changes, players[1].route_choice.changes)
+    pauses, slips = (sum(getattr(player.motor_noise, name) for player in players) for name in ("pauses", "slips"))
+    return Carried(episode, chosen, changes, pauses, slips)
 
 
 def frames(episodes: list[Episode]) -> Trajectories:
@@ -86,7 +86,7 @@ def frames(episodes: list[Episode]) -> Trajectories:
         )
         for e in episodes
     ]  # fmt: skip
-    return Trajectories.of(trips, rows, FPS)
+    return Trajectories.from_episodes(trips, rows, FPS)
 
 
 def report(name: str, runs: list[Carried]) -> None:
@@ -99,7 +99,7 @@ def report(name: str, runs: list[Carried]) -> None:
     speed = np.concatenate([np.hypot(e.states[:, 4], e.states[:, 5]) for e in episodes])
     disagreed = [run for run in runs if run.disagreed]
     clearance = np.quantile([run.clearance for run in runs], QUANTILES)
-    print(f"\n{name}: {len(runs)} episodes of simulated pairs, no person took part; habits tuned on these aggregates")
+    print(f"\n{name}: {len(runs)} episodes of simulated pairs, no person took part; profiles tuned on these aggregates")
     _line("success", f"{100 * len(good) / len(runs):.1f} %; " + ", ".join(f"{k} {v}" for k, v in ends.most_common()))
     _line("steps of successes", f"{steps.mean():.0f} ± {steps.std(ddof=1):.0f} of 1/{RECORD_HZ} s ({_range(steps)})")
     _line("speed", f"mean {speed.mean():.1f} px/s, 95 % below {np.quantile(speed, 0.95):.1f}")

@@ -21,7 +21,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.tasks.table.features import FEATURES
-from copolicy.train.frame_table import FrameTable
+from copolicy.train.frame_tensors import FrameTensors
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
@@ -99,7 +99,7 @@ def _make_step(settings: dict, size: int, device: torch.device, kind: str) -> Ca
         **dict.fromkeys(_KINDS, config.observation_delta_indices),
         ACTION: config.action_delta_indices,
     }
-    table = FrameTable(columns, (frames // 500 * 500, frames // 500 * 500 + 499), windows).to(device)
+    table = FrameTensors(columns, (frames // 500 * 500, frames // 500 * 500 + 499), windows).to(device)
     optimizer = config.get_optimizer_preset().build(policy.get_optim_params())
     order = torch.Generator().manual_seed(0)
 

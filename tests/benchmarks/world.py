@@ -16,9 +16,9 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
 
 from copolicy.tasks.table.agents import simulated_pair
+from copolicy.tasks.table.geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, IMAGE_SIZE, TRIANGLE
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.maps import MAP_SETS
-from copolicy.tasks.table.outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, IMAGE_SIZE, TRIANGLE
 from copolicy.tasks.table.physics import GOAL_SIZE
 from copolicy.tasks.table.world import TableWorld
 

@@ -1,7 +1,7 @@
-"""LeRobot plugin of tasks for two players: importing it registers policy, environments and teleoperator.
+"""LeRobot plugin for tasks of two players: importing it registers the policy, environments and teleoperator.
 
-LeRobot imports this module because the distribution has the same name; networks, torch modules, the simulator
-and pygame are imported only when a policy, an environment or a teleoperator is built.
+LeRobot imports this module because the distribution has the same name; networks, the simulator and pygame are imported
+only when a policy, an environment or a teleoperator is created.
 """
 
 from .copolicy.configuration_copolicy import CopolicyConfig

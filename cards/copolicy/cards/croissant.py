@@ -1,8 +1,8 @@
-"""Croissant 1.0 metadata of a data set as JSON-LD, which search engines and loaders of other projects read.
+"""Croissant 1.0 metadata of a data set as JSON-LD, for search engines and loaders of other projects.
 
-The data lie in the repository on the Hub, described as one file object that is fetched with git, as the Hub's own
-Croissant files have it; every file of the data is named in it with its sha256. A copy on the disk is read by naming its
-folder: `mlcroissant.Dataset("meta/croissant.json", mapping={"repository": FOLDER})`.
+The Hub repository is one file object fetched with git, as in the Hub's own Croissant files; every data file is listed
+in it with its sha256. To read a local copy:
+`mlcroissant.Dataset("meta/croissant.json", mapping={"repository": FOLDER})`.
 Format: https://docs.mlcommons.org/croissant/docs/croissant-spec.html
 """
 
@@ -19,20 +19,20 @@ from .dataset_card import licence
 from .facts import DatasetFacts
 
 REPOSITORY = "repository"
-"""Id of what the data files lie in; a reader maps it to a folder."""
+"""Id of the file object that contains the data files; a reader maps it to a folder."""
 
 _TYPES = {
     "float32": "sc:Float", "float64": "sc:Float", "int64": "sc:Integer", "bool": "sc:Boolean", "string": "sc:Text",
     "float": "sc:Float", "int": "sc:Integer", "str": "sc:Text",
 }  # fmt: skip
-_PICTURES = ("video", "image")
+_IMAGES = ("video", "image")
 _TERMS = (
     "@language", "@vocab", "citeAs", "column", "conformsTo", "cr", "rai", "data", "dataType", "dct",
     "equivalentProperty", "examples", "extract", "field", "fileProperty", "fileObject", "fileSet", "format",
     "includes", "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet", "references", "regex",
     "repeated", "replace", "samplingRate", "sc", "separator", "source", "subField", "transform",
 )  # fmt: skip
-_ELSEWHERE = {
+_OTHER_TERMS = {
     "@language": "en",
     "@vocab": "https://schema.org/",
     "conformsTo": "dct:conformsTo",
@@ -44,14 +44,14 @@ _ELSEWHERE = {
     "examples": {"@id": "cr:examples", "@type": "@json"},
     "sc": "https://schema.org/",
 }
-_CONTEXT = {name: _ELSEWHERE.get(name, f"cr:{name}") for name in _TERMS}
-"""Croissant's terms are its own, but for those that are defined elsewhere."""
+_CONTEXT = {name: _OTHER_TERMS.get(name, f"cr:{name}") for name in _TERMS}
+"""Terms in the namespace of Croissant, except those of other vocabularies."""
 
 
 def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> str:
-    """The JSON-LD: every data file with its hash, one record set of frames and one of episodes.
+    """Renders the JSON-LD: every data file with its hash, one record set of frames and one of episodes.
 
-    Version and date of publication are those of the newest release, and left out where there is none.
+    Version and date of publication are those of the newest release, absent without a release.
 
     Raises:
         InvalidValueError: a licence that is not in the Hub's form.
@@ -60,7 +60,7 @@ def croissant_text(facts: DatasetFacts, repo_id: str, pretty_name: str | None = 
 
 
 def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | None = None) -> dict[str, Any]:
-    """The same as a JSON-able dict."""
+    """The content of `croissant_text` as a JSON-able dict."""
     release, words = newest_release(facts.root) or {}, facts.words
     url = f"https://huggingface.co/datasets/{repo_id}"
     metadata: dict[str, Any] = {
@@ -79,9 +79,9 @@ def croissant_metadata(facts: DatasetFacts, repo_id: str, pretty_name: str | Non
                          *_file_set(facts.root, "episodes", "meta/episodes")],
         "recordSet": [_frames(facts), _episodes(facts)],
     }  # fmt: skip
-    stated = licence(facts)
-    if stated not in ("unknown", "other"):
-        metadata["license"] = stated
+    identifier = licence(facts)
+    if identifier not in ("unknown", "other"):
+        metadata["license"] = identifier
     if "version" in release:
         metadata |= {"version": release["version"], "datePublished": release["date"]}
     return metadata
@@ -92,25 +92,25 @@ def _repository(url: str) -> dict[str, Any]:
         "@type": "cr:FileObject",
         "@id": REPOSITORY,
         "name": REPOSITORY,
-        "description": "The data set's repository; the files in it have their own check sums.",
+        "description": "The data set's repository; each file in it has its own check sum.",
         "contentUrl": url,
         "encodingFormat": "git+https",
-        # The format asks for a check sum of every file object; a repository has none, and this issue is what stands
-        # in its place in the Croissant files of the Hub.
+        # The format requires a check sum of every file object. A repository has none; the Hub's own Croissant files
+        # put this issue in its place.
         "sha256": "https://github.com/mlcommons/croissant/issues/80",
     }
 
 
 def _file_set(root: Path, name: str, folder: str) -> list[dict[str, Any]]:
-    """A file set of the Parquet files in a folder, and each of them with its check sum."""
+    """A file set of the Parquet files in a folder, and a file object with check sum for each of them."""
     parquet = "application/x-parquet"
     within = {"containedIn": {"@id": REPOSITORY}, "encodingFormat": parquet}
     files = {"@type": "cr:FileSet", "@id": f"{name}-files", "name": f"{name}-files", **within}
     return [{**files, "includes": f"{folder}/*/*.parquet"}, *(
-        {"@type": "cr:FileObject", "@id": place, "name": place, "contentUrl": place, **within,
+        {"@type": "cr:FileObject", "@id": name, "name": name, "contentUrl": name, **within,
          "contentSize": f"{path.stat().st_size} B", "sha256": _sha256(path)}
         for path in visible_files(root / folder, "*.parquet")
-        for place in (path.relative_to(root).as_posix(),)
+        for name in (path.relative_to(root).as_posix(),)
     )]  # fmt: skip
 
 
@@ -120,10 +120,10 @@ def _sha256(path: Path) -> str:
 
 
 def _frames(facts: DatasetFacts) -> dict[str, Any]:
-    """The columns of the data files; pictures lie in files of their own."""
+    """The columns of the data files; images are in separate files."""
     fields = []
     for key, feature in facts.info["features"].items():
-        if feature["dtype"] in _PICTURES:
+        if feature["dtype"] in _IMAGES:
             continue
         names = feature.get("names")
         field = _field("frames", key, feature["dtype"], ", ".join(map(str, names)) if isinstance(names, list) else key)
@@ -134,7 +134,7 @@ def _frames(facts: DatasetFacts) -> dict[str, Any]:
         "@type": "cr:RecordSet",
         "@id": "frames",
         "name": "frames",
-        "description": f"One record a frame, {facts.info['fps']:g} a second.",
+        "description": f"One record per frame, {facts.info['fps']:g} per second.",
         "key": {"@id": "frames/index"},
         "field": fields,
     }
@@ -143,8 +143,8 @@ def _frames(facts: DatasetFacts) -> dict[str, Any]:
 def _episodes(facts: DatasetFacts) -> dict[str, Any]:
     columns = {"episode_index": "int", "length": "int", **EPISODE_COLUMNS}
     columns = {
-        name: kind
-        for name, kind in columns.items()
+        name: dtype
+        for name, dtype in columns.items()
         if name in facts.folder.episodes.column_names or name not in LATER_COLUMNS
     }
     return {
@@ -153,16 +153,16 @@ def _episodes(facts: DatasetFacts) -> dict[str, Any]:
         "name": "episodes",
         "description": facts.words.record,
         "key": {"@id": "episodes/episode_index"},
-        "field": [_field("episodes", name, kind, name.replace("_", " ")) for name, kind in columns.items()],
+        "field": [_field("episodes", name, dtype, name.replace("_", " ")) for name, dtype in columns.items()],
     }
 
 
-def _field(records: str, column: str, kind: str, description: str) -> dict[str, Any]:
+def _field(record_set: str, column: str, dtype: str, description: str) -> dict[str, Any]:
     return {
         "@type": "cr:Field",
-        "@id": f"{records}/{column}",
-        "name": f"{records}/{column}",
+        "@id": f"{record_set}/{column}",
+        "name": f"{record_set}/{column}",
         "description": description,
-        "dataType": _TYPES.get(kind, "sc:Text"),
-        "source": {"fileSet": {"@id": f"{records}-files"}, "extract": {"column": column}},
+        "dataType": _TYPES.get(dtype, "sc:Text"),
+        "source": {"fileSet": {"@id": f"{record_set}-files"}, "extract": {"column": column}},
     }

@@ -1,37 +1,36 @@
-"""The card of a data set: Hub metadata in YAML, and a README that states only what the data set's metadata holds."""
+"""The card of a data set: Hub metadata in YAML, and a README with facts from the data set's metadata only."""
 
 from collections.abc import Iterable
 
 from huggingface_hub import DatasetCardData
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.lerobot_folder.exclusions import FLAG
-from copolicy.dataset.physics_text import physics_counts
+from copolicy.dataset.lerobot_folder.exclusions import EXCLUDED_PREFIX
 from copolicy.dataset.publication.licences import checked_licence, licence_identifier
 from copolicy.dataset.publication.minimal_card import CONFIGS
 from copolicy.dataset.publication.repo_id import checked_repo_id
 from copolicy.dataset.scenarios import set_label
+from copolicy.dataset.settings_text import count_settings
 from copolicy.dataset.task_words import TaskWords
 
 from .artefacts import newest_release
 from .datasheet import datasheet
 from .facts import DatasetFacts
 from .findings import findings
-from .markdown import left_out, share, table
+from .formatting import count_text, missing_part_note, table
 from .multimodality import multimodality
 
 _UPSTREAM = (
-    "Imported from files of the original program of Ng, Liu and Kennedy (RA-L 2023){} do not say who or what held the "
-    "sticks."
+    "Imported from files of the original program of Ng, Liu and Kennedy (RA-L 2023){} do not state who or what played."
 )
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
-_LISTED = 400  # episodes; a longer list is for a command to print
+_MAX_LISTED = 400  # episodes printed on the card; `copolicy-dataset exclude --list` prints a longer list
 
 
 def source_text(source: str, words: TaskWords, page: bool = False) -> str:
-    """Who played, on a card or on the page."""
+    """Sentence on who played, for a card or the report page."""
     if source == "human":
         return "People played these episodes, two at a time, with one controller each."
     if source == "upstream":
@@ -39,25 +38,25 @@ def source_text(source: str, words: TaskWords, page: bool = False) -> str:
     if source != "simulated":
         return f"Source: {source}."
     if page:
-        before, about = "Simulated pairs: no person took part.", "on this page that includes them"
+        opening, scope = "Simulated pairs: no person took part.", "on this page that includes them"
     else:
-        before, about = "**No person took part.**", "made with these episodes"
-    return f"{before} {words.stand_in} No figure {about} is a result about people."
+        opening, scope = "**No person took part.**", "made with these episodes"
+    return f"{opening} {words.stand_in} No figure {scope} is a result about people."
 
 
 def citation(words: TaskWords) -> list[str]:
-    """The section on the paper behind a task, where there is one."""
+    """The section that cites the paper of a task; empty if there is none."""
     return [f"## Citation\n\n{words.citation}\n\n```bibtex\n{words.paper}\n```"] if words.paper else []
 
 
-def render(
+def render_dataset_card(
     facts: DatasetFacts, repo_id: str, pretty_name: str | None = None, figures: Iterable[tuple[str, str]] = ()
 ) -> str:
-    """The text of `README.md` for a data set.
+    """Renders `README.md` of a data set.
 
     Args:
         repo_id: `user/name` of the data set, for the loading example.
-        figures: path in the data set's folder and caption of each picture.
+        figures: path in the data set's folder and caption of each figure.
 
     Raises:
         InvalidValueError: `repo_id` or a licence is not in the Hub's form.
@@ -82,7 +81,7 @@ def render(
 
 
 def hub_metadata(facts: DatasetFacts, title: str) -> DatasetCardData:
-    """The YAML block that the Hub reads."""
+    """The YAML block for the Hub."""
     sources = facts.values("source")
     return DatasetCardData(
         license=licence(facts),
@@ -95,8 +94,8 @@ def hub_metadata(facts: DatasetFacts, title: str) -> DatasetCardData:
 
 
 def licence(facts: DatasetFacts) -> str:
-    """The Hub's identifier: the one licence of all episodes, `other` for several, `unknown` where one has none."""
-    # Recordings may have been made where nobody looked at the spelling.
+    """Hub identifier of the licence of all episodes; `other` for several, `unknown` if an episode has none."""
+    # Recordings may spell a licence differently.
     licences = {licence_identifier(text) or text for text in facts.counts("license")}
     if "" in licences:
         return "unknown"
@@ -120,7 +119,7 @@ def _overview(facts: DatasetFacts, title: str) -> str:
                     ("frames", f"{info['total_frames']:,}"),
                     ("rate of the frames", f"{info['fps']:g} Hz"),
                     ("recorded time", f"{facts.seconds / 60:.1f} min"),
-                    (words.success, share(facts.successes, len(facts.episodes))),
+                    (words.success, count_text(facts.successes, len(facts.episodes))),
                     ("physics", _physics(facts)),
                     ("format", f"LeRobot {info['codebase_version']}"),
                 ),
@@ -131,11 +130,11 @@ def _overview(facts: DatasetFacts, title: str) -> str:
 
 def _physics(facts: DatasetFacts) -> str:
     try:
-        counts = physics_counts((episode["physics"] for episode in facts.episodes), facts.task)
+        counts = count_settings((episode["physics"] for episode in facts.episodes), facts.task)
     except InvalidValueError as error:
-        raise FileFormatError(facts.root, "episodes whose settings of the dynamics can be read", str(error)) from None
+        raise FileFormatError(facts.root, "episodes with valid physics settings", str(error)) from None
     total = len(facts.episodes)
-    return "; ".join(f"{words} ({count} of {total} episodes)" for words, count in counts.items())
+    return "; ".join(f"{physics} ({count} of {total} episodes)" for physics, count in counts.items())
 
 
 def _episodes(facts: DatasetFacts) -> str:
@@ -148,25 +147,25 @@ def _episodes(facts: DatasetFacts) -> str:
             name,
             len({e["map_id"] for e in members}),
             len(members),
-            share(sum(e["success"] for e in members), len(members)),
+            count_text(sum(e["success"] for e in members), len(members)),
         )
         for name, members in sorted(sets.items())
         if name
     ]
-    reasons = [(reason, share(count, total)) for reason, count in facts.counts("termination_reason").items()]
-    words, kept = facts.words, "Failures and time-outs are kept and marked."
+    reasons = [(reason, count_text(count, total)) for reason, count in facts.counts("termination_reason").items()]
+    words, failures = facts.words, "Failures and time-outs are included and marked."
     if facts.task.offers("strategy"):
-        kept += f" {words.label.capitalize()}s{words.labels[0] and f', {words.labels[0]}'}:"
+        failures += f" {words.label.capitalize()}s{words.labels[0] and f', {words.labels[0]}'}:"
         routes = [(label or "none", count) for label, count in facts.counts("route_class").items()]
         labels = [table((words.label, "episodes"), routes)]
     else:
-        labels = [left_out(facts.task, "strategy labels")]
+        labels = [missing_part_note(facts.task, "strategy labels")]
     return "\n\n".join(
         (
             "## Episodes",
             table((f"{words.scenario} set", words.scenarios, "episodes", words.success), maps),
             table(("ended by", "episodes"), reasons),
-            kept,
+            failures,
             *labels,
         )
     )
@@ -174,15 +173,16 @@ def _episodes(facts: DatasetFacts) -> str:
 
 def _features(facts: DatasetFacts) -> str:
     rows = [
-        (f"`{key}`", feature["dtype"], "x".join(map(str, feature["shape"])), ", ".join(_names(feature)))
+        (f"`{key}`", feature["dtype"], "x".join(map(str, feature["shape"])),
+         ", ".join(map(str, names)) if isinstance(names := feature.get("names"), list) else "")
         for key, feature in facts.info["features"].items()
-    ]
+    ]  # fmt: skip
     return "\n\n".join(
         (
             "## Features",
             table(("key", "type", "shape", "names"), rows),
-            f"{facts.words.numbers} An action is stored with the state it was taken in; "
-            "`observation.human_action` is the human's action of the frame before.",
+            f"{facts.words.numbers} An action is stored with the state in which it was taken; "
+            "`observation.human_action` is the human's action of the previous frame.",
         )
     )
 
@@ -190,7 +190,7 @@ def _features(facts: DatasetFacts) -> str:
 def _loading(facts: DatasetFacts, repo_id: str) -> str:
     release = newest_release(facts.root)
     revision = f', revision="data-{release["version"]}"' if release and "version" in release else ""
-    return f"""## How to load it, and how to train on it
+    return f"""## Loading and training
 
 ```python
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -205,47 +205,38 @@ copolicy-train --policy.type=copolicy --dataset.repo_id={repo_id}
 ```"""
 
 
-def _names(feature: dict) -> Iterable[str]:
-    names = feature.get("names")
-    return map(str, names) if isinstance(names, list) else ()
-
-
 def _excluded(facts: DatasetFacts, repo_id: str) -> list[str]:
-    """The section on excluded episodes, where there are any; none otherwise.
-
-    Args:
-        repo_id: `user/name` of the data set, for the examples.
-    """
-    marked = [episode for episode in facts.episodes if episode.get("discarded")]
-    if not marked:
+    """The section on excluded episodes, empty if there are none; `repo_id` is used in the examples."""
+    discarded = [episode for episode in facts.episodes if episode.get("discarded")]
+    if not discarded:
         return []
     included = [str(episode["episode_index"]) for episode in facts.episodes if not episode.get("discarded")]
-    named = f"'[{','.join(included)}]'" if len(included) <= _LISTED else "LIST"
-    rows = [(episode["episode_index"], _why(str(episode.get("quality_flags") or ""))) for episode in marked]
+    episodes = f"'[{','.join(included)}]'" if len(included) <= _MAX_LISTED else "LIST"
+    rows = [(episode["episode_index"], _exclusion_reason(str(episode["quality_flags"] or ""))) for episode in discarded]
     return [
         f"""## Excluded episodes
 
-{len(marked)} of {len(facts.episodes)} episodes are kept and marked as not to be used (column `discarded` of
+{len(discarded)} of {len(facts.episodes)} episodes are stored but marked as excluded (column `discarded` of
 `meta/episodes`):
 
-{table(("episode", "why"), rows)}
+{table(("episode", "reason"), rows)}
 
-`copolicy-train` leaves them out. LeRobot knows no such mark: its own trainer and loader take every episode unless they
-are told which ones (`copolicy-dataset exclude FOLDER --list` prints the list).
+`copolicy-train` skips them. LeRobot ignores the mark: its trainer and loader use every episode unless a list is given
+(`copolicy-dataset exclude FOLDER --list` prints it).
 
 ```bash
-lerobot-train --dataset.repo_id={repo_id} --dataset.episodes={named} ...
+lerobot-train --dataset.repo_id={repo_id} --dataset.episodes={episodes} ...
 ```
 
 ```python
 from lerobot.datasets import LeRobotDataset, LeRobotDatasetMetadata
 
-marked = LeRobotDatasetMetadata("{repo_id}").episodes["discarded"]
-dataset = LeRobotDataset("{repo_id}", episodes=[k for k, mark in enumerate(marked) if not mark])
+discarded = LeRobotDatasetMetadata("{repo_id}").episodes["discarded"]
+dataset = LeRobotDataset("{repo_id}", episodes=[k for k, flag in enumerate(discarded) if not flag])
 ```"""
     ]
 
 
-def _why(flags: str) -> str:
-    reasons = [flag.removeprefix(FLAG) for flag in flags.split(",") if flag.startswith(FLAG)]
+def _exclusion_reason(flags: str) -> str:
+    reasons = [flag.removeprefix(EXCLUDED_PREFIX) for flag in flags.split(",") if flag.startswith(EXCLUDED_PREFIX)]
     return reasons[0] if reasons else "discarded while recording"

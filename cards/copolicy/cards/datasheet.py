@@ -1,6 +1,6 @@
-"""The datasheet of a data set after Gebru et al., "Datasheets for Datasets" (CACM 2021), from its metadata alone.
+"""The datasheet of a data set after Gebru et al., "Datasheets for Datasets" (CACM 2021), from its metadata only.
 
-What the metadata does not say is called not stated, so that a reader knows what to ask.
+Facts that the metadata lacks are given as "not stated".
 """
 
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ from copolicy.dataset.versions.withdrawals import read_withdrawals
 
 from .artefacts import newest_release
 from .facts import DatasetFacts
-from .markdown import listing, share
+from .formatting import count_text, counts_text
 
 
 def datasheet(facts: DatasetFacts) -> Iterator[str]:
-    """The sections, in the order of the paper."""
+    """Yields the sections, in the order of the paper."""
     for heading, lines in (
         ("Motivation", _motivation(facts)),
         ("Composition", _composition(facts)),
@@ -33,8 +33,8 @@ def datasheet(facts: DatasetFacts) -> Iterator[str]:
 
 def _motivation(facts: DatasetFacts) -> list[str]:
     return [
-        f"Purpose: learning and judging policies that {facts.words.purpose}.",
-        "Who made it and who paid for it: not stated in the metadata.",
+        f"Purpose: training and evaluating policies that {facts.words.purpose}.",
+        "Creators and funding: not stated in the metadata.",
     ]
 
 
@@ -44,11 +44,11 @@ def _composition(facts: DatasetFacts) -> list[str]:
     return [
         f"An instance is an episode: {facts.words.episode}, {lengths[0]} to {lengths[-1]} frames "
         f"(median {lengths[len(lengths) // 2]}).",
-        f"Each has states, the joint action of both players, the {facts.words.scenario}, and who did it with whom.",
+        f"Each has states, the joint action of both players, the {facts.words.scenario}, and the players' pseudonyms.",
         f"Splits: {', '.join(f'{name} {span}' for name, span in facts.info.get('splits', {}).items()) or 'none'}",
-        f"Marked as discarded (kept, left out of training): {share(discarded, len(facts.episodes))}",
-        f"Quality flags, exclusions with their reasons among them: {_flags(facts)}",
-        "People appear under pseudonyms only; there is no image, sound or name in the data.",
+        f"Marked as discarded (stored, not used in training): {count_text(discarded, len(facts.episodes))}",
+        f"Quality flags, including reasons of exclusions: {_flags(facts)}",
+        "People are identified by pseudonyms only; the data hold no image, sound or name of a person.",
     ]
 
 
@@ -59,7 +59,7 @@ def _flags(facts: DatasetFacts) -> str:
 
 def _collection(facts: DatasetFacts) -> list[str]:
     lines = [
-        f"{label}: {listing(facts.counts(column))}"
+        f"{label}: {counts_text(facts.counts(column))}"
         for label, column in (
             ("Source", "source"),
             ("Sessions", "session_id"),
@@ -69,55 +69,53 @@ def _collection(facts: DatasetFacts) -> list[str]:
             ("Software", "software_version"),
         )
     ]
-    rates = _known(facts, "achieved_hz")
+    rates = _known_values(facts, "achieved_hz")
     if rates:
-        lines.append(f"Achieved rate of recording: {min(rates):.4g} to {max(rates):.4g} Hz")
+        lines.append(f"Achieved recording rate: {min(rates):.4g} to {max(rates):.4g} Hz")
     lines.append(f"Late ticks: {sum(episode['late_ticks'] for episode in facts.episodes)}")
-    drift = _known(facts, "replay_drift_px")
+    drift = _known_values(facts, "replay_drift_px")
     if drift:
-        unit = facts.task.outline.unit if facts.task.outline else "of its unit"
-        lines.append(f"Recorded against re-simulated position: at most {max(drift):.3g} {unit} apart")
+        unit = facts.task.outline.unit if facts.task.outline else "(unit of the task)"
+        lines.append(f"Distance between recorded and re-simulated position: at most {max(drift):.3g} {unit}")
     return lines
 
 
-def _known(facts: DatasetFacts, column: str) -> list[float]:
+def _known_values(facts: DatasetFacts, column: str) -> list[float]:
     values = [episode[column] for episode in facts.episodes]
     return [value for value in values if value is not None and value == value]
 
 
 def _preprocessing(facts: DatasetFacts) -> list[str]:
     action = facts.info["features"].get(ACTION, {})
-    lines = [
-        f"Frames at {facts.info['fps']:g} Hz, taken from a recording at {action.get('record_hz', 'not stated')} Hz"
-    ]
+    lines = [f"Frames at {facts.info['fps']:g} Hz, from a recording at {action.get('record_hz', 'not stated')} Hz"]
     if "hold" in action:
-        lines.append(f"The action of a frame is the {action['hold']} of the recorded actions until the next frame")
+        lines.append(f"Downsampling: the {action['hold']} of the recorded actions until the next frame")
     record = read_optional_json(facts.root / RECORD_FILE, ConversionRecord, "the record of a conversion")
     if record is None:
         return [*lines, f"Conversion: not stated (no `{RECORD_FILE}`)"]
     lines.append(f"Converted by `{record.get('converter', 'not stated')}` {record.get('version', '')}".rstrip())
     left_out = record.get("left_out")
     if isinstance(left_out, dict):
-        counts = ", ".join(f"{len(names)} {why}" for why, names in left_out.items() if isinstance(names, list))
-        lines.append(f"Left out at conversion: {counts or 'none'}")
+        counts = ", ".join(f"{len(names)} {reason}" for reason, names in left_out.items() if isinstance(names, list))
+        lines.append(f"Skipped at conversion: {counts or 'none'}")
     notes = record.get("notes") or {}
-    lines.append(f"Episodes with a note on what was mended or doubtful: {len(notes)} (`{RECORD_FILE}`)")
+    lines.append(f"Episodes with a note on repaired or unverified data: {len(notes)} (`{RECORD_FILE}`)")
     sources = sum(bool(episode["source_sha256"]) for episode in facts.episodes)
-    lines.append(f"Episodes that name the hash of the file they were made from: {share(sources, len(facts.episodes))}")
+    lines.append(f"Episodes with the hash of their source file: {count_text(sources, len(facts.episodes))}")
     return lines
 
 
 def _uses(facts: DatasetFacts) -> list[str]:
     sources = facts.values("source")
     lines = [
-        "For: imitation learning of co-policies, prediction of a partner's action, statistics of shared decisions.",
-        "Not for: identifying people, or judging a single player.",
+        "Intended: imitation learning of co-policies, prediction of partner actions, statistics of shared decisions.",
+        "Not intended: identifying people, or assessing a single player.",
     ]
     if "simulated" in sources:
-        lines.append("Not for: claims about people, as far as simulated episodes are involved.")
+        lines.append("Not intended: claims about people from simulated episodes.")
     if "upstream" in sources:
-        lines.append("With care: the imported files do not say who or what held the sticks.")
-    return [*lines, f"{facts.words.limits}; nothing here says how a policy behaves on a real robot."]
+        lines.append("Caution: the imported files do not state who or what played.")
+    return [*lines, f"{facts.words.limits}; the data do not show how a policy behaves on a real robot."]
 
 
 def _distribution(facts: DatasetFacts) -> list[str]:
@@ -129,25 +127,25 @@ def _distribution(facts: DatasetFacts) -> list[str]:
 def _maintenance(facts: DatasetFacts) -> list[str]:
     release = newest_release(facts.root)
     if release is None:
-        return ["Not released yet: no version, no change log.", "Contact: not stated in the metadata."]
+        return ["Not released: no version and no change log.", "Contact: not stated in the metadata."]
     lines = [f"Version {release.get('version')} of {release.get('date')}; changes are in `CHANGELOG.md`."]
     if "content_hash" in release:
-        lines.append(f"Content hash, independent of how files are laid out: `{release['content_hash']}`")
+        lines.append(f"Content hash, independent of the file layout: `{release['content_hash']}`")
     return [*lines, "Contact: not stated in the metadata."]
 
 
 def _consent(facts: DatasetFacts) -> list[str]:
     people = [episode for episode in facts.episodes if episode["source"] == "human"]
     withdrawn = sum(entry["episodes"] for entry in read_withdrawals(facts.root))
-    gone = [f"Withdrawn so far: {withdrawn} episodes, which are in no file of this version."] if withdrawn else []
+    removed = [f"Withdrawn so far: {withdrawn} episodes, which are in no file of this version."] if withdrawn else []
     if not people:
-        return ["No episode is marked as played by people, so there is no consent to state.", *gone]
-    named = sum(bool(episode["consent_id"]) for episode in people)
+        return ["No episode is marked as played by people, so no consent is stated.", *removed]
+    consented = sum(bool(episode["consent_id"]) for episode in people)
     return [
-        f"Consent: {share(named, len(people))} episodes played by people name a consent record (by its identifier; the "
-        "record itself is kept by whoever recorded)",
-        "Withdrawal: whoever recorded deletes a person's episodes by their consent id "
+        f"Consent: {count_text(consented, len(people))} episodes played by people state the identifier of a consent "
+        "record, which the recording lab keeps",
+        "Withdrawal: the recording lab deletes a person's episodes by consent id "
         "(`copolicy-dataset withdraw CONSENT_ID PATH... --yes`: recordings, data set, raw copies and the records of "
-        "earlier releases) and publishes the next version; copies that were downloaded before cannot be called back.",
-        *gone,
+        "earlier releases) and publishes the next version; earlier downloads cannot be deleted.",
+        *removed,
     ]

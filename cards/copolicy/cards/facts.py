@@ -1,4 +1,4 @@
-"""What a data set says of itself: everything a card may state, read from the folder and from nowhere else."""
+"""Reads the facts that a card of a data set states, from the data set's folder only."""
 
 import math
 from collections import Counter
@@ -19,7 +19,7 @@ class DatasetFacts:
     """The metadata of a LeRobot v3 data set and its episodes.
 
     Attributes:
-        episodes: one dict an episode with its episode columns and `length` (frames).
+        episodes: one dict per episode with its episode columns and `length` (frames).
     """
 
     folder: LeRobotFolder
@@ -37,8 +37,8 @@ class DatasetFacts:
         episodes = tuple(folder.rows())
         count, frames = folder.info["total_episodes"], folder.info["total_frames"]
         if len(episodes) != count or sum(folder.lengths) != frames:
-            found = f"{len(episodes)} episodes with {sum(folder.lengths)} frames"
-            raise FileFormatError(root / INFO_FILE, f"{count} episodes with {frames} frames in meta/episodes", found)
+            contents = f"{len(episodes)} episodes with {sum(folder.lengths)} frames"
+            raise FileFormatError(root / INFO_FILE, f"{count} episodes with {frames} frames in meta/episodes", contents)
         return cls(folder, episodes)
 
     @property
@@ -53,7 +53,7 @@ class DatasetFacts:
 
     @property
     def words(self) -> TaskWords:
-        """How that task is spoken of."""
+        """The phrases of the task."""
         return self.task.words
 
     @property
@@ -62,7 +62,7 @@ class DatasetFacts:
         return self.folder.info
 
     def counts(self, column: str) -> dict[str, int]:
-        """How many episodes have each value of a column, most frequent first."""
+        """Number of episodes with each value of a column, most frequent first."""
         counter = Counter(str(episode[column]) for episode in self.episodes)
         return dict(sorted(counter.items(), key=lambda item: (-item[1], item[0])))
 
@@ -72,12 +72,12 @@ class DatasetFacts:
 
     @property
     def seconds(self) -> float:
-        """Recorded time in all, s; an episode that does not say counts with its frames."""
+        """Total recorded time, s; computed from the frames for an episode without a duration."""
         fps = self.info["fps"]
         times = ((episode["duration_s"], episode["length"] / fps) for episode in self.episodes)
         return sum(stated if math.isfinite(stated) else counted for stated, counted in times)
 
     @property
     def successes(self) -> int:
-        """Episodes that succeeded."""
+        """Number of successful episodes."""
         return sum(bool(episode["success"]) for episode in self.episodes)

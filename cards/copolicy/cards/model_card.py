@@ -1,42 +1,42 @@
-"""The card of a model: Hub metadata with its results, and a README that states only what its files hold."""
+"""The card of a model: Hub metadata with results, and a README with facts from the model's files only."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from huggingface_hub import ModelCardData
 
-from .checkpoint import Checkpoint
+from .checkpoint_facts import CheckpointFacts
 from .dataset_card import citation, source_text
-from .markdown import listing, share, table
+from .formatting import count_text, counts_text, table
 from .model_index import eval_results
 from .model_results import results
 
-# What tells one policy from another, in the order of a reader's questions; a policy has only some of them.
+# Settings that distinguish policies, in the order of the card; a policy has only some of them.
 _SETTINGS = (
     "type", "preset", "past_human_action", "network", "observation_features", "n_obs_steps", "horizon",
     "n_action_steps", "n_layers", "width", "n_heads", "num_train_timesteps", "prediction_type", "sampler",
     "num_inference_steps", "initial_noise_scale", "mirror", "permute_obstacles", "ema", "fps",
 )  # fmt: skip
-_WITH_PACKAGE = "pretrained"  # folder of the model that the package brings
+_PACKAGED = "pretrained"  # folder name of the model in the package
 _TRAINING = ("steps", "batch_size", "samples", "seed")
 
 
 def render_model_card(
-    checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]], name: str, licence: str | None = None
+    checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, Any]], name: str, licence: str | None = None
 ) -> str:
-    """The text of `README.md` for a checkpoint.
+    """Renders `README.md` of a checkpoint.
 
     Args:
         evaluations: contents of `eval.json` files of this checkpoint.
-        name: of the model, `user/name` or the like.
-        licence: the Hub's identifier; by default what the configuration says, else none is stated.
+        name: name of the model, such as `user/name`.
+        licence: Hub identifier; default: the licence in the configuration, else none.
     """
     sections = (
         _overview(checkpoint, name),
         results(evaluations, checkpoint.task),
         _data(checkpoint),
         _configuration(checkpoint, evaluations),
-        *_again(checkpoint),
+        *_reproduction(checkpoint),
         _usage(checkpoint, name, evaluations),
         _limits(checkpoint, evaluations),
         *citation(checkpoint.task.words),
@@ -46,9 +46,9 @@ def render_model_card(
 
 
 def hub_metadata(
-    checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]], name: str, licence: str | None
+    checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, Any]], name: str, licence: str | None
 ) -> ModelCardData:
-    """The YAML block that the Hub reads, with a model-index where there are evaluations."""
+    """The YAML block for the Hub, with a model-index if there are evaluations."""
     repo_id = checkpoint.data.repo_id
     return ModelCardData(
         license=licence or checkpoint.config.get("license"),
@@ -68,59 +68,59 @@ def _on_hub(repo_id: str) -> bool:
     return "/" in repo_id and not repo_id.startswith("local/")
 
 
-def _overview(checkpoint: Checkpoint, name: str) -> str:
+def _overview(checkpoint: CheckpointFacts, name: str) -> str:
     words = checkpoint.task.words
     parts = [
         f"# {name.rpartition('/')[2]}",
-        f"A policy of type `{checkpoint.config['type']}` that {words.acts}: it plans the next actions of both players, "
-        "and the robot executes its half.",
+        f"A policy of type `{checkpoint.config['type']}` that {words.acts}: it predicts the next actions of both "
+        "players, and the robot executes its own.",
         *_interface(checkpoint),
     ]
-    if checkpoint.data.at_hand:
+    if checkpoint.data.described:
         parts += [f"Training data: {source_text(source, words)}" for source in sorted(checkpoint.data.sources)]
     else:
         parts.append(
-            "**Source of the training data: not stated.** The data set was not at hand when this card was written."
+            "**Source of the training data: not stated.** The data set was not found when this card was written."
         )
     return "\n\n".join(parts)
 
 
-def _interface(checkpoint: Checkpoint) -> list[str]:
-    """What goes in and what comes out, where the configuration says so."""
+def _interface(checkpoint: CheckpointFacts) -> list[str]:
+    """Inputs and outputs of the policy, if the configuration states them."""
     config, rate = checkpoint.config, f" at {checkpoint.data.fps:g} Hz" if checkpoint.data.fps else ""
     if not {"n_obs_steps", "horizon", "n_action_steps"} <= config.keys():
         return []
     words, human = checkpoint.task.words, ", the human's past actions" if config.get("past_human_action") else ""
     return [
-        f"In: the last {config['n_obs_steps']} frames{rate} of {words.state_sees}, {words.scenario_sees}{human}. Out: "
-        f"{config['horizon']} actions of both players, {words.action}; up to {config['n_action_steps']} are executed "
-        "before the next plan."
+        f"Input: the last {config['n_obs_steps']} frames{rate} of {words.state_sees}, {words.scenario_sees}{human}. "
+        f"Output: a chunk of {config['horizon']} actions of both players, {words.action}; up to "
+        f"{config['n_action_steps']} are executed before the next chunk."
     ]
 
 
-def _data(checkpoint: Checkpoint) -> str:
+def _data(checkpoint: CheckpointFacts) -> str:
     data = checkpoint.data
-    where = "" if _on_hub(data.repo_id) else " (a local name, not one on the Hub)"
-    lines = [f"- Data set: `{data.repo_id}`{where}" if data.repo_id else "- Data set: not stated"]
+    locality = "" if _on_hub(data.repo_id) else " (a local name, not one on the Hub)"
+    lines = [f"- Data set: `{data.repo_id}`{locality}" if data.repo_id else "- Data set: not stated"]
     for title, value in (("Revision", data.revision), ("Version", data.version), ("Content", data.content_hash)):
         lines += [f"- {title}: `{value}`"] if value else []
-    if not data.at_hand:
+    if not data.described:
         lines += ["- Source: not stated", f"- Episodes used: {'all' if data.used is None else data.used}"]
     else:
         lines += [
-            f"- Source: {listing(data.sources)}",
-            f"- Episodes used: {share(data.used or 0, data.episodes or 0)}",
+            f"- Source: {counts_text(data.sources)}",
+            f"- Episodes used: {count_text(data.used or 0, data.episodes or 0)}",
             f"- Frames: {data.frames:,} at {data.fps:g} Hz",
-            f"- Pairs: {listing(data.pairs)}" if data.pairs else "- Pairs: not stated",
-            f"- {checkpoint.task.words.scenario.capitalize()} sets: {listing(data.map_sets)}",
-            f"- Licences: {listing(data.licences)}",
+            f"- Pairs: {counts_text(data.pairs)}" if data.pairs else "- Pairs: not stated",
+            f"- {checkpoint.task.words.scenario.capitalize()} sets: {counts_text(data.map_sets)}",
+            f"- Licences: {counts_text(data.licences)}",
         ]
     return "## Training data\n\n" + "\n".join(lines)
 
 
-def _configuration(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> str:
+def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, Any]]) -> str:
     averaged = (checkpoint.recipe.get("weights") or {}).get("averaged")
-    # Said otherwise below, or of no consequence.
+    # Stated in another row, or without effect.
     skipped = ({"ema"} if averaged else set()) | ({"n_heads"} if checkpoint.config.get("network") == "mlp" else set())
     rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config.keys() - skipped]
     training = [
@@ -132,52 +132,49 @@ def _configuration(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]
     size = [("parameters", f"{parameters:,}") for parameters in sizes]
     weights = [("sha256 of the weights", f"`{checkpoint.weights_sha256}`")]
     if averaged:
-        weights.insert(0, ("weights", "moving average over the training, alone"))
+        weights.insert(0, ("weights", "moving average over the training only"))
     text = table(("setting", "value"), [*rows, *size, *training, *weights])
     if not checkpoint.training:
-        text += "\n\nHow it was trained is not stated (no `train_config.json` or `recipe.json`)."
+        text += "\n\nThe training settings are not stated (no `train_config.json` or `recipe.json`)."
     return f"## Policy and training\n\n{text}"
 
 
-def _again(checkpoint: Checkpoint) -> list[str]:
-    """How it was made, where that is on record."""
+def _reproduction(checkpoint: CheckpointFacts) -> list[str]:
+    """Commands that reproduce the model, if stated."""
     if not checkpoint.commands:
         return []
-    return ["## How it was made\n\n```bash\n" + "\n".join(checkpoint.commands) + "\n```"]
+    return ["## Reproduction\n\n```bash\n" + "\n".join(checkpoint.commands) + "\n```"]
 
 
-def _usage(checkpoint: Checkpoint, name: str, evaluations: Sequence[dict[str, Any]]) -> str:
+def _usage(checkpoint: CheckpointFacts, name: str, evaluations: Sequence[dict[str, Any]]) -> str:
     maps = evaluations[0]["settings"]["maps"] if evaluations else "holdout"
     commands = ["pip install 'lerobot_policy_copolicy[train]'"]
-    place = "checkpoint"
-    if checkpoint.folder.name == _WITH_PACKAGE:
-        place = _WITH_PACKAGE  # the commands know it by this name
+    policy = "checkpoint"
+    if checkpoint.folder.name == _PACKAGED:
+        policy = _PACKAGED  # the name that the commands accept
     elif _on_hub(name):
         commands.append(f"hf download {name} --local-dir checkpoint")
     commands += [
-        f"copolicy-collect play --players keyboard policy:{place}",
-        f"copolicy-eval coplan --policy {place} --maps {maps} --out eval.json",
+        f"copolicy-collect play --players keyboard policy:{policy}",
+        f"copolicy-eval coplan --policy {policy} --maps {maps} --out eval.json",
     ]
-    text = "## How to use it\n\n```bash\n" + "\n".join(commands) + "\n```"
-    if place == _WITH_PACKAGE:
-        text += "\n\nIt comes with the package; `copolicy-train pretrained` says where it is, for LeRobot's commands."
+    text = "## Usage\n\n```bash\n" + "\n".join(commands) + "\n```"
+    if policy == _PACKAGED:
+        text += "\n\nThe package includes it; `copolicy-train pretrained` prints its folder, for LeRobot's commands."
     return text
 
 
-def _limits(checkpoint: Checkpoint, evaluations: Sequence[dict[str, Any]]) -> str:
+def _limits(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, Any]]) -> str:
     words = checkpoint.task.words
-    lines = [f"- Everything above was measured in {words.place}; nothing here says how a real robot would {words.act}."]
+    lines = [f"- All results are from {words.place}; how a real robot would {words.act} was not evaluated."]
     if "simulated" in checkpoint.data.sources:
-        lines.append(f"- Trained on simulated pairs: how it {words.act_s} with a person has not been measured.")
+        lines.append(f"- Trained on simulated pairs: how it {words.act_s} with a person was not evaluated.")
     if any(evaluation["study"] == "partner" for evaluation in evaluations):
         lines.append(
-            "- The partners of the study above are simulated too, by the same kind of pilot as the training data."
+            "- The partners of the study are also simulated, by the same kind of scripted agent as the training data."
         )
     incomplete = [e["settings"]["maps"] for e in evaluations if not e["settings"].get("complete_set", True)]
-    lines += [f"- Only a part of the {words.scenarios} of {maps} was tried." for maps in incomplete]
+    lines += [f"- Only a part of the {words.scenarios} of {maps} was evaluated." for maps in incomplete]
     contradictions = [line for e in evaluations for line in e["settings"].get("told_otherwise", ())]
-    lines += [
-        f"- Evaluated under other conditions than it was trained under: {line}."
-        for line in dict.fromkeys(contradictions)
-    ]
+    lines += [f"- Evaluated under other conditions than trained: {line}." for line in dict.fromkeys(contradictions)]
     return "## Limits\n\n" + "\n".join(lines)

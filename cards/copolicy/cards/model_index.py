@@ -1,7 +1,7 @@
-"""The results of a model as the Hub reads them, the `model-index` of its card.
+"""The results of a model for the Hub: the `model-index` of its card.
 
-The Hub's library puts results of equal task type, data set type, config, split and revision together under the name and
-the arguments of the first of them. So no two results here have the same config and split.
+The Hub's library merges results of equal task type, data set type, config, split and revision, and keeps the name and
+arguments of the first only. So no two results here have the same config and split.
 """
 
 from collections import defaultdict
@@ -21,12 +21,12 @@ _POLICY = ("sampler", "num_inference_steps", "initial_noise_scale")
 
 
 def eval_results(evaluations: Sequence[Mapping[str, Any]], task: PairTask | None = None) -> list[EvalResult]:
-    """One result an evaluation, this policy's alone: those of the robots beside it in a study are not the model's.
+    """Makes one result per evaluation, of this policy only, not of the baselines in a study.
 
-    `dataset_config` is the study, and whatever else tells results apart that would have the same config and split.
+    `dataset_config` is the study, with the differing arguments of results that would have the same config and split.
 
     Args:
-        task: the table by default.
+        task: None is the table.
     """
     groups: dict[tuple, list[int]] = defaultdict(list)
     results = [_result(evaluation, task or get_task()) for evaluation in evaluations]
@@ -40,7 +40,7 @@ def eval_results(evaluations: Sequence[Mapping[str, Any]], task: PairTask | None
 
 def _result(evaluation: Mapping[str, Any], task: PairTask) -> EvalResult:
     settings, success = evaluation["settings"], evaluation["summary"]["success"]
-    whole = settings.get("complete_set", True)
+    complete = settings.get("complete_set", True)
     count = settings.get("configurations", settings.get("map_count"))
     arguments = {key: settings[key] for key in _SETTINGS if settings.get(key) is not None}
     arguments |= {key: evaluation["policy"][key] for key in _POLICY if evaluation["policy"].get(key) is not None}
@@ -51,9 +51,9 @@ def _result(evaluation: Mapping[str, Any], task: PairTask) -> EvalResult:
         task_type="robotics",
         task_name=f"{task.spec.title}, {evaluation['study']} (simulation)",
         dataset_type=f"copolicy-{scenarios}-{settings['maps'].replace('#', '-')}",
-        dataset_name=f"{settings['maps']} {scenarios}{'' if whole else ', a part of them'}",
+        dataset_name=f"{settings['maps']} {scenarios}{'' if complete else ', a part of them'}",
         dataset_config=f"{evaluation['study']}{'-four-orientations' if settings.get('orientations') else ''}",
-        dataset_split="all" if whole else f"{count}-{'starts' if 'configurations' in settings else scenarios}",
+        dataset_split="all" if complete else f"{count}-{'starts' if 'configurations' in settings else scenarios}",
         dataset_revision=f"{maps['version']}-{maps['digest']}" if maps.get("from") == "file" else None,
         dataset_args=arguments,
         metric_type="success_rate",
@@ -64,19 +64,19 @@ def _result(evaluation: Mapping[str, Any], task: PairTask) -> EvalResult:
 
 
 def _configs(results: Sequence[EvalResult]) -> list[str]:
-    """A config for each of some results with the same one: with the arguments that differ, else with a number."""
+    """Unique configs for results with the same config: with the arguments that differ, else with a number."""
     names = [str(result.dataset_config) for result in results]
     if len(results) == 1:
         return names
     arguments = [result.dataset_args or {} for result in results]
     differing = [
         key
-        for key in dict.fromkeys(key for given in arguments for key in given)
-        if any(given.get(key) != arguments[0].get(key) for given in arguments)
+        for key in dict.fromkeys(key for entry in arguments for key in entry)
+        if any(entry.get(key) != arguments[0].get(key) for entry in arguments)
     ]
     names = [
-        "-".join((name, *(f"{key}-{_word(given[key])}" for key in differing if key in given)))
-        for name, given in zip(names, arguments, strict=True)
+        "-".join((name, *(f"{key}-{_argument_text(entry[key])}" for key in differing if key in entry)))
+        for name, entry in zip(names, arguments, strict=True)
     ]
     return [
         name if names.count(name) == 1 else f"{name}-run-{names[: index + 1].count(name)}"
@@ -84,5 +84,5 @@ def _configs(results: Sequence[EvalResult]) -> list[str]:
     ]
 
 
-def _word(value: Any) -> str:
+def _argument_text(value: Any) -> str:
     return "-".join(str(item) for item in value) if isinstance(value, list) else str(value)

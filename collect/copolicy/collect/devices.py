@@ -1,4 +1,4 @@
-"""The pads that are plugged in: what they are, and what they say."""
+"""The command `copolicy-collect devices`: lists the connected gamepads and shows their input."""
 
 import sys
 import time
@@ -7,11 +7,11 @@ from typing import Any, TextIO
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 
-from .inputs import CalibrationStore, InputSample, MappingStore, Pad, Pads, StickCalibration, user_config_folder
+from .inputs import CalibrationStore, Gamepad, Gamepads, InputSample, MappingStore, StickCalibration, user_config_folder
 from .sdl import init_events, pygame
 
-_PICTURES_HZ = 20
-_OF_JOYSTICKS = (
+_UPDATE_HZ = 20
+_JOYSTICK_EVENTS = (
     pygame.JOYDEVICEADDED,
     pygame.JOYDEVICEREMOVED,
     pygame.JOYAXISMOTION,
@@ -19,162 +19,165 @@ _OF_JOYSTICKS = (
     pygame.JOYHATMOTION,
     pygame.JOYBUTTONDOWN,
     pygame.JOYBUTTONUP,
-    # Of looking up what SDL knows of a pad.
+    # SDL adds these when a mapping is looked up.
     pygame.CONTROLLERDEVICEADDED,
     pygame.CONTROLLERDEVICEREMOVED,
 )
 _BAR = 21  # characters, an odd number: the middle is the centre
 
 
-def open_pads(config_folder: Path | None = None) -> Pads:
-    """All pads that are plugged in; needs neither a window nor a display.
+def open_gamepads(config_folder: Path | None = None) -> Gamepads:
+    """Opens all connected gamepads; needs neither a window nor a display.
 
     Args:
-        config_folder: of the user's mappings; by default that of this user.
+        config_folder: with the mappings; by default the user's settings.
 
     Raises:
-        FileFormatError: the file of mappings is none.
+        FileFormatError: the file of mappings cannot be read.
     """
     mappings = MappingStore(config_folder or user_config_folder())
     init_events()
-    pads = Pads(mappings)
-    # Where somebody in this process has taken the events that tell of them, the pads are there all the same.
+    gamepads = Gamepads(mappings)
+    # The events of connected gamepads may have been read by other code of this process.
     for index in range(pygame.joystick.get_count()):
-        pads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
-    return pads
+        gamepads.handle(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=index))
+    return gamepads
 
 
-def follow_pads(pads: Pads) -> list[Pad]:
-    """Reads the sticks, and the events of plugging and unplugging; returns the pads that went.
+def poll_gamepads(gamepads: Gamepads) -> list[Gamepad]:
+    """Handles the joystick events and returns the gamepads that were unplugged.
 
-    Takes all events of joysticks from the queue, so that it never fills up, and leaves those of the window.
+    Removes all joystick events from the queue, so that it does not fill up, and leaves those of the window.
     """
-    gone = []
-    for event in pygame.event.get(_OF_JOYSTICKS):
-        _, left = pads.handle(event)
-        if left is not None:
-            gone.append(left)
-    return gone
+    unplugged = []
+    for event in pygame.event.get(_JOYSTICK_EVENTS):
+        _, removed = gamepads.handle(event)
+        if removed is not None:
+            unplugged.append(removed)
+    return unplugged
 
 
-def list_devices(pads: Pads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
-    """Every pad by its instance id, JSON-able."""
+def list_devices(gamepads: Gamepads, calibrations: CalibrationStore) -> list[dict[str, Any]]:
+    """Facts about every gamepad, sorted by instance id, JSON-able."""
     return [
         {
-            "instance": pad.instance_id,
-            "name": pad.name,
-            "guid": pad.guid,
-            "axes": pad.axes,
-            "buttons": pad.buttons,
-            "hats": pad.hats,
-            "calibrated": pad.guid in calibrations,
+            "instance": gamepad.instance_id,
+            "name": gamepad.name,
+            "guid": gamepad.guid,
+            "axes": gamepad.axes,
+            "buttons": gamepad.buttons,
+            "hats": gamepad.hats,
+            "calibrated": gamepad.guid in calibrations,
         }
-        for pad in sorted(pads, key=lambda pad: pad.instance_id)
+        for gamepad in sorted(gamepads, key=lambda gamepad: gamepad.instance_id)
     ]
 
 
-def table(devices: list[dict[str, Any]]) -> list[str]:
-    """The list as lines of text."""
+def table_lines(devices: list[dict[str, Any]]) -> list[str]:
+    """The result of `list_devices` as lines of text with aligned columns."""
     if not devices:
-        return ["no pad is plugged in"]
+        return ["no gamepad is connected"]
     rows = [[str(name) for name in devices[0]]]
-    rows += [[{True: "yes", False: "no"}.get(value, str(value)) for value in one.values()] for one in devices]
+    rows += [[{True: "yes", False: "no"}.get(value, str(value)) for value in device.values()] for device in devices]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return ["  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
-def watch(
-    pads: Pads,
+def show_input(
+    gamepads: Gamepads,
     calibrations: CalibrationStore,
     seconds: float,
     out: TextIO,
 ) -> dict[int, dict[str, Any]]:
-    """Shows what every pad says, live, and tells at the end what of it moved.
+    """Shows the input of every gamepad live, and returns its range.
 
     Args:
-        pads: to watch; pads that are plugged in meanwhile are watched too.
-        calibrations: turn axes into the force that is shown.
-        seconds: how long.
-        out: a terminal, drawn over; otherwise only the last picture is written.
+        gamepads: to show; gamepads that are connected meanwhile are added.
+        calibrations: for the force that is shown.
+        seconds: duration.
+        out: a terminal, which is updated in place; to another file only the last state is written.
 
     Returns:
         By instance id: name, range of each axis, buttons that were pressed, readings, and whether it was unplugged.
 
     Raises:
-        InvalidValueError: no time at all.
-        RunError: there is no pad.
+        InvalidValueError: a duration that is not positive.
+        RunError: no gamepad is connected.
     """
     if not seconds > 0:
         raise InvalidValueError("seconds", "a positive number", seconds)
-    if not len(pads):
-        raise RunError("expected at least one pad, found none plugged in")
-    found: dict[int, dict[str, Any]] = {}
+    if not len(gamepads):
+        raise RunError("expected at least one gamepad, found none connected")
+    summaries: dict[int, dict[str, Any]] = {}
     height, lines = 0, []
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        for pad in follow_pads(pads):
-            found[pad.instance_id]["unplugged"] = True
+        for gamepad in poll_gamepads(gamepads):
+            summaries[gamepad.instance_id]["unplugged"] = True
         lines = []
-        for pad in pads:
-            sample = pad.sample(time.monotonic_ns())
-            _remember(found, pad, sample)
-            lines += _picture(pad, sample, calibrations.of(pad))
+        for gamepad in gamepads:
+            sample = gamepad.sample(time.monotonic_ns())
+            _add_sample(summaries, gamepad, sample)
+            lines += _gamepad_lines(gamepad, sample, calibrations.for_gamepad(gamepad))
         if out.isatty():
-            # Up over the last picture, and clear what is below.
+            # Move the cursor up over the last lines and clear the screen below it.
             out.write((f"\x1b[{height}A\x1b[J" if height else "") + "".join(f"{line}\n" for line in lines))
             out.flush()
             height = len(lines)
-        time.sleep(1 / _PICTURES_HZ)
+        time.sleep(1 / _UPDATE_HZ)
     if not out.isatty():
         out.write("".join(f"{line}\n" for line in lines))
-    return found
+    return summaries
 
 
 def devices_command(seconds: float | None, as_json: bool, config_folder: Path | None = None) -> dict[str, Any]:
-    """What the command does: prints the table or the live test, and returns its summary."""
-    pads = open_pads(config_folder)
+    """Runs the command: prints the list or the live test, and returns the summary for `--json`."""
+    gamepads = open_gamepads(config_folder)
     calibrations = CalibrationStore(config_folder or user_config_folder())
-    devices = list_devices(pads, calibrations)
+    devices = list_devices(gamepads, calibrations)
     if not as_json:
-        print("\n".join(table(devices)))
+        print("\n".join(table_lines(devices)))
     if seconds is None:
         return {"devices": devices} if as_json else {}
-    found = watch(pads, calibrations, seconds, sys.stderr if as_json else sys.stdout)
-    return {"devices": devices, "test": found} if as_json else {}
+    summaries = show_input(gamepads, calibrations, seconds, sys.stderr if as_json else sys.stdout)
+    return {"devices": devices, "test": summaries} if as_json else {}
 
 
-def _remember(found: dict[int, dict[str, Any]], pad: Pad, sample: InputSample) -> None:
-    new = {"name": pad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
-    one = found.setdefault(pad.instance_id, new)
-    one["readings"] += 1
-    ranges = one["axes"] or [[value, value] for value in sample.axes]
-    one["axes"] = [
+def _add_sample(summaries: dict[int, dict[str, Any]], gamepad: Gamepad, sample: InputSample) -> None:
+    new = {"name": gamepad.name, "axes": [], "buttons": [], "readings": 0, "unplugged": False}
+    summary = summaries.setdefault(gamepad.instance_id, new)
+    summary["readings"] += 1
+    ranges = summary["axes"] or [[value, value] for value in sample.axes]
+    summary["axes"] = [
         [round(min(low, value), 3), round(max(high, value), 3)]
         for (low, high), value in zip(ranges, sample.axes, strict=True)
     ]
     pressed = {index for index, down in enumerate(sample.buttons) if down}
-    one["buttons"] = sorted(pressed | set(one["buttons"]))
+    summary["buttons"] = sorted(pressed | set(summary["buttons"]))
 
 
-def _picture(pad: Pad, sample: InputSample, calibration: StickCalibration) -> list[str]:
-    x, y = pad.force(sample, calibration)
-    lines = [f"{pad.instance_id}: {pad.name}   force {x:+.2f} {y:+.2f}", f"  {_about(pad, calibration)}"]
+def _gamepad_lines(gamepad: Gamepad, sample: InputSample, calibration: StickCalibration) -> list[str]:
+    x, y = gamepad.force(sample, calibration)
+    header = f"{gamepad.instance_id}: {gamepad.name}   force {x:+.2f} {y:+.2f}"
+    lines = [header, f"  {_description(gamepad, calibration)}"]
     lines += [f"  axis {index:<3} {_bar(value)} {value:+.2f}" for index, value in enumerate(sample.axes)]
-    for hat in range(pad.hats):
+    for hat in range(gamepad.hats):
         right, down = sample.directions[2 * hat : 2 * hat + 2]
         lines.append(f"  hat {hat:<4} {right:+.0f} {down:+.0f}")
     pressed = " ".join(str(index) for index, down in enumerate(sample.buttons) if down)
     return [*lines, f"  buttons  {pressed or '-'}"]
 
 
-def _about(pad: Pad, calibration: StickCalibration) -> str:
-    known = "buttons known" if pad.mapping.known else "buttons not known: the lobby of play sets them up"
-    steers = f"steers with: {pad.steering(calibration).label}" if pad.steerings else "cannot steer: no stick, no d-pad"
-    return f"{steers}; {known}"
+def _description(gamepad: Gamepad, calibration: StickCalibration) -> str:
+    buttons = "buttons known" if gamepad.mapping.is_known else "buttons unknown: set them up in the lobby of play"
+    steering = "cannot steer: no stick, no d-pad"
+    if gamepad.steering_options:
+        steering = f"steers with: {gamepad.steering(calibration).label}"
+    return f"{steering}; {buttons}"
 
 
 def _bar(value: float) -> str:
     middle = _BAR // 2
-    place = middle + round(max(-1.0, min(1.0, value)) * middle)
-    low, high = sorted((middle, place))
+    end = middle + round(max(-1.0, min(1.0, value)) * middle)
+    low, high = sorted((middle, end))
     return "[" + "".join("#" if low <= index <= high else " " for index in range(_BAR)) + "]"

@@ -1,4 +1,4 @@
-"""Two agents act on a set of scenarios, and what happened comes back as episodes."""
+"""Runs two agents on a set of scenarios and returns the episodes."""
 
 import uuid
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import TABLE, get_task
 
-from .agents.named import make_agent
+from .agents.agent_names import make_agent
 from .agents.policy import PolicyAgent
 from .rollout import Agent, Rollout, Trace
 
@@ -26,59 +26,60 @@ def run_episodes(
     seed: int = 0,
     settings: Any = None,
 ) -> list[Episode]:
-    """Lets two agents act on every scenario of a set, side by side, until each episode ends.
+    """Runs two agents on every scenario of a set, in parallel worlds, until each episode ends.
 
         episodes = run_episodes("policy:pretrained", "scripted:stubborn", maps="unseen", limit=12)
         np.mean([episode.meta.success for episode in episodes])
 
     Args:
         robot: at the robot's seat; an agent, or its name for `make_agent`.
-        human: at the human's seat; the same agent may not sit at both. None: the robot's policy acts for both players
+        human: at the human's seat, another agent than `robot`. None: the robot's policy acts for both players
             (co-planning).
-        maps: name of a set of scenarios, a file of maps, or one of its splits as `FILE#split`; or scenarios themselves.
+        maps: name of a set of scenarios, a map file, or one of its splits as `FILE#split`; or a sequence of scenarios.
         task: name of the task.
-        limit: number of scenarios, the first ones; all if None.
-        seed: of whatever agents draw at random; episode k gets `seed + k`.
+        limit: use the first `limit` scenarios; all if None.
+        seed: of the agents' random numbers; episode k gets `seed + k`.
         settings: of the worlds; the task's defaults if None.
 
     Returns:
-        One episode a scenario at the task's rate, in order; its `meta` says how it ended.
+        One episode a scenario at the task's rate, in order; its `meta` has the outcome.
 
     Raises:
         UnknownNameError: no such agent or set.
-        InvalidValueError: one agent at both seats, an agent at a seat that is not its own, none at the human's beside a
-            robot that is no policy, or a policy of another task.
-        FileFormatError: a checkpoint, recording or file of maps that cannot be used.
+        InvalidValueError: the same agent at both seats, an agent that cannot act at its seat, no human beside a robot
+            that is not a policy, or a policy of another task.
+        FileFormatError: a checkpoint, recording or map file that cannot be used.
     """
-    found = get_task(task)
+    pair_task = get_task(task)
     if limit is not None and limit < 1:
         raise InvalidValueError("limit", "at least 1", limit)
-    scenarios = (found.scenario_set(maps).scenarios if isinstance(maps, str) else maps)[:limit]
+    scenarios = (pair_task.scenario_set(maps).scenarios if isinstance(maps, str) else maps)[:limit]
     if not scenarios:
         raise InvalidValueError("maps", "at least one", "none")
     if robot is human and not isinstance(robot, str):
         raise InvalidValueError("human", "another agent than the robot's", robot.name)
-    first = make_agent(robot, task) if isinstance(robot, str) else robot
+    robot_agent = make_agent(robot, task) if isinstance(robot, str) else robot
     if human is None:
-        if not isinstance(first, PolicyAgent):
-            raise InvalidValueError("robot", "a policy, which acts for both players", first.name)
-        second: Agent = first.other_half()
+        if not isinstance(robot_agent, PolicyAgent):
+            raise InvalidValueError("robot", "a policy, which acts for both players", robot_agent.name)
+        human_agent: Agent = robot_agent.human_half()
     else:
-        second = make_agent(human, task) if isinstance(human, str) else human
-    for agent in (first, second):
-        if isinstance(agent, PolicyAgent) and agent.task is not found:
+        human_agent = make_agent(human, task) if isinstance(human, str) else human
+    for agent in (robot_agent, human_agent):
+        if isinstance(agent, PolicyAgent) and agent.task is not pair_task:
             raise InvalidValueError("task", f"{agent.task.spec.name!r}, which {agent.name} has learned", task)
     seeds = [seed + index for index in range(len(scenarios))]
-    rollout = Rollout(found, scenarios, (first, second), seeds=seeds, settings=settings)
+    rollout = Rollout(pair_task, scenarios, (robot_agent, human_agent), seeds=seeds, settings=settings)
     trace = Trace(rollout)
     rollout.run()
     return [
-        episode_of(rollout, trace, index, scenario, seed + index, settings) for index, scenario in enumerate(scenarios)
+        episode_from_trace(rollout, trace, index, scenario, seed + index, settings)
+        for index, scenario in enumerate(scenarios)
     ]
 
 
-def episode_of(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
-    """What happened in a world of a rollout, from its start to its end, as an episode."""
+def episode_from_trace(rollout: Rollout, trace: Trace, index: int, scenario: Any, seed: int, settings: Any) -> Episode:
+    """The episode of a world of a rollout, from its start to its end; `index` is that of the world."""
     task, outcome = rollout.task, rollout.outcomes[index]
     states, actions = task.states_of(trace.states(index)), trace.actions(index)
     robot, human = (agent.name for agent in rollout.agents)

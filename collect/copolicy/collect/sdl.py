@@ -1,7 +1,7 @@
-"""pygame, imported quietly and with the settings that must stand before it is.
+"""Imports pygame without output, with the environment variables that must be set before its import.
 
-`from .sdl import pygame` in place of `import pygame`: the latter greets on stdout, where `--json` promises one
-object, and pygame 2.6 warns about a package of setuptools that it uses.
+Use `from .sdl import pygame` instead of `import pygame`, which prints a greeting on stdout, where `--json` prints one
+object; pygame 2.6 also warns about a package of setuptools.
 """
 
 import os
@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-# SDL drops the input of all joysticks while a window exists without the keyboard's focus, and in a run without a
-# window there is no focus at all. A lost focus pauses the episode anyway.
+# SDL drops the input of all joysticks while its window lacks the keyboard focus, and without a window there is no
+# focus. The episode is paused anyway when the focus is lost.
 os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")
 os.environ.setdefault("SDL_WINDOWS_DPI_AWARENESS", "permonitorv2")
 
@@ -27,44 +27,44 @@ _DRIVER = "SDL_VIDEODRIVER"
 
 
 class NoDisplayError(Exception):
-    """There is nothing to show a window on."""
+    """There is no display for a window."""
 
 
 def open_display() -> None:
-    """Starts SDL's video system for a window that somebody is to see.
+    """Starts SDL's video system for a visible window.
 
-    Without a display SDL falls back on a driver that draws nowhere; whoever wants that one names it in
-    `SDL_VIDEODRIVER`.
+    Without a display SDL would fall back on a driver that draws nowhere; this is an error, unless `SDL_VIDEODRIVER`
+    names such a driver.
 
     Raises:
         NoDisplayError: there is no display.
     """
-    wanted = os.environ.get(_DRIVER, "")
-    invisible = _INVISIBLE.difference(wanted.split(","))
+    requested = os.environ.get(_DRIVER, "")
+    invisible = _INVISIBLE.difference(requested.split(","))
     if pygame.display.get_init() and pygame.display.get_driver() in invisible:
-        pygame.display.quit()  # as `init_events` left it
-    # Without the folder of its sockets libwayland complains on stderr, and there is no such display.
+        pygame.display.quit()  # started by `init_events`
+    # Without the folder of its sockets libwayland prints errors on stderr, and there is no Wayland display.
     without_wayland = sys.platform == "linux" and not os.environ.get("XDG_RUNTIME_DIR")
     try:
-        with _driver("x11,kmsdrm" if without_wayland and not wanted else None):
+        with _driver("x11,kmsdrm" if without_wayland and not requested else None):
             pygame.display.init()
         driver = pygame.display.get_driver()
     except pygame.error as error:
-        raise NoDisplayError(str(error) if wanted else _why_invisible(str(error))) from None
+        raise NoDisplayError(str(error) if requested else _no_display_reason(str(error))) from None
     if driver in invisible:
         pygame.display.quit()
-        raise NoDisplayError(_why_invisible(f"SDL offers nothing but its driver {driver!r}"))
+        raise NoDisplayError(_no_display_reason(f"SDL offers only its driver {driver!r}"))
 
 
 def init_events(window: bool = False) -> None:
-    """Starts what delivers the events of joysticks, SDL's video system; needs no display.
+    """Starts SDL's video system, which delivers the events of joysticks; needs no display.
 
     Args:
-        window: open a window that nobody sees, for what needs one.
+        window: open an invisible window, for functions that need one.
     """
     if not pygame.display.get_init():
-        named = os.environ.get(_DRIVER) or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        with _driver("dummy" if window or (sys.platform == "linux" and not named) else None):
+        display = os.environ.get(_DRIVER) or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        with _driver("dummy" if window or (sys.platform == "linux" and not display) else None):
             pygame.display.init()
     if window:
         pygame.display.set_mode((64, 64))
@@ -72,7 +72,7 @@ def init_events(window: bool = False) -> None:
 
 @contextmanager
 def _driver(name: str | None) -> Iterator[None]:
-    """SDL's choice of a driver for as long as it takes; a later window of this process makes its own."""
+    """Sets SDL's video driver for the duration of the block, so that a later window of this process can use another."""
     before = os.environ.get(_DRIVER)
     if name is not None:
         os.environ[_DRIVER] = name
@@ -85,8 +85,8 @@ def _driver(name: str | None) -> Iterator[None]:
                 os.environ[_DRIVER] = before
 
 
-def _why_invisible(otherwise: str) -> str:
+def _no_display_reason(default: str) -> str:
     if sys.platform != "linux":
-        return otherwise
-    named = [f"{name}={os.environ[name]}" for name in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)]
-    return f"no answer from {' and '.join(named)}" if named else "neither DISPLAY nor WAYLAND_DISPLAY is set"
+        return default
+    displays = [f"{name}={os.environ[name]}" for name in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)]
+    return f"no answer from {' and '.join(displays)}" if displays else "neither DISPLAY nor WAYLAND_DISPLAY is set"

@@ -1,4 +1,4 @@
-"""The beat of the real-time loop: when the next step is due, how late it came, and how well an episode kept time."""
+"""Timing of the real-time loop: ticks at a fixed rate, their lateness, and statistics of an episode."""
 
 import time
 from collections.abc import Callable
@@ -9,35 +9,35 @@ import numpy as np
 from copolicy.dataset.task_spec import RECORD_HZ
 
 DT_NS = 10**9 // RECORD_HZ
-"""Length of a step at the rate that tasks have by default, ns."""
+"""Length of a step at the default rate of tasks, ns."""
 
-LATE = 4
-"""A step that begins later than a quarter of one after its time counts as late."""
+LATE_DIVISOR = 4
+"""A step that begins more than 1 / `LATE_DIVISOR` of a step after its time is late."""
 
 SLOW_LOOP = 1.25
 """An episode whose 99th percentile of periods exceeds this many steps is flagged."""
 
 
 class MonotonicClock:
-    """The machine's clock that never goes back. A loop follows any clock with these two methods."""
+    """The machine's monotonic clock. A loop can use any object with these two methods as its clock."""
 
     def __call__(self) -> int:
         """The time, ns."""
         return time.monotonic_ns()
 
     def sleep(self, seconds: float) -> None:
-        """Waits; longer where the machine is busy."""
+        """Waits at least this long, s."""
         time.sleep(seconds)
 
 
 @dataclass(frozen=True)
 class Tick:
-    """One step's time, all on the monotonic clock.
+    """Times of one step on the monotonic clock.
 
     Attributes:
         scheduled_ns: when it was due.
         start_ns: when it began.
-        skipped: ticks before it that were let go, since the loop had fallen behind by more than one.
+        skipped: ticks skipped before it, since the loop was behind by a whole tick or more.
     """
 
     scheduled_ns: int
@@ -46,16 +46,16 @@ class Tick:
 
     @property
     def late_ns(self) -> int:
-        """How much too late it began."""
+        """Delay of the step, ns."""
         return self.start_ns - self.scheduled_ns
 
 
 class Ticker:
-    """The task's ticks a second of the monotonic clock, for any length of time without drift.
+    """Ticks at the task's rate on the monotonic clock, without drift.
 
-    A tick that comes late is taken as soon as possible, and the next keeps its own time. A loop that is behind by a
-    whole tick or more never catches up with two steps on one reading of the sticks: the ticks it missed are let go
-    and counted, and the simulation runs behind the wall clock by so much.
+    A late tick starts as soon as possible and does not shift the next one. A loop that is behind by a whole tick or
+    more does not catch up, which would need two steps for one reading of the sticks: the missed ticks are skipped and
+    counted, and the simulation falls behind the wall clock by their length.
 
     Attributes:
         dt_ns: length of a step, ns.
@@ -76,7 +76,7 @@ class Ticker:
         return self.due_ns - self._clock()
 
     def tick(self) -> Tick:
-        """Takes the tick that is due."""
+        """Starts the tick that is due, and schedules the next one."""
         start = self._clock()
         skipped = max(0, (start - self.due_ns) // self.dt_ns)
         scheduled = self.due_ns + skipped * self.dt_ns
@@ -85,7 +85,7 @@ class Ticker:
 
 
 class LoopStatistics:
-    """How well the loop kept its time over an episode, its pauses left out."""
+    """Timing of the loop over an episode, without its pauses."""
 
     def __init__(self, hz: int = RECORD_HZ):
         self._dt_ns = 10**9 // hz
@@ -96,27 +96,27 @@ class LoopStatistics:
         self.skipped = 0
 
     def add(self, tick: Tick) -> None:
-        """Takes a tick."""
+        """Adds a tick."""
         if self._last is not None:
             self._periods.append(tick.start_ns - self._last.start_ns)
             self.skipped += tick.skipped
-        self.late += tick.late_ns > self._dt_ns // LATE
+        self.late += tick.late_ns > self._dt_ns // LATE_DIVISOR
         self.ticks += 1
         self._last = tick
 
     def pause(self) -> None:
-        """The next tick comes after a pause: what lies between is no period."""
+        """Marks a pause before the next tick, which is not counted as a period."""
         self._last = None
 
     @property
     def achieved_hz(self) -> float:
-        """Steps a second; nan before the second one."""
+        """Achieved steps a second; nan before the second tick."""
         total = sum(self._periods)
         return len(self._periods) * 1e9 / total if total else float("nan")
 
     @property
     def slow(self) -> bool:
-        """The episode is to be flagged: a tick was skipped, or periods were too long too often."""
+        """Whether a tick was skipped or the 99th percentile of the periods exceeds `SLOW_LOOP` steps."""
         return self.skipped > 0 or self.percentile_ms(99) > SLOW_LOOP * self._dt_ns / 1e6
 
     def percentile_ms(self, percent: float) -> float:
@@ -124,6 +124,6 @@ class LoopStatistics:
         return float(np.percentile(self._periods, percent)) / 1e6 if self._periods else float("nan")
 
     def summary(self) -> str:
-        """One line, as it stands in the event `loop` of a recording."""
-        p50, p99, most = (self.percentile_ms(percent) for percent in (50, 99, 100))
-        return f"period p50 {p50:.2f} p99 {p99:.2f} max {most:.2f} ms, late {self.late}, skipped {self.skipped}"
+        """The detail of the event `loop` in recordings, one line."""
+        p50, p99, maximum = (self.percentile_ms(percent) for percent in (50, 99, 100))
+        return f"period p50 {p50:.2f} p99 {p99:.2f} max {maximum:.2f} ms, late {self.late}, skipped {self.skipped}"

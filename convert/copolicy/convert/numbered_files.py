@@ -1,4 +1,4 @@
-"""Files of a LeRobot v3 data set that are written one after the other."""
+"""Writes the numbered files of a LeRobot v3 data set one after the other."""
 
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 
 class NumberedFiles(AbstractContextManager):
-    """`chunk-000/file-000`, ... in a folder; a subclass opens and fills them."""
+    """Counts through `chunk-000/file-000`, ...; a subclass opens and fills the files."""
 
     def __init__(self, root: Path, pattern: str, file_mb: float, chunks_size: int):
         self._root, self._pattern = root, pattern
@@ -18,7 +18,7 @@ class NumberedFiles(AbstractContextManager):
         self._close()
 
     def _new_path(self) -> Path:
-        """Of the present number, in a folder that is there."""
+        """Path of the current file; creates its folder."""
         self._path.parent.mkdir(parents=True, exist_ok=True)
         return self._path
 
@@ -27,7 +27,7 @@ class NumberedFiles(AbstractContextManager):
         return self._root / self._pattern.format(chunk_index=self._chunk, file_index=self._file)
 
     def _next(self) -> None:
-        """Closes the file; what is written goes into another."""
+        """Closes the current file and advances to the next number."""
         self._close()
         from lerobot.datasets.utils import update_chunk_file_indices
 

@@ -1,12 +1,12 @@
-"""What pair data is: read it, check it, count it.
+"""Data sets of two-player tasks: reading, checks, statistics, versions and publication.
 
     from copolicy.dataset import load_dataset
 
     dataset = load_dataset("outputs/quickstart/dataset")
     dataset.episodes[0].states  # (T, 7)
-    dataset.table.to_pandas()   # one row an episode
+    dataset.table.to_pandas()   # one row per episode
 
-Names are loaded when they are asked for.
+Names are imported on first access.
 """
 
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .episode import Episode, EpisodeMeta
     from .exceptions import CopolicyError
     from .pair_dataset import DatasetEpisode, PairDataset, load_dataset
-    from .recording.log import read_episode
+    from .recording.reader import read_episode
     from .statistics.compute import compute_statistics
     from .task import PairTask, get_task, installed_tasks
     from .task_spec import TaskSpec, Vector
@@ -47,7 +47,7 @@ __getattr__, __dir__ = lazy_names(
         **dict.fromkeys(("Episode", "EpisodeMeta"), "episode"),
         "CopolicyError": "exceptions",
         **dict.fromkeys(("DatasetEpisode", "PairDataset", "load_dataset"), "pair_dataset"),
-        "read_episode": "recording.log",
+        "read_episode": "recording.reader",
         "compute_statistics": "statistics.compute",
         **dict.fromkeys(("PairTask", "get_task", "installed_tasks"), "task"),
         **dict.fromkeys(("TaskSpec", "Vector"), "task_spec"),

@@ -1,23 +1,24 @@
-"""One clock: the rules that tie states and actions to time, for recording, data sets and execution alike.
+"""Time alignment of states and actions, for recordings, data sets and execution.
 
-At step k of the recording, at the rate of the task, the state s_k is read, the action u_k is chosen in it, (s_k, u_k)
-is stored and the world advances to s_{k+1}. A data set at `fps` keeps every `stride`-th state; its action is what,
-held until the next frame, best reproduces the motion. Execution holds each action for `stride` steps.
+Step k of a recording, at the rate of the task: read the state s_k, choose the action u_k, store (s_k, u_k), advance the
+world to s_{k+1}. A data set at `fps` keeps every `stride`-th state; the action of a frame is the mean of its steps,
+which best reproduces the motion under a zero-order hold. Execution repeats each action for `stride` steps.
 """
 
 from typing import Literal, get_args
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError
 from .task_spec import RECORD_HZ
 
-Hold = Literal["mean", "first"]
-"""How the actions between two frames become one: their mean (reproduces the motion), or the first of them."""
+Downsampling = Literal["mean", "first"]
+"""How the actions between two frames are reduced to one: their mean (reproduces the motion), or the first."""
 
 
 def stride(fps: int, record_hz: int = RECORD_HZ) -> int:
-    """Recorded steps in a frame.
+    """Recorded steps per frame.
 
     Raises:
         InvalidValueError: `fps` does not divide the recording rate.
@@ -29,38 +30,38 @@ def stride(fps: int, record_hz: int = RECORD_HZ) -> int:
 
 
 def frames(steps: int, fps: int, record_hz: int = RECORD_HZ) -> int:
-    """Frames that some recorded steps fill, the last one perhaps in part."""
+    """Number of frames of `steps` recorded steps; the last frame may be incomplete."""
     return -(-steps // stride(fps, record_hz))
 
 
-def frame_states(states: np.ndarray, fps: int, record_hz: int = RECORD_HZ) -> np.ndarray:
+def frame_states(states: Array, fps: int, record_hz: int = RECORD_HZ) -> Array:
     """States of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`."""
     return states[:: stride(fps, record_hz)]
 
 
-def frame_actions(actions: np.ndarray, fps: int, hold: Hold = "mean", record_hz: int = RECORD_HZ) -> np.ndarray:
+def frame_actions(actions: Array, fps: int, downsampling: Downsampling = "mean", record_hz: int = RECORD_HZ) -> Array:
     """Actions of the frames: `(T, n)` at the recording rate to `(ceil(T / stride), n)`.
 
-    The dynamics are linear in the force but for a clip, so the mean of the held steps gives the velocity that was
-    recorded; the last frame may hold fewer steps.
+    The dynamics are linear in the force except for clipping, so the mean over a frame's steps reproduces the recorded
+    velocity. The last frame may have fewer steps.
     """
     step = stride(fps, record_hz)
-    if hold not in get_args(Hold):
-        raise InvalidValueError("hold", f"one of {get_args(Hold)}", hold)
-    if hold == "first" or step == 1:
+    if downsampling not in get_args(Downsampling):
+        raise InvalidValueError("downsampling", f"one of {get_args(Downsampling)}", downsampling)
+    if downsampling == "first" or step == 1:
         return actions[::step].copy()
     starts = np.arange(0, len(actions), step)
     counts = np.diff(np.append(starts, len(actions)))
     return np.add.reduceat(actions, starts, axis=0) / counts[:, None]
 
 
-def previous_actions(actions: np.ndarray) -> np.ndarray:
-    """The action of the frame before each frame, zero at the first: `(T, n)` to `(T, n)`."""
+def previous_actions(actions: Array) -> Array:
+    """The action of the previous frame, zero at the first: `(T, n)` to `(T, n)`."""
     previous = np.zeros_like(actions)
     previous[1:] = actions[:-1]
     return previous
 
 
-def zero_order_hold(actions: np.ndarray, fps: int) -> np.ndarray:
-    """Executed actions of a plan: `(T, n)` at `fps` to `(T * stride, n)` at the recording rate."""
+def zero_order_hold(actions: Array, fps: int) -> Array:
+    """Executed actions of an action chunk: `(T, n)` at `fps` to `(T * stride, n)` at the recording rate."""
     return np.repeat(actions, stride(fps), axis=0)

@@ -1,30 +1,31 @@
-"""One recorded episode: what happened, in which scenario, and who did it with whom."""
+"""One recorded episode: states, actions, scenario and metadata."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError, ShapeError
 from .task import get_task
 from .task_spec import TaskSpec
 
 Source = Literal["human", "simulated", "upstream"]
 
-OTHER_REASONS = ("operator_discard", "device_lost", "focus_lost", "crash_recovered", "unknown")
-"""How an episode can end beside the reasons of its task."""
+GENERIC_REASONS = ("operator_discard", "device_lost", "focus_lost", "crash_recovered", "unknown")
+"""Termination reasons that every task has, in addition to its own."""
 
 
 def termination_reasons(spec: TaskSpec) -> tuple[str, ...]:
-    """What the column `termination_reason` of an episode of a task can hold."""
-    return (*spec.reasons, *OTHER_REASONS)
+    """Allowed values of the episode column `termination_reason` for a task."""
+    return (*spec.reasons, *GENERIC_REASONS)
 
 
 @dataclass(frozen=True)
 class EpisodeMeta:
-    """Who, what and how of an episode; its fields are the episode columns of a data set, by exactly these names.
+    """Metadata of an episode. The field names are the episode columns of a data set.
 
-    Identifiers of people are pseudonyms. An empty text means that nothing is known or that nothing applies.
+    Identifiers of people are pseudonyms. An empty string means unknown or not applicable.
     """
 
     episode_uuid: str
@@ -45,25 +46,25 @@ class EpisodeMeta:
     late_ticks: int = 0
     replay_drift_px: float = float("nan")
     route_class: str = ""
-    quality_flags: str = ""  # comma separated
+    quality_flags: str = ""  # comma-separated
     discarded: bool = False
     consent_id: str = ""
     license: str = ""
     software_version: str = ""
     source_sha256: str = ""
-    physics: str = ""  # see physics_text
-    obstacle_size: int = 0  # px, 0 where it is not known; of the largest where they differ
-    obstacle_sizes: str = ""  # px of each, comma separated, where they differ
+    physics: str = ""  # see settings_text
+    obstacle_size: int = 0  # px, 0 if unknown; the largest if sizes differ
+    obstacle_sizes: str = ""  # px of each, comma-separated, if sizes differ
     map_set_version: str = ""  # of a set from a file
     map_set_digest: str = ""
-    map_weight: int = 1  # how often the map comes up beside one of weight 1
+    map_weight: int = 1  # relative frequency of the map in its set
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for column in fields(self):
-            kind = {"str": str, "int": int, "float": float, "bool": bool}.get(str(_type_name(column)), str)
+            expected = {"str": str, "int": int, "float": float, "bool": bool}.get(str(_type_name(column)), str)
             value = getattr(self, column.name)
-            if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-                raise InvalidValueError(f"EpisodeMeta.{column.name}", kind.__name__, value)
+            if not isinstance(value, expected) or (expected is int and isinstance(value, bool)):
+                raise InvalidValueError(f"EpisodeMeta.{column.name}", expected.__name__, value)
 
 
 def _type_name(column) -> str:
@@ -74,13 +75,13 @@ EPISODE_COLUMNS: dict[str, str] = {column.name: _type_name(column) for column in
 """Name and type (`str`, `int`, `float`, `bool`) of every episode column, in order."""
 
 SET_COLUMNS: tuple[str, ...] = ("map_set_version", "map_set_digest", "map_weight")
-"""Episode columns of maps from a file; recordings and content hashes have them only where they say something."""
+"""Episode columns of maps from a file. Recordings and content hashes leave them out if they have their defaults."""
 
 UNHASHED_DEFAULTS: tuple[str, ...] = ("obstacle_sizes", *SET_COLUMNS)
-"""Episode columns that the content hash leaves out where they have their default."""
+"""Episode columns that the content hash leaves out if they have their default."""
 
 LATER_COLUMNS: tuple[str, ...] = ("physics", "obstacle_size", *UNHASHED_DEFAULTS)
-"""Episode columns that data sets of earlier versions lack; readers take the default of `EpisodeMeta` for them."""
+"""Episode columns that data sets of earlier versions lack; readers then use the default of `EpisodeMeta`."""
 
 UNKNOWN_VALUES: dict[str, Any] = {
     column.name: column.default
@@ -88,31 +89,31 @@ UNKNOWN_VALUES: dict[str, Any] = {
     else {"str": "", "int": -1, "float": float("nan"), "bool": False}[_type_name(column)]
     for column in fields(EpisodeMeta)
 }
-"""What stands for an empty entry of each episode column."""
+"""The value that replaces a missing entry of each episode column."""
 
 
 @dataclass(frozen=True, repr=False)
 class Episode:
-    """States and actions at the rate of recordings: `actions[k]` was taken in `states[k]`.
+    """One episode at the recording rate: `actions[k]` was applied in `states[k]`.
 
     Attributes:
-        states: `(T, n)`, by `TaskSpec.state`; of the table: x, y, cos_theta, sin_theta, vx, vy, omega.
-        actions: `(T, m)`, by `TaskSpec.joint_action`; of the table: robot xy, human xy in [-1, 1].
-        final_state: `(n,)` the state that the last action led to.
-        scenario: where it began and what it was about; of the table: the map.
-        fps: states a second; that of the task, except for data that was stored at another rate.
-        settings: of the world that led from state to state; the task's default where None is given.
-        notes: what an importer noticed and wants said.
+        states: `(T, n)`, see `TaskSpec.state`; for the table task: x, y, cos_theta, sin_theta, vx, vy, omega.
+        actions: `(T, 2 m)`, see `TaskSpec.joint_action`; for the table task: robot xy, human xy in [-1, 1].
+        final_state: `(n,)` state after the last action.
+        scenario: start, goal and obstacles of the episode; for the table task its `MapConfig`.
+        fps: states per second: the rate of the task, unless the data were stored at another rate.
+        settings: settings of the simulated world; None stands for the defaults of the task.
+        notes: warnings of the importer or reader, one sentence each.
         task: name of the task.
 
     Raises:
-        ShapeError: an array does not fit the spec of the task.
+        ShapeError: an array does not have the shape given by the spec of the task.
         UnknownNameError: the task is not installed.
     """
 
-    states: np.ndarray
-    actions: np.ndarray
-    final_state: np.ndarray
+    states: Array
+    actions: Array
+    final_state: Array
     meta: EpisodeMeta
     scenario: Any
     fps: int = 30
@@ -120,7 +121,7 @@ class Episode:
     notes: tuple[str, ...] = field(default=())
     task: str = "table"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         task = get_task(self.task)
         if self.settings is None:
             object.__setattr__(self, "settings", task.settings_type())
@@ -141,15 +142,15 @@ class Episode:
 
     @property
     def map_config(self) -> Any:
-        """The scenario, by the table's name for it."""
+        """Alias of `scenario`, the name that the table task uses."""
         return self.scenario
 
     @property
     def physics(self) -> Any:
-        """The settings, by the table's name for them."""
+        """Alias of `settings`, the name that the table task uses."""
         return self.settings
 
     @property
-    def path(self) -> np.ndarray | None:
-        """`(T + 1, 2)` the point that the task tracks, from the start to the end; None where it tracks none."""
+    def path(self) -> Array | None:
+        """`(T + 1, 2)` positions of the tracked point, from start to end; None if the task tracks none."""
         return get_task(self.task).path(np.vstack((self.states, self.final_state)))

@@ -1,64 +1,65 @@
-"""Errors that a user can act on: one line each, naming the thing, what was expected and what was found."""
+"""Errors that a user can act on: one line each with the file or value, what was expected and what was found."""
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class CopolicyError(Exception):
-    """Base of every error that copolicy raises on purpose.
+    """Base class of all errors that copolicy raises on purpose.
 
-    `exit_status` is what a command returns for it: 2 where the call or its input is wrong,
-    1 where the data or the run has a problem.
+    `exit_status` is the exit status of a command: 2 if the call or its input is wrong, 1 if the data or the run has a
+    problem.
     """
 
     exit_status = 2
 
-    def __reduce__(self):
-        # Children build the message from other arguments; an error that comes out of a worker process has it already.
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Subclasses build the message from their arguments; an error from a worker process already has its message.
         return _with_message, (type(self), self.args)
 
 
 class ShapeError(CopolicyError):
-    """An array of another shape than the one promised."""
+    """An array has the wrong shape."""
 
-    def __init__(self, name: str, expected: tuple[int | str, ...], given: tuple[int, ...]):
-        super().__init__(f"{name}: expected shape {_shape(expected)}, got {_shape(given)}")
+    def __init__(self, name: str, expected: tuple[int | str, ...], actual: tuple[int, ...]):
+        super().__init__(f"{name}: expected shape {_shape(expected)}, got {_shape(actual)}")
 
 
 class InvalidValueError(CopolicyError):
-    """A value outside what is allowed."""
+    """A value is not allowed."""
 
-    def __init__(self, name: str, expected: str, found: object):
-        super().__init__(f"{name}: expected {expected}, found {found!r}")
+    def __init__(self, name: str, expected: str, actual: object):
+        super().__init__(f"{name}: expected {expected}, found {actual!r}")
 
 
 class UnknownNameError(CopolicyError):
-    """A name that is not among those on offer; the message lists what is."""
+    """A name is unknown; the message lists the available names."""
 
     def __init__(self, kind: str, name: str, available: Iterable[str]):
         super().__init__(f"unknown {kind} {name!r}; available: {', '.join(sorted(available))}")
 
 
 class FileFormatError(CopolicyError):
-    """A file that is not what it should be."""
+    """A file has the wrong format or content."""
 
-    def __init__(self, path: Path | str, expected: str, found: str):
-        super().__init__(f"{path}: expected {expected}, found {found}")
+    def __init__(self, path: Path | str, expected: str, actual: str):
+        super().__init__(f"{path}: expected {expected}, found {actual}")
 
 
 class ForeignRecordingError(FileFormatError):
-    """A sound file that holds no recording of this task, or one of a version that this reader does not know."""
+    """An undamaged file that is not a recording of this task, or has an unknown schema version."""
 
 
 class OutputExistsError(CopolicyError):
-    """An output that would overwrite something."""
+    """An output path exists already."""
 
     def __init__(self, path: Path | str):
         super().__init__(f"{path}: expected a path that does not exist yet, found one; nothing was overwritten")
 
 
 class MissingExtraError(CopolicyError):
-    """A command whose packages were not installed."""
+    """A package that a command needs is not installed."""
 
     def __init__(self, package: str, extra: str = "train"):
         super().__init__(
@@ -67,13 +68,13 @@ class MissingExtraError(CopolicyError):
 
 
 class RunError(CopolicyError):
-    """The call was right, but the data or the run has a problem."""
+    """The call is valid, but the data or the run has a problem."""
 
     exit_status = 1
 
 
-def _with_message(kind: type[CopolicyError], args: tuple) -> CopolicyError:
-    return kind.__new__(kind, *args)
+def _with_message(error_type: type[CopolicyError], args: tuple) -> CopolicyError:
+    return error_type.__new__(error_type, *args)
 
 
 def _shape(shape: tuple[int | str, ...]) -> str:

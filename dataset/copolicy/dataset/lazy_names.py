@@ -1,4 +1,4 @@
-"""Names of a package that are imported when they are asked for, so that `--help` waits for nothing heavy."""
+"""Names of a package that are imported on first access, so that `--help` imports no heavy library."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -9,8 +9,8 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str]
     """`__getattr__` and `__dir__` of a package (PEP 562).
 
     Args:
-        package: its `__name__`.
-        modules: by name, the module of the package that has it.
+        package: `__name__` of the package.
+        modules: for each name, the module of the package that defines it.
     """
 
     def get(name: str) -> Any:

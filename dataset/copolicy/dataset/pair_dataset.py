@@ -1,4 +1,4 @@
-"""A data set as notebooks and scripts read it: episodes as arrays, and one table of what is known of each."""
+"""A data set for notebooks and scripts: episodes as arrays, and a table with one row per episode."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,59 +6,58 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
-import numpy as np
-
+from .arrays import Array
 from .exceptions import CopolicyError, FileFormatError
 from .features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
 from .hub.local_copy import local_copy
 from .lerobot_folder.folder import POSITIONS, LeRobotFolder
 from .lerobot_folder.tables import pa
-from .physics_text import physics_of
+from .settings_text import parse_settings_text
 from .task import PairTask
 
 _REWARD = "next.reward"
 
 
 def load_dataset(path: str | Path, revision: str | None = None) -> "PairDataset":
-    """A data set in a folder, or one on the Hub, of which everything but the recordings is downloaded.
+    """Opens a LeRobot v3 data set in a folder or on the Hub (downloads everything except the recordings).
 
     Args:
         path: a folder, `USER/NAME`, or `hf://datasets/USER/NAME`.
         revision: tag, branch or commit on the Hub; `main` if None.
 
     Raises:
-        FileFormatError: no such folder, or no LeRobot v3 data set of an installed task.
-        InvalidValueError: a revision of a folder.
+        FileFormatError: the folder does not exist or is not a LeRobot v3 data set of an installed task.
+        InvalidValueError: `revision` is given for a folder.
         HubError: the Hub does not answer, or has no such data set or revision.
-        MissingExtraError: pyarrow is not installed, or for the Hub its client.
     """
-    found = LeRobotFolder.open(local_copy(str(path), revision))
-    found.require_task((STATE, ACTION, ENVIRONMENT_STATE))
-    return PairDataset(found)
+    folder = LeRobotFolder.open(local_copy(str(path), revision))
+    folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
+    return PairDataset(folder)
 
 
 @dataclass(frozen=True, repr=False)
 class DatasetEpisode:
     """One episode at the rate of its data set.
 
-    Not an `Episode`: a data set keeps no state after the last action, and has columns that recordings do not have.
+    A type of its own beside `Episode`: a data set does not store the state after the last action, and has columns that
+    recordings lack.
 
     Attributes:
         index: `episode_index`.
-        columns: what is known of it, by the names of `EpisodeMeta`.
-        states: `(T, n)`, by `TaskSpec.state`.
-        actions: `(T, 2 m)`, by `TaskSpec.joint_action`: robot, human.
-        past_human_actions: `(T, m)` the human's action of the frame before, zeros at first.
-        rewards: `(T,)` of the state that each frame leads to.
-        fps: frames a second.
+        columns: episode columns by name, see `EpisodeMeta`.
+        states: `(T, n)`, see `TaskSpec.state`.
+        actions: `(T, 2 m)`, see `TaskSpec.joint_action`: robot, human.
+        past_human_actions: `(T, m)` the human's action of the previous frame, zero at the first.
+        rewards: `(T,)` reward of the state after each frame.
+        fps: frames per second.
     """
 
     index: int
     columns: Mapping[str, Any]
-    states: np.ndarray
-    actions: np.ndarray
-    past_human_actions: np.ndarray
-    rewards: np.ndarray
+    states: Array
+    actions: Array
+    past_human_actions: Array
+    rewards: Array
     fps: int
     task: PairTask
     scenario: Any
@@ -67,22 +66,22 @@ class DatasetEpisode:
         return len(self.states)
 
     def __repr__(self) -> str:
-        about = ", ".join(str(self.columns[name]) for name in ("map_id", "source", "termination_reason"))
-        return f"DatasetEpisode({self.index}, states={self.states.shape}, actions={self.actions.shape}, {about})"
+        summary = ", ".join(str(self.columns[name]) for name in ("map_id", "source", "termination_reason"))
+        return f"DatasetEpisode({self.index}, states={self.states.shape}, actions={self.actions.shape}, {summary})"
 
     @property
     def settings(self) -> Any:
-        """Of the world that led from state to state; None where the data set does not say."""
-        return physics_of(self.columns["physics"], self.task)
+        """Settings of the simulated world; None if the data set does not state them."""
+        return parse_settings_text(self.columns["physics"], self.task)
 
     @property
-    def path(self) -> np.ndarray | None:
-        """`(T, 2)` the point that the task tracks; None where it tracks none."""
+    def path(self) -> Array | None:
+        """`(T, 2)` positions of the tracked point; None if the task tracks none."""
         return self.task.path(self.states)
 
     @property
-    def interaction(self) -> np.ndarray | None:
-        """`(T,)` what passes between the players, see `PairTask.interaction`; None where it is not measured."""
+    def interaction(self) -> Array | None:
+        """`(T,)` interaction measure, see `PairTask.interaction`; None if the task has none."""
         return self.task.interaction(self.states, self.actions)
 
 
@@ -90,20 +89,20 @@ class PairDataset:
     """A LeRobot v3 data set of a pair task.
 
     Attributes:
-        root: its folder.
-        info: `meta/info.json`.
-        task: of its episodes.
-        fps: frames a second.
-        episodes: a sequence of `DatasetEpisode`; iterating holds one data file in memory, indexing all of them.
+        root: folder of the data set.
+        info: content of `meta/info.json`.
+        task: task of the episodes.
+        fps: frames per second.
+        episodes: a sequence of `DatasetEpisode`. Iterating reads one data file at a time, indexing loads all of them.
     """
 
     def __init__(self, folder: LeRobotFolder):
         self._folder = folder
-        self.root = folder.root
-        self.info = folder.info
-        self.task = folder.task
-        self.fps = int(folder.info["fps"])
-        self.episodes = Episodes(folder, self.fps)
+        self.root: Path = folder.root
+        self.info: dict[str, Any] = folder.info
+        self.task: PairTask = folder.task
+        self.fps: int = int(folder.info["fps"])
+        self.episodes: Episodes = Episodes(folder, self.fps)
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -118,18 +117,18 @@ class PairDataset:
 
     @property
     def splits(self) -> dict[str, range]:
-        """Episodes of each split."""
+        """Episode indices of each split."""
         return self._folder.splits
 
     @cached_property
     def table(self) -> pa.Table:
-        """One row an episode: `episode_index`, `length` and the episode columns; `.to_pandas()` where pandas is."""
+        """One row per episode: `episode_index`, `length` and the episode columns. `.to_pandas()` needs pandas."""
         keys = [name for name in self._folder.episodes.column_names if "/" not in name and name not in POSITIONS[2:]]
         return self._folder.episodes.select(keys)
 
 
 class Episodes(Sequence[DatasetEpisode]):
-    """The episodes of a data set in order."""
+    """The episodes of a data set, in order."""
 
     def __init__(self, folder: LeRobotFolder, fps: int):
         self._folder, self._fps = folder, fps
@@ -162,7 +161,7 @@ class Episodes(Sequence[DatasetEpisode]):
     def _loaded(self) -> list[DatasetEpisode]:
         return [self._episode(index, columns) for index, columns in self._folder.frames(self._shapes)]
 
-    def _episode(self, index: int, columns: Mapping[str, np.ndarray]) -> DatasetEpisode:
+    def _episode(self, index: int, columns: Mapping[str, Array]) -> DatasetEpisode:
         row, task = self._rows[index], self._folder.task
         try:
             scenario = task.scenario_of_vector(columns[ENVIRONMENT_STATE][0].astype(float), row)

@@ -1,4 +1,4 @@
-"""Sets of scenarios: those that come with a task, and those of a lab's own files."""
+"""Sets of scenarios: the named sets of a task, and sets from scenario files."""
 
 import hashlib
 import json
@@ -12,29 +12,29 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .exceptions import UnknownNameError
 
 if TYPE_CHECKING:
-    from .scenario_document import Problem
+    from .scenario_document import ScenarioProblem
 
 SUFFIXES = (".yaml", ".yml", ".json")
-"""Endings of scenario files."""
+"""File name suffixes of scenario files."""
 
 DISPLACED = "-displaced"
-"""Ends the name of a scenario whose start alone was changed."""
+"""Suffix of the name of a scenario whose start was displaced."""
 
 
 def base_name(scenario: str) -> str:
-    """The name of a scenario without what says that its start was turned (`-90deg`) or displaced."""
+    """The name of a scenario without the suffixes for a rotated (`-90deg`) or displaced start."""
     return re.sub(rf"(-\d+deg)?({DISPLACED})?$", "", scenario)
 
 
 class ScenarioName(NamedTuple):
-    """Which scenario of which set something is.
+    """The name of a scenario, and the set that it is from.
 
     Attributes:
-        scenario: its name, such as `training-17`.
-        set_name: of its set.
-        version: of a set from a file, as the file states it; empty for a set that comes with the task.
-        digest: of what is in such a file; empty likewise.
-        weight: how often it comes up beside a scenario of weight 1.
+        scenario: name, such as `training-17`.
+        set_name: name of the set.
+        version: version of a set from a file, as the file states it; empty for a set of the task.
+        digest: digest of the content of that file; empty for a set of the task.
+        weight: relative frequency of the scenario in its set.
     """
 
     scenario: str
@@ -45,7 +45,7 @@ class ScenarioName(NamedTuple):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The episode columns that say so."""
+        """The episode columns with these values."""
         return {
             "map_id": self.scenario,
             "map_set": self.set_name,
@@ -57,16 +57,16 @@ class ScenarioName(NamedTuple):
 
 @dataclass(frozen=True)
 class ScenarioSet:
-    """Scenarios in order, under one name.
+    """A named, ordered set of scenarios.
 
     Attributes:
-        task: name of the task that they are of.
-        version: as the file states it; `1` for a set that comes with the task.
-        scenarios: each once, but where a set that comes with the task repeats one.
-        weights: how often each comes up beside one of weight 1.
+        task: name of the task.
+        version: version of the file; `1` for a set of the task.
+        scenarios: the scenarios, each once unless a set of the task repeats it.
+        weights: relative frequency of each scenario.
         splits: indices of the scenarios of each named split.
-        split: name of the split that this is, empty for the whole set.
-        from_file: the set is not one that comes with the task.
+        split: name of the split that this set is; empty for the whole set.
+        from_file: whether the set was read from a file.
         digest: sixteen hexadecimal digits over scenarios, weights and splits of the whole set.
     """
 
@@ -80,22 +80,22 @@ class ScenarioSet:
     from_file: bool = False
     digest: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.digest:
-            rows = [[one.to_json(), weight] for one, weight in zip(self.scenarios, self.weights, strict=True)]
+            rows = [[scenario.to_json(), weight] for scenario, weight in zip(self.scenarios, self.weights, strict=True)]
             text = json.dumps([rows, {name: list(indices) for name, indices in self.splits.items()}], sort_keys=True)
             object.__setattr__(self, "digest", hashlib.sha256(text.encode()).hexdigest()[:16])
 
-    def part(self, split: str) -> "ScenarioSet":
-        """The scenarios of a named split, in the order that the split has them.
+    def for_split(self, split: str) -> "ScenarioSet":
+        """The scenarios of a named split, in the order of the split.
 
         Raises:
             UnknownNameError: the set has no such split.
         """
         if split not in self.splits:
             raise UnknownNameError(f"split of {self.name}", split, self.splits or ["none"])
-        places = self.splits[split]
-        scenarios, weights = (tuple(column[place] for place in places) for column in (self.scenarios, self.weights))
+        indices = self.splits[split]
+        scenarios, weights = (tuple(column[index] for index in indices) for column in (self.scenarios, self.weights))
         return replace(self, scenarios=scenarios, weights=weights, splits={}, split=split)
 
     @property
@@ -105,22 +105,22 @@ class ScenarioSet:
 
     @property
     def scheduled(self) -> tuple[Any, ...]:
-        """The scenarios, each as often as its weight says."""
+        """The scenarios, each repeated by its weight."""
         pairs = zip(self.scenarios, self.weights, strict=True)
         return tuple(scenario for scenario, weight in pairs for _ in range(weight))
 
     def describe(self) -> dict[str, str]:
-        """Name, version and digest, as results have them, and whether they are of a `file` or of the `task`."""
+        """Label, version, digest and origin (`file` or `task`), as results store them."""
         origin = "file" if self.from_file else "task"
         return {"name": self.label, "version": self.version, "digest": self.digest, "from": origin}
 
 
 class ScenarioFiles(ABC):
-    """How a task writes scenarios into files: the part of a task behind `--maps FILE` and `copolicy-collect maps`.
+    """The part `scenario_files` of a task, for `--maps FILE` and `copolicy-collect maps`.
 
     Attributes:
-        schema: JSON schema of a file.
-        bounds: within which `make` draws, lowest and highest value by name, where nothing else is asked for.
+        schema: JSON schema of a scenario file.
+        bounds: default bounds of random scenarios: lowest and highest value by name.
     """
 
     schema: Mapping[str, Any]
@@ -128,45 +128,45 @@ class ScenarioFiles(ABC):
 
     @abstractmethod
     def read(self, path: Path) -> ScenarioSet:
-        """The set in a file.
+        """Reads the set in a file.
 
         Raises:
-            FileFormatError: no such file, or one with a problem; the line names the first.
+            FileFormatError: the file does not exist or has a problem; the message names the first problem.
         """
 
     @abstractmethod
-    def problems(self, path: Path) -> "list[Problem]":
-        """Everything that is wrong with a file; empty where it can be used.
+    def problems(self, path: Path) -> "list[ScenarioProblem]":
+        """All problems of a file; empty if it is valid.
 
         Raises:
-            FileFormatError: no such file, or none that can be read at all.
+            FileFormatError: the file does not exist or cannot be parsed.
         """
 
     @abstractmethod
     def make(self, name: str, count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-        """The content of a file with scenarios drawn at random, in which `problems` finds nothing.
+        """The content of a valid file with random scenarios.
 
         Args:
-            bounds: all of them, those of `ScenarioFiles.bounds` among them.
+            bounds: lowest and highest value for every name in `ScenarioFiles.bounds`.
 
         Raises:
-            RunError: they leave no room for so many.
+            RunError: the bounds leave no room for so many scenarios.
         """
 
 
 def set_label(row: Mapping[str, Any]) -> str:
-    """The map set in an episode's columns, with version and digest where it is of a file."""
+    """The map set of an episode, with version and digest if it is from a file."""
     file = f" (version {row['map_set_version']}, {row['map_set_digest']})" if row["map_set_digest"] else ""
     return f"{row['map_set']}{file}"
 
 
 def file_and_split(text: str) -> tuple[str, str]:
-    """The two parts of `FILE#split`; the split is empty where there is none (a path may hold `#`)."""
+    """Splits `FILE#split` into path and split; the split is empty if none is given (a path may contain `#`)."""
     path, mark, split = text.rpartition("#")
     return (path, split) if mark and not Path(text).is_file() else (text, "")
 
 
 def is_file_name(text: str) -> bool:
-    """Whether `--maps` names a file, not a set that comes with the task."""
+    """Whether the value of `--maps` names a file rather than a set of the task."""
     path, _ = file_and_split(text)
     return path.lower().endswith(SUFFIXES) or "/" in path or "\\" in path or Path(path).is_file()

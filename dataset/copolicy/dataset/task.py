@@ -1,12 +1,13 @@
-"""What the pipeline must know of a task for two players, and which tasks are installed.
+"""The contract of a two-player task, and the lookup of installed tasks.
 
-A task is one object, a `PairTask`. `get_task` finds it by its name through the entry point group `copolicy.tasks`; the
-tasks that come along are registered there as those of any other package are:
+A task is one object, a `PairTask`. `get_task` finds it by name through the entry point group `copolicy.tasks`, in which
+any package can register tasks:
 
     [project.entry-points."copolicy.tasks"]
     peg = "lab_peg.task:PegTask"
 
-Player 0 is the robot seat, player 1 the human seat. A joint action is both players' actions, robot first.
+Player 0 is the robot seat, player 1 the human seat. A joint action is both players' actions, robot first. In the shapes
+below n is the length of a state, k that of a recorded state, m that of one player's action.
 """
 
 import functools
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import CopolicyError, InvalidValueError, UnknownNameError
 from .features import PAIR_GYM_ID
 from .outline import Outline
@@ -46,7 +48,7 @@ from .task_words import TaskWords
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
 
-# The whole contract from one place, for packages that bring a task.
+# The whole contract in one place, for packages that define a task.
 __all__ = [
     "ENTRY_POINTS",
     "PLAYERS",
@@ -76,24 +78,24 @@ __all__ = [
 ]
 
 TABLE = "table"
-"""Name of the task of data, recordings and policies that name none."""
+"""The default task: that of recordings, data sets and policies that state no task."""
 
 ENTRY_POINTS = "copolicy.tasks"
 """The entry point group in which tasks are registered."""
 
 
 class PairTask(ABC):
-    """A task for two players. A subclass says what is abstract here; every other part is optional.
+    """A two-player task. A subclass implements the abstract members; every other part is optional.
 
-    What a task does not offer is None (or empty) here; commands leave out what needs it and say so (`missing`).
+    An optional part that a task lacks is None or empty; commands skip what needs it and report so (`missing`).
 
     Attributes:
-        spec: what it is.
-        settings_type: class of its settings.
-        exchange: how an episode looks from the other seat.
-        outline: what it looks like.
-        studies: what results of studies say of it.
-        orientations: how many start orientations `turned` gives a scenario; 1: there are none.
+        spec: name, vectors, rate and termination reasons.
+        settings_type: class of the world settings, see `Settings`.
+        exchange: exchange of the two seats.
+        outline: shapes of the task for figures, pages and videos.
+        studies: task-specific parts of study results.
+        orientations: number of start orientations that `turned` gives each scenario; 1 if the task has none.
     """
 
     spec: ClassVar[TaskSpec]
@@ -105,86 +107,92 @@ class PairTask(ABC):
 
     @property
     def agents(self) -> SimulatedPlayers | None:
-        """Simulated players."""
+        """Scripted agents."""
         return None
 
     @property
     @abstractmethod
     def scenario_sets(self) -> Mapping[str, Sequence[Any]]:
-        """Scenarios by the name of their set, in order."""
+        """Named sets of scenarios, each in order."""
 
     @abstractmethod
     def scenario_of_json(self, text: str | bytes) -> Any:
-        """The inverse of `Scenario.to_json`.
+        """Parses a scenario, the inverse of `Scenario.to_json`.
 
         Raises:
-            InvalidValueError: the text is no scenario.
+            InvalidValueError: the text is not a scenario.
         """
 
     @abstractmethod
-    def scenario_vector(self, scenario: Any) -> np.ndarray:
-        """The vector of a scenario, as `TaskSpec.scenario` names it, `(n,)`."""
+    def scenario_vector(self, scenario: Any) -> Array:
+        """The vector of a scenario, `(len(TaskSpec.scenario),)`."""
 
     @abstractmethod
-    def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> Any:
-        """The scenario behind a vector `(n,)` of a data set and the columns of its episode.
+    def scenario_of_vector(self, vector: Array, columns: Mapping[str, Any]) -> Any:
+        """The scenario of a vector `(n,)` and the episode columns that complete it, see `columns_of`.
 
         Raises:
-            InvalidValueError: no scenario has that vector.
+            InvalidValueError: no scenario has this vector.
         """
 
-    def settings_of(self, entries: Mapping[str, Any], where: str = "settings: {}") -> Any:
-        """Settings from numbers, or from their digits, by name.
+    def settings_of(self, entries: Mapping[str, Any], label: str = "settings: {}") -> Any:
+        """Settings from numbers or their decimal text, by name.
 
         Args:
-            where: what an error calls a setting.
+            label: format of a setting's name in errors.
 
         Raises:
-            InvalidValueError: one is missing, is no number, or is not allowed.
+            InvalidValueError: a setting is missing, is not a number, or is out of range.
         """
         values = {}
         for setting in fields(self.settings_type):
-            entry, kind = entries.get(setting.name), type(setting.default)
-            if isinstance(entry, bool) or not isinstance(entry, (str, int) if kind is int else (str, int, float)):
-                raise InvalidValueError(where.format(setting.name), "a number", entry)
+            entry, number_type = entries.get(setting.name), type(setting.default)
+            if isinstance(entry, bool) or not isinstance(
+                entry, (str, int) if number_type is int else (str, int, float)
+            ):
+                raise InvalidValueError(label.format(setting.name), "a number", entry)
             try:
-                values[setting.name] = kind(entry)
+                values[setting.name] = number_type(entry)
             except (ValueError, OverflowError) as error:
                 expected = "a number" if isinstance(error, ValueError) else "a finite number"
-                raise InvalidValueError(where.format(setting.name), expected, entry) from None
+                raise InvalidValueError(label.format(setting.name), expected, entry) from None
         return self.settings_type(**values)
 
     @abstractmethod
     def make_world(self, scenario: Any, settings: Any = None) -> World:
-        """A world at the start of a scenario, under the default settings where none are given."""
+        """A world at the start of a scenario; default settings if None."""
 
     def start_of(self, scenario: Any) -> tuple[float, ...]:
         """The recorded state at the start of a scenario."""
         return self.make_world(scenario).recorded
 
-    def states_of(self, recorded: np.ndarray) -> np.ndarray:
-        """States `(T, n)` from recorded ones `(T, k)`, to the last bit those of `World.observation`."""
+    def states_of(self, recorded: Array) -> Array:
+        """States `(T, n)` of recorded states `(T, k)`, bit-identical to `World.observation`."""
         return recorded
 
-    def recorded_of(self, states: np.ndarray) -> np.ndarray:
-        """The inverse of `states_of`, as exact as the states allow."""
+    def recorded_of(self, states: Array) -> Array:
+        """Recorded states `(T, k)` of states `(T, n)`: the inverse of `states_of`, up to rounding."""
         return states
 
     def columns_of(self, scenario: Any) -> dict[str, Any]:
-        """Episode columns with what the vector of a scenario does not say."""
+        """Episode columns with the information about a scenario that its vector lacks."""
         return {}
 
     def unseen(self, columns: Mapping[str, Any]) -> str:
-        """What of these columns a policy would have to know and does not see, in words; empty: nothing."""
+        """Description of a property in these episode columns that policies do not observe; empty if there is none."""
         return ""
 
-    def unseen_in(self, episodes: Sequence[Mapping[str, Any]]) -> str:
-        """How many of some episodes, by these columns, have something that no policy sees; empty: none."""
-        found = [text for columns in episodes if (text := self.unseen(columns))]
-        return f"{len(found)} of {len(episodes)} have what no policy sees: {found[0]}" if found else ""
+    def unseen_summary(self, episodes: Sequence[Mapping[str, Any]]) -> str:
+        """Number of episodes with a property that policies do not observe, with an example; empty if there are none."""
+        summaries = [text for columns in episodes if (text := self.unseen(columns))]
+        return (
+            f"{len(summaries)} of {len(episodes)} have a property that no policy observes: {summaries[0]}"
+            if summaries
+            else ""
+        )
 
-    def integrate(self, scenario: Any, settings: Any, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """States `(T + 1, n)` under joint actions `(T, m)` from a state `(n,)` on, whatever ends there are."""
+    def integrate(self, scenario: Any, settings: Any, state: Array, actions: Array) -> Array:
+        """States `(T + 1, n)` under joint actions `(T, 2 m)` from a state `(n,)`, also after the end of the episode."""
         world = self.make_world(scenario, settings)
         world.restore(tuple(self.recorded_of(np.asarray(state, float)[None])[0].tolist()))
         states = [world.observation]
@@ -193,8 +201,8 @@ class PairTask(ABC):
             states.append(world.observation)
         return np.array(states)
 
-    def rewards(self, scenario: Any, states: np.ndarray) -> np.ndarray:
-        """The reward of each of some states `(T, n)`, `(T,)`."""
+    def rewards(self, scenario: Any, states: Array) -> Array:
+        """`(T,)` rewards of states `(T, n)`."""
         world, rewards = self.make_world(scenario), []
         for recorded in self.recorded_of(np.asarray(states, float)).tolist():
             world.restore(tuple(recorded))
@@ -203,118 +211,118 @@ class PairTask(ABC):
 
     @property
     def recording(self) -> "TaskMessages | None":
-        """Messages of its own in recordings; None: the generic ones."""
+        """Message types of the task in recordings; None for the generic ones."""
         return None
 
-    def path(self, states: np.ndarray) -> np.ndarray | None:
-        """`(T, 2)` the point that figures and statistics follow; None: there is none."""
+    def path(self, states: Array) -> Array | None:
+        """`(T, 2)` positions of the tracked point, for figures and statistics; None if the task tracks none."""
         return None
 
-    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
-        """`(T,)` what passes between the players in states `(T, n)` under actions `(T, m)`; None: not measured."""
+    def interaction(self, states: Array, actions: Array) -> Array | None:
+        """`(T,)` interaction measure in states `(T, n)` under joint actions `(T, 2 m)`; None if the task has none."""
         return None
 
-    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray | None:
-        """The same in recorded states `(T, k)`."""
+    def interaction_recorded(self, recorded: Array, actions: Array) -> Array | None:
+        """`interaction` in recorded states `(T, k)`."""
         return self.interaction(self.states_of(recorded), actions)
 
     def layout(self, scenario: Any, with_goal: bool = False) -> Hashable:
-        """What scenarios share that differ in their start alone, or without `with_goal` in start and goal; sortable."""
+        """Sortable key, equal for scenarios that differ only in the start, or without `with_goal` in start and goal."""
         return scenario.digest
 
-    def strategy(self, scenario: Any, states: np.ndarray) -> str:
-        """The strategy label of an episode's states `(T + 1, n)`; empty: the task has none."""
+    def strategy(self, scenario: Any, states: Array) -> str:
+        """The strategy label of an episode with states `(T + 1, n)`; empty if the task has no labels."""
         return ""
 
     def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
-        """Id of its gymnasium environment and the arguments beside its rate, under settings that are not the usual."""
-        steps = {name: value for name, value in settings.items() if name == "step_limit"}
-        others = {name: value for name, value in settings.items() if name not in steps}
-        return PAIR_GYM_ID, {"task": self.spec.name, **steps, **({"settings": others} if others else {})}
+        """Gymnasium id and arguments (except the rate) of the task's environment under non-default settings."""
+        step_limit = {name: value for name, value in settings.items() if name == "step_limit"}
+        changed = {name: value for name, value in settings.items() if name not in step_limit}
+        return PAIR_GYM_ID, {"task": self.spec.name, **step_limit, **({"settings": changed} if changed else {})}
 
     @property
     def words(self) -> TaskWords:
-        """How screens, cards and pages speak of it."""
-        return TaskWords.of(self.spec)
+        """Phrases about the task for screens, cards, pages and figures."""
+        return TaskWords.from_spec(self.spec)
 
-    def images(self, scenario: Any, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray] | None:
-        """Of each of some states, `(height, width, 3)` uint8 for a size (width, height); None: it is not drawn."""
+    def images(self, scenario: Any, states: Array, size: tuple[int, int]) -> Iterator[Array] | None:
+        """An image `(height, width, 3)` uint8 of each state, for a size (width, height) in px; None if not drawn."""
         return None
 
     def view(self, scenario: Any) -> SceneView | None:
-        """What draws a scenario on the screen; None: `outline` is drawn as it is."""
+        """The view that draws a scenario on the screen; None to draw `outline`."""
         return None
 
     @property
     def drift_limits(self) -> Mapping[str, float]:
-        """What `drift` measures, and up to where two motions are the same: here a hundred thousandth of the bounds."""
+        """Largest `drift` of two equal motions, by the name of each measure; by default 1e-5 of the bounds' range."""
         vector = self.spec.recorded
         limits = 1e-5 * (np.array(vector.high) - np.array(vector.low))
         return dict(zip(vector.names, limits.tolist(), strict=True))
 
-    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """`(T, len(drift_limits))` how far apart recorded states `(T, k)` of two motions are, step by step.
+    def drift(self, recorded: Array, reference: Array) -> Array:
+        """`(T, len(drift_limits))` distances between the recorded states `(T, k)` of two motions at each step.
 
-        A task with angles in its state says what a whole turn is.
+        A task with angles in its recorded state must override this, so that a full turn is no distance.
         """
-        return np.abs(recorded - other)
+        return np.abs(recorded - reference)
 
     def displaced(self, scenario: Any, scale: float, rng: np.random.Generator) -> Any:
-        """A scenario that begins beside its start, by up to `scale` times what the task sees fit.
+        """A scenario with a random start near its own, up to `scale` times the displacement that the task defines.
 
         Raises:
-            InvalidValueError: the task has none.
+            InvalidValueError: the task has no displaced starts.
         """
         raise InvalidValueError("--start-noise", "no such flag", self.missing("displaced starts"))
 
     def balanced(self, scenario: Any) -> tuple[Hashable, ...]:
-        """What a session balances beside scenarios, such as their starts; each scenario has as many."""
+        """Factors of a scenario that a session balances, such as its start; the same number for every scenario."""
         return ()
 
     @property
     def statistics(self) -> TaskStatistics:
-        """What statistics are computed by, and statistics beside the generic ones."""
+        """Inputs of the generic statistics, and statistics of the task."""
         return TaskStatistics()
 
     @property
     def rules(self) -> TaskRules:
-        """Rules of `check` and their limits beside the generic ones."""
+        """Rules and limits of the task for `copolicy-dataset check`, in addition to the generic ones."""
         return TaskRules()
 
     @property
     def features(self) -> PolicyFeatures:
-        """Observation encoders and symmetries of policies; torch is imported for them here, and nowhere before."""
+        """Observation encoders and symmetries for policies. Import torch here, not at the top of a task's module."""
         return PolicyFeatures()
 
     def settings_summary(self, settings: Any) -> str:
-        """Settings in words: what is not the default."""
+        """Readable text of the settings that differ from the defaults; `default` if none does."""
         default = asdict(self.settings_type())
-        others = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
-        return ", ".join(others) or "default"
+        changed = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
+        return ", ".join(changed) or "default"
 
     def identify(self, scenario: Any) -> tuple[str, str]:
-        """Name of a scenario and of its set: `("training-17", "training")`, `("custom-1a2b3c4d", "custom")`."""
+        """Names of a scenario and its set: `("training-17", "training")`, `("custom-1a2b3c4d", "custom")`."""
         for set_name, scenarios in self.scenario_sets.items():
-            for index, known in enumerate(scenarios):
-                if known.digest == scenario.digest:
+            for index, candidate in enumerate(scenarios):
+                if candidate.digest == scenario.digest:
                     return f"{set_name}-{index:02d}", set_name
         return f"custom-{scenario.digest}", "custom"
 
     def name_of(self, scenario: Any) -> ScenarioName:
-        """Name of a scenario, of its set, and of the file that it is from; its `columns` go into recordings."""
+        """Names of a scenario and its set, and the version of the file that it is from."""
         return ScenarioName(*self.identify(scenario))
 
     @property
     def scenario_files(self) -> ScenarioFiles | None:
-        """How scenarios are written into files."""
+        """Reader and writer of scenario files; None if the task has none."""
         return None
 
     def scenario_set(self, text: str) -> ScenarioSet:
-        """The scenarios behind `--maps`: the name of a set, a file, or one of its splits as `FILE#split`.
+        """The scenarios for a value of `--maps`: the name of a set, a file, or a split of it as `FILE#split`.
 
         Raises:
             UnknownNameError: no such set or split.
-            FileFormatError: the file is none, has a problem, or is of another task.
+            FileFormatError: the file does not exist, has a problem, or is of another task.
             InvalidValueError: the task has no scenario files.
         """
         if text in self.scenario_sets:
@@ -325,56 +333,56 @@ class PairTask(ABC):
         if self.scenario_files is None:
             raise InvalidValueError("--maps", f"a set ({self.missing('scenario files')})", text)
         path, split = file_and_split(text)
-        chosen = self.scenario_files.read(Path(path))
-        return chosen.part(split) if split else chosen
+        file_set = self.scenario_files.read(Path(path))
+        return file_set.for_split(split) if split else file_set
 
-    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
-        """A set with each scenario in several start orientations.
+    def turned(self, scenario_set: ScenarioSet) -> ScenarioSet:
+        """A set with each scenario in `orientations` start orientations.
 
         Raises:
-            InvalidValueError: the task has none.
+            InvalidValueError: the task has no start orientations.
         """
         raise InvalidValueError("--orientations", "no such flag", self.missing("start orientations"))
 
     def offers(self, part: str) -> bool:
-        """Whether the task brings a part of its own, such as `strategy` or `interaction`."""
+        """Whether the task overrides an optional part, such as `strategy` or `interaction`."""
         return getattr(type(self), part) is not getattr(PairTask, part)
 
     @property
     def required_outline(self) -> Outline:
-        """The outline, for what cannot do without.
+        """The outline of the task.
 
         Raises:
-            CopolicyError: there is none.
+            CopolicyError: the task has none.
         """
         if self.outline is None:
             raise CopolicyError(self.missing("outline"))
         return self.outline
 
     def missing(self, part: str) -> str:
-        """The sentence with which a command leaves out what needs a part that the task does not offer."""
+        """The message of a command that skips what needs a part that the task lacks."""
         return f"left out: the task {self.spec.name!r} has no {part}"
 
 
 def installed_tasks() -> list[str]:
-    """Names of the tasks that are installed, sorted."""
+    """Sorted names of the installed tasks."""
     return sorted({entry.name for entry in entry_points(group=ENTRY_POINTS)})
 
 
 def distribution_of(task: PairTask) -> str | None:
-    """Name of the installed package that registers a task."""
+    """Name of the installed package that registers a task; None if unknown."""
     package = next(iter(entry_points(group=ENTRY_POINTS, name=task.spec.name))).dist
     return None if package is None else package.name
 
 
 @functools.cache
 def get_task(name: str = TABLE) -> PairTask:
-    """The task of a name.
+    """The installed task with a name.
 
     Raises:
         UnknownNameError: no such task is installed.
-        InvalidValueError: what is registered under the name is no task, or is one of another name.
-        CopolicyError: it cannot be imported.
+        InvalidValueError: the object registered under the name is not a `PairTask` of that name.
+        CopolicyError: the task cannot be imported.
     """
     entries = list(entry_points(group=ENTRY_POINTS, name=name))
     if not entries:

@@ -1,4 +1,4 @@
-"""What a task is made of: scenarios, settings, the world, and the parts that it may offer beside them."""
+"""Types of the task contract: scenario, settings, world, and the optional parts of a task."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,35 +7,36 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from .arrays import Array
 from .outline import Point, Pose
 
 
 class Scenario(Protocol):
-    """Where an episode starts and what it is about; frozen, equal where it means the same."""
+    """Start, goal and obstacles of an episode; frozen, compared by value."""
 
     @property
     def digest(self) -> str:
-        """Eight hexadecimal digits, equal for scenarios that mean the same."""
+        """Eight hexadecimal digits, equal for equal scenarios."""
         ...
 
     def to_json(self) -> str:
-        """Canonical JSON, the text that is attached to a recording."""
+        """Canonical JSON, attached to recordings."""
         ...
 
 
 class Settings(Protocol):
-    """Settings of a world: a frozen dataclass of numbers, with a default for each."""
+    """World settings: a frozen dataclass of numbers with defaults."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def step_limit(self) -> int:
-        """A field: steps after which an episode ends with the reason `timeout`."""
+        """Steps after which an episode ends with the reason `timeout`; a field of the dataclass."""
         ...
 
 
 class Outcome(NamedTuple):
-    """How an episode stands after a step; `reason` is empty while it runs, else one of the task's reasons."""
+    """State of an episode after a step; `reason` is empty while it runs, else one of `TaskSpec.reasons`."""
 
     done: bool
     success: bool
@@ -49,59 +50,59 @@ class World(Protocol):
     """The simulated world of a task: deterministic, advanced one step of `1 / record_hz` s at a time.
 
     Attributes:
-        step_count: steps since the last reset.
+        step_count: steps since the last `restore`.
     """
 
     step_count: int
 
     @property
     def recorded(self) -> tuple[float, ...]:
-        """The state as recordings hold it (`TaskSpec.recorded`), exact: `reset` to it goes on bit for bit."""
+        """The exact state as recordings store it (`TaskSpec.recorded`): after `restore` the motion is bit-identical."""
         ...
 
     @property
-    def observation(self) -> np.ndarray:
-        """The state as data sets and agents see it (`TaskSpec.state`), `(n,)`."""
+    def observation(self) -> Array:
+        """The state that data sets store and agents observe (`TaskSpec.state`), `(n,)`."""
         ...
 
     def restore(self, recorded: Sequence[float]) -> None:
-        """Puts the world into a recorded state and sets the step count to zero."""
+        """Sets the world to a recorded state and the step count to zero."""
         ...
 
-    def step(self, action: np.ndarray) -> Outcome:
-        """Advances under a joint action, each number clipped to its bounds; after an end, too."""
+    def step(self, action: Array) -> Outcome:
+        """Advances one step under a joint action, clipped to its bounds; also after the end of an episode."""
         ...
 
     def reward(self) -> float:
-        """Of the present state."""
+        """Reward of the current state."""
         ...
 
 
 class Player(Protocol):
-    """A simulated player of one episode."""
+    """A scripted agent at one seat, for one episode."""
 
     @property
     def changes(self) -> int:
-        """How often it has changed its mind, as the task defines it."""
+        """Number of changes of strategy so far, as the task defines them."""
         ...
 
-    def act(self, state: np.ndarray) -> np.ndarray:
-        """Its action `(m,)` in a state `(n,)`; called once a step."""
+    def act(self, state: Array) -> Array:
+        """The action `(m,)` in a state `(n,)`; called once per step."""
         ...
 
 
 @dataclass(frozen=True)
 class SimulatedPlayers:
-    """The part `agents` of a task: players that need neither a person nor a policy.
+    """The part `agents` of a task: its scripted agents.
 
     Attributes:
-        pairs: profiles (frozen dataclasses) of simulated pairs by name, robot seat first.
-        partners: profiles of kinds of partner for the human seat, which robots are judged with.
-        robots: profile and description of scripted robots, which policies are compared with.
-        make_pair: players from scenario, name and seed of a pair, and whatever options the task has.
-        make_partner: a player from scenario, kind and seed; equal seeds make equal ones, whoever the robot is.
-        make_robot: a player from scenario, name and seed.
-        options: names of what `make_pair` takes beside these; `clearance` is behind the flag of that name.
+        pairs: profiles (frozen dataclasses) of scripted pairs by name, robot seat first.
+        partners: profiles of the partner kinds at the human seat with which robots are evaluated.
+        robots: profile and description of the scripted robots with which policies are compared.
+        make_pair: two agents from scenario, name and seed of a pair, and the keyword arguments in `options`.
+        make_partner: an agent from scenario, partner kind and seed; equal for equal seeds, whatever the robot.
+        make_robot: an agent from scenario, name and seed.
+        options: names of further keyword arguments of `make_pair`; `clearance` is set by the flag `--clearance`.
     """
 
     pairs: Mapping[str, tuple[Any, Any]]
@@ -114,7 +115,7 @@ class SimulatedPlayers:
 
 
 class SceneView(Protocol):
-    """What `PairTask.view` gives: draws one scenario and what moves in it on pygame surfaces of any size."""
+    """Draws one scenario and its moving body on pygame surfaces of any size; made by `PairTask.view`."""
 
     def draw(
         self,
@@ -124,70 +125,71 @@ class SceneView(Protocol):
         forces: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
         trail: Sequence[Pose] = (),
     ) -> Any:
-        """Draws the scene into the middle of an area, in its own shape, and returns the rectangle that it fills.
+        """Draws the scene centred in an area with its own aspect ratio, and returns the rectangle that it fills.
 
         Args:
             surface: a `pygame.Surface`.
             area: a `pygame.Rect`.
-            pose: of the body, see `Outline.poses`.
-            forces: of both players, see `Outline.forces`.
+            pose: pose of the body, see `Outline.poses`.
+            forces: forces of both players, see `Outline.forces`.
             trail: earlier poses, oldest first.
         """
         ...
 
     def to_screen(self, point: Point) -> Point:
-        """Where a point of the scene was drawn last, px of the surface."""
+        """Surface coordinates (px) of a scene point in the last drawing."""
         ...
 
 
 class Studies:
-    """The part `studies` of a task: what results of studies say of it beside what they say of any task.
+    """The part `studies` of a task: its additions to study results.
 
     Attributes:
-        step_limit: steps after which an episode of a study ends; None: as the settings of the task have it.
-        definitions: what measures are in this task, in words by their names in results.
+        step_limit: steps after which an episode of a study ends; None for the limit in the settings.
+        definitions: definitions of measures for this task, by their names in results.
     """
 
     step_limit: int | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
 
     def factors(self, scenario: Any) -> dict[str, Any]:
-        """Columns of an episode's row; results are split by `start_theta` (rad) and `obstacles` (a count), if any."""
+        """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""
         return {}
 
-    def at_rest(self, recorded: np.ndarray) -> np.ndarray | None:
-        """`(T,)` whether what is moved stands, in recorded states `(T, k)`; None: not measured."""
+    def at_rest(self, recorded: Array) -> Array | None:
+        """`(T,)` whether the body is at rest in recorded states `(T, k)`; None if not measured."""
         return None
 
 
 class SeatExchange(Protocol):
-    """The part `exchange` of a task: the same episode with the robot's and the human's place exchanged.
+    """The part `exchange` of a task: exchanges the robot's and the human's seat.
 
-    Each method is its own inverse. A world in an exchanged state moves under an exchanged action as the first one
-    does, so that a policy that has learned the robot's seat can act at the human's.
+    Each method is its own inverse. The dynamics commute with the exchange, so that a policy trained for the robot's
+    seat can act at the human's.
     """
 
     def scenario(self, scenario: Any) -> Any:
         """A scenario with the seats exchanged."""
         ...
 
-    def states(self, states: np.ndarray) -> np.ndarray:
+    def states(self, states: Array) -> Array:
         """States `(..., n)` with the seats exchanged."""
         ...
 
-    def actions(self, actions: np.ndarray) -> np.ndarray:
+    def actions(self, actions: Array) -> Array:
         """Joint actions `(..., 2 m)` with the seats exchanged."""
         ...
 
 
 @dataclass(frozen=True)
 class PolicyFeatures:
-    """What a task offers to policies beside the generic input, which is its scaled columns; by name.
+    """Observation encoders and symmetries of a task, by name; the generic policy input is the scaled columns.
 
     Attributes:
-        encoders: each is called with whether the human's past action is seen, and gives a torch module with a `size`
-            that makes `(..., size)` of observation columns `(..., n)` in physical units.
-        symmetries: each makes other training samples `{column: (B, T, n)}`, as true, of some; applied in this order.
+        encoders: factories, called with whether the policy observes the human's past action. Each returns a torch
+            module with an attribute `size` that maps observation columns `(..., n)` in physical units to `(..., size)`.
+        symmetries: functions that augment training samples `{column: (B, T, n)}` by a symmetry of the task, applied in
+            this order.
     """
 
     encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
@@ -196,18 +198,18 @@ class PolicyFeatures:
 
 @dataclass(frozen=True)
 class TaskStatistics:
-    """The part `statistics` of a task: what its statistics are computed by, and those that it alone has.
+    """The part `statistics` of a task: inputs of the generic statistics, and statistics of the task.
 
     Attributes:
-        people: what a data set of people is.
-        velocity: places in the state of the velocity of what moves, an axis of a player's action each; empty where
-            there is none: no statistics of speed and of work.
+        people: description of a data set recorded with people.
+        velocity: indices of the body's velocity in the state, one per axis of a player's action; empty if the state has
+            none, which omits statistics of speed and work.
         interaction: definition of the interaction measure.
-        interaction_unit: of it.
-        label_bits: bits that a strategy label can tell at most; None where nobody knows.
-        families: by family, computes estimates from trajectories, bootstrap and generator: further ones of a family
-            of `compute_statistics`, some in the place of generic ones, or a family of its own.
-        reference: what people did elsewhere, as a part of the document, from a generator.
+        interaction_unit: unit of the interaction measure.
+        label_bits: maximum information in a strategy label, bits; None if unknown.
+        families: functions of trajectories, bootstrap and generator by statistics family; their estimates add to or
+            replace those of a family of `compute_statistics`, or form a new family.
+        reference: computes published statistics of people, for comparison, from a generator.
     """
 
     people: str = "people took part"
@@ -221,7 +223,7 @@ class TaskStatistics:
 
 @dataclass(frozen=True)
 class Limit:
-    """A number and why it is that one; `{hz}` in its unit stands for the task's steps a second."""
+    """The limit of a rule with its reason; `{hz}` in the unit stands for the task's steps per second."""
 
     value: float
     unit: str
@@ -230,16 +232,15 @@ class Limit:
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule.
+    """One rule of `copolicy-dataset check`.
 
     Attributes:
-        what: what it looks after; where `find` is None, the part that a task lacks without a rule of this name.
-        find: yields the findings of an `EpisodeTable`; None in the place of a rule that only a task can bring.
-        frames: columns of the frames that it reads.
-        columns: episode columns that it reads.
-        kinds: the kinds of data that it says something about.
-        whole: it compares episodes with each other, or says something of the files as they lie; a part of the episodes
-            is not enough to apply it.
+        what: short description; if `find` is None, the name of the missing part for the report.
+        find: yields the findings in an `EpisodeData`; None for a rule that only a task can define.
+        frames: frame columns that the rule needs.
+        columns: episode columns that the rule needs.
+        kinds: kinds of data to which the rule applies.
+        whole: whether the rule needs the whole data set: it compares episodes or checks the files.
     """
 
     name: str
@@ -256,8 +257,8 @@ class TaskRules:
     """The part `rules` of a task.
 
     Attributes:
-        rules: of its own; one with the name of a generic rule stands in its place, the others come last.
-        limits: of its own rules, and those of generic rules that it sets otherwise; None where it does without.
+        rules: rules of the task; a rule with the name of a generic rule replaces it, the others come last.
+        limits: limits of these rules, and overridden limits of generic rules; None removes a limit.
     """
 
     rules: tuple[Rule, ...] = ()

@@ -1,30 +1,31 @@
-"""What a task is in plain data: its seats, its rate, and what the numbers of its vectors mean."""
+"""The specification of a task as plain data: vectors with names, units and bounds, seats, rate, reasons."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import InvalidValueError
 
 RECORD_HZ = 30
-"""Steps of simulation and recording per second."""
+"""Default steps of simulation and recording per second."""
 
 PLAYERS = ("robot", "human")
 
 TIMEOUT = "timeout"
-"""The reason of an end by the step limit, in every task."""
+"""Termination reason of an episode that reaches the step limit, in every task."""
 
 
 @dataclass(frozen=True)
 class Vector:
-    """A vector of numbers with what each of them means.
+    """Names, units and bounds of the elements of a vector.
 
     Attributes:
-        names: one a number.
-        units: of each, `1` for none.
-        low: lowest value of each that the task knows; what scales a policy's input.
-        high: highest value of each.
+        names: name of each element.
+        units: unit of each element, `1` for none.
+        low: lowest value of each element; low and high scale the input of policies.
+        high: highest value of each element, above the lowest.
     """
 
     names: tuple[str, ...]
@@ -32,7 +33,7 @@ class Vector:
     low: tuple[float, ...]
     high: tuple[float, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         sizes = {name: len(getattr(self, name)) for name in ("names", "units", "low", "high")}
         if len(set(sizes.values())) != 1:
             raise InvalidValueError("Vector", "as many units, low and high values as names", sizes)
@@ -43,33 +44,33 @@ class Vector:
         return len(self.names)
 
     @property
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> Array:
         """Lowest and highest values, `(2, n)`."""
         return np.array((self.low, self.high), float)
 
     @property
     def range(self) -> str:
-        """The bounds in words: `[-1, 1]` where all are the same."""
-        one = len(set(self.low)) == len(set(self.high)) == 1
-        return f"[{self.low[0]:g}, {self.high[0]:g}]" if one else f"their bounds, {self.low} to {self.high}"
+        """The bounds as text: `[-1, 1]` if they are the same for all elements."""
+        uniform = len(set(self.low)) == len(set(self.high)) == 1
+        return f"[{self.low[0]:g}, {self.high[0]:g}]" if uniform else f"their bounds, {self.low} to {self.high}"
 
 
 @dataclass(frozen=True)
 class TaskSpec:
-    """What a task is, in plain data; recordings, data sets and checkpoints carry it.
+    """The specification of a task; stored in recordings, data sets and checkpoints.
 
     Attributes:
-        name: by which `get_task` finds it.
+        name: name for `get_task`.
         sentence: LeRobot's task sentence.
-        state: what agents and policies see of the world.
-        recorded: the state as recordings hold it; from it `PairTask.states_of` makes `state`.
+        state: the state that agents and policies observe.
+        recorded: the state that recordings store; `PairTask.states_of` computes `state` from it.
         scenario: the vector of a scenario in a data set.
         action: one player's action.
-        reasons: how a world can end an episode.
-        successes: which of them mean success.
-        record_hz: steps a second.
+        reasons: termination reasons of the world.
+        successes: those of `reasons` that mean success.
+        record_hz: steps per second.
         players: names of the seats.
-        title: what it is called in messages; its name where none is given.
+        title: name in messages; `name` by default.
     """
 
     name: str
@@ -84,22 +85,22 @@ class TaskSpec:
     title: str = ""
     successes: tuple[str, ...] = ("goal",)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "title", self.title or self.name)
         if not set(self.successes) <= set(self.reasons):
             raise InvalidValueError(f"TaskSpec.successes of {self.name!r}", f"some of {self.reasons}", self.successes)
 
     def to_dict(self) -> dict[str, Any]:
-        """The spec as data sets and recordings carry it, JSON-able."""
+        """The specification as a JSON-compatible dictionary."""
         return asdict(self)
 
     @property
     def joint_action(self) -> Vector:
-        """Both players' actions, robot first; names begin with the player's."""
-        one = self.action
-        names = tuple(f"{player}_{name}" for player in self.players for name in one.names)
-        return Vector(names, one.units * 2, one.low * 2, one.high * 2)
+        """The vector of both players' actions, robot first; names are prefixed with the player's."""
+        single = self.action
+        names = tuple(f"{player}_{name}" for player in self.players for name in single.names)
+        return Vector(names, single.units * 2, single.low * 2, single.high * 2)
 
-    def full_forces(self, actions: np.ndarray) -> np.ndarray:
-        """Joint actions `(N, 2 m)` in units of a player's full force, the farthest of the bounds of a number."""
+    def full_forces(self, actions: Array) -> Array:
+        """Joint actions `(N, 2 m)` in units of a player's full force, which is the larger absolute bound of an axis."""
         return actions / np.abs(self.joint_action.bounds).max(axis=0).astype(actions.dtype)

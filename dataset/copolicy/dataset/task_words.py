@@ -1,4 +1,4 @@
-"""How screens, cards, pages and figures speak of a task."""
+"""Phrases with which screens, cards, pages and figures describe a task."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,43 +8,43 @@ from .task_spec import TaskSpec, Vector
 
 @dataclass(frozen=True)
 class TaskWords:
-    """The part `words` of a task: phrases, put into sentences that are the same for every task.
+    """The part `words` of a task: phrases that are inserted into sentences common to all tasks.
 
     Attributes:
-        about: what the players do, a sentence without its end.
-        episodes_of: what an episode shows.
-        tag: for the Hub.
-        numbers: units and axes of state, scenario and action, in sentences.
-        cast: who and what takes part.
-        act, act_s: the verb of a player, and its third person.
-        place: where everything happens.
-        episode: what an episode is.
-        record: what meta/episodes holds, a sentence.
-        invitation: title of a session's window; that of the task where empty.
-        instruction: what players read before they begin; the sentence of the task where empty.
+        about: what the players do; a sentence without its full stop.
+        episodes_of: the content of an episode.
+        tag: tag on the Hub.
+        numbers: units and axes of state, scenario and action; sentences.
+        cast: the participants.
+        act, act_s: verb for a player's activity, and its third person.
+        place: where the task takes place.
+        episode: definition of an episode.
+        record: content of meta/episodes; a sentence.
+        invitation: title of a session's window; the title of the task if empty.
+        instruction: instruction for players before they start; the sentence of the task if empty.
         purpose: what policies learn to do with a partner.
-        limits: how far the data are from robots, the beginning of a sentence.
-        scenario, scenarios: the noun.
-        scenario_sees: what a policy sees of one.
-        noun: what moves, in a word.
-        body: the point of it that is followed.
-        state_sees: what a policy sees of it.
+        limits: how the data differ from real robots; the beginning of a sentence.
+        scenario, scenarios: noun for a scenario, singular and plural.
+        scenario_sees: what a policy observes of the scenario.
+        noun: noun for the moving body.
+        body: name of the tracked point.
+        state_sees: what a policy observes of the moving body.
         acts: what a policy does with a partner, and where.
-        action: what the numbers of an action are.
-        running: what a study still plans for.
-        success, failure, did_not: of episodes; the second begins with "ended".
-        scene: what a film shows.
-        stand_in: who plays simulated episodes, a sentence.
-        label, label_class: what a strategy label is called, and what it is a kind of.
-        labels: how labels are read, on a card and on the page.
-        meanings: of labels, in figures; by the label.
-        interaction: what the interaction measure is called.
-        interaction_unit: of the measure.
-        interaction_senses: what it means where it is positive, negative and zero.
-        interaction_above: the same of positive values, after "above".
-        interaction_note: what it is, in sentences.
-        citation: what a paper is cited for, a sentence.
-        paper: BibTeX.
+        action: meaning of the numbers of an action.
+        running: noun for the episodes of a study that are still running.
+        success, failure, did_not: verb phrases for episodes; `failure` begins with "ended".
+        scene: content of a video.
+        stand_in: who plays simulated episodes; a sentence.
+        label, label_class: name of a strategy label, and of its category.
+        labels: how to read labels, on a card and on the report page.
+        meanings: meaning of each label, in figures.
+        interaction: name of the interaction measure.
+        interaction_unit: unit of the interaction measure.
+        interaction_senses: meaning of positive, negative and zero values.
+        interaction_above: meaning of positive values, after "above".
+        interaction_note: definition of the interaction measure; sentences.
+        citation: reason to cite the paper; a sentence.
+        paper: BibTeX entry.
     """
 
     about: str
@@ -65,7 +65,7 @@ class TaskWords:
     scenarios: str = "scenarios"
     scenario_sees: str = "the scenario"
     noun: str = "body"
-    body: str = "what moves"
+    body: str = "the moving body"
     state_sees: str = "the state"
     acts: str = "acts together with a partner, in simulation"
     action: str = "within their bounds"
@@ -88,8 +88,8 @@ class TaskWords:
     paper: str = ""
 
     @classmethod
-    def of(cls, spec: TaskSpec) -> "TaskWords":
-        """What the spec alone can say."""
+    def from_spec(cls, spec: TaskSpec) -> "TaskWords":
+        """Default phrases from the specification of a task."""
         vectors = {"State": spec.state, "Scenario": spec.scenario, "Action of each player": spec.action}
         numbers = " ".join(f"{name}: {_numbers(vector)}." for name, vector in vectors.items())
         about = f"Two players, one task ({spec.sentence.rstrip('.')})"

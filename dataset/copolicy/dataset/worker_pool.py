@@ -1,4 +1,4 @@
-"""Processes of a command that share its work, and what a stop or the death of the command means to them."""
+"""A pool of worker processes that ignore Ctrl-C and end with the command that started them."""
 
 import multiprocessing
 import os
@@ -11,48 +11,48 @@ from typing import Any
 
 
 class WorkerPool(ProcessPoolExecutor):
-    """A pool of spawned processes that leave Ctrl-C to the command and end with it.
+    """A pool of spawned processes that ignore SIGINT and end with the command.
 
-    Ctrl-C reaches every process of a terminal. A worker does not hear it, not even while it is still importing, and
-    finishes what it has begun; the command cancels the rest and ends in its own line. Where the command itself is
-    killed, its workers, which would wait for their next task for ever, end at once.
+    Ctrl-C sends SIGINT to every process of a terminal. Workers ignore it, also while they are still importing, and
+    finish their current item; the command cancels the remaining items and reports the interruption. If the command
+    is killed, its workers exit at once instead of waiting for their next item.
 
-    Spawned, not forked: a fork would copy the locks of whatever threads the command runs.
+    Processes are spawned, not forked: a fork would copy the locks of the command's threads.
     """
 
     def __init__(self, workers: int, initializer: Callable[..., object] | None = None, initargs: tuple = ()):
         """
         Args:
-            workers: how many processes.
-            initializer: called in each of them, with `initargs`.
+            workers: number of processes.
+            initializer: called in each process, with `initargs`.
         """
         super().__init__(workers, multiprocessing.get_context("spawn"), _start, (initializer, initargs))
         if hasattr(signal, "pthread_sigmask"):
             from multiprocessing import resource_tracker
 
-            # It lets signals through again when it starts itself, so not while a worker is being started.
+            # Its start unblocks signals, so it must not start together with a worker.
             resource_tracker.ensure_running()
 
     def submit[**P, T](self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """See `ProcessPoolExecutor`, which starts its processes here."""
-        with _interrupts_held_back():
+        with _sigint_blocked():
             return super().submit(fn, *args, **kwargs)
 
-    def __exit__(self, kind: type[BaseException] | None, *_: Any) -> None:
-        self.shutdown(cancel_futures=kind is not None)
+    def __exit__(self, error_type: type[BaseException] | None, *_: Any) -> None:
+        self.shutdown(cancel_futures=error_type is not None)
 
 
 @contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits until the end of the block; a process that starts in it never hears of one."""
+def _sigint_blocked() -> Iterator[None]:
+    """Blocks SIGINT until the end of the block; a process started in it inherits the block."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 def _start(initializer: Callable[..., object] | None, initargs: tuple) -> None:

@@ -1,4 +1,4 @@
-"""Simulated players of the peg: each pushes towards the mark, brakes as the peg comes near, and sees nothing else."""
+"""Scripted players of the peg: each pushes towards the mark and against the motion, from the state alone."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Push:
-    """How one pushes: a force towards the mark, one against the motion, and some noise."""
+    """Profile of a player: gain towards the mark, gain against the motion, and noise."""
 
     effort: float = 2.0  # full forces per m
     braking: float = 1.5  # full forces per m/s
@@ -21,7 +21,7 @@ class Push:
 
 
 class Pusher:
-    """A player of one episode; it never changes its mind."""
+    """A player of one episode; it never changes its strategy."""
 
     changes = 0
 
@@ -29,7 +29,7 @@ class Pusher:
         self._mark, self._push, self._rng = line.mark, push, np.random.default_rng(seed)
 
     def act(self, state: np.ndarray) -> np.ndarray:
-        """Its push, `(1,)`."""
+        """Its force, `(1,)`."""
         position, velocity = state
         push = self._push
         force = push.effort * (self._mark - position) - push.braking * velocity + push.noise * self._rng.normal()
@@ -42,7 +42,7 @@ ROBOTS = {"scripted": (Push(noise=0.0), "a usual simulated player without noise"
 
 
 def pair(line: "Line", name: str, seed: int) -> tuple[Pusher, Pusher]:
-    """Both players of a pair, each with its own random numbers."""
+    """Both players of a pair, with separate random numbers."""
     robot, human = PAIRS[name]
     return Pusher(line, robot, 2 * seed), Pusher(line, human, 2 * seed + 1)
 

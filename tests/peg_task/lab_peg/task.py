@@ -22,18 +22,18 @@ _HZ = 20
 
 @dataclass(frozen=True)
 class Line:
-    """Where the peg begins and where its mark is, m."""
+    """Start of the peg and position of its mark, m."""
 
     start: float
     mark: float
 
     def __post_init__(self):
-        if not all(abs(place) < LENGTH / 2 for place in (self.start, self.mark)):
-            raise InvalidValueError("Line", f"places within {LENGTH / 2} m", (self.start, self.mark))
+        if not all(abs(position) < LENGTH / 2 for position in (self.start, self.mark)):
+            raise InvalidValueError("Line", f"positions within {LENGTH / 2} m", (self.start, self.mark))
 
     @property
     def digest(self) -> str:
-        """Of the JSON."""
+        """Eight hexadecimal digits of the JSON's hash."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()[:8]
 
     def to_json(self) -> str:
@@ -51,7 +51,7 @@ class Friction:
 
 
 class PegWorld:
-    """The peg: pushed by the sum of both forces, slowed by friction."""
+    """A peg on a line, moved by the sum of both forces against friction."""
 
     def __init__(self, line: Line, settings: Friction | None = None):
         self.line, self.settings = line, settings or Friction()
@@ -107,20 +107,20 @@ class PegOutline:
         return (Shape("goal", square((scenario.mark + LENGTH / 2, 0.2), 2 * _CLOSE)),)
 
     def poses(self, states: np.ndarray) -> np.ndarray:
-        """`(T, 3)` on the line, never turned."""
-        places = np.zeros((len(states), 3))
-        places[:, 0], places[:, 1] = states[:, 0] + LENGTH / 2, self.size[1] / 2
-        return places
+        """`(T, 3)` poses on the line with orientation 0."""
+        poses = np.zeros((len(states), 3))
+        poses[:, 0], poses[:, 1] = states[:, 0] + LENGTH / 2, self.size[1] / 2
+        return poses
 
     def forces(self, actions: np.ndarray) -> np.ndarray:
-        """`(T, 4)` along the line."""
+        """`(T, 4)` forces along the line."""
         arrows = np.zeros((len(actions), 4))
         arrows[:, [0, 2]] = actions
         return arrows
 
 
 class PegTask(PairTask):
-    """Numbers, an outline and simple players: everything else that is optional is lacking."""
+    """A task with a spec, an outline and scripted players, without all other optional parts."""
 
     spec = TaskSpec(
         name="peg",
@@ -145,8 +145,8 @@ class PegTask(PairTask):
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[Line]]:
         """Marks to the right, and marks to the left."""
-        places = (0.2, 0.4, 0.6)
-        return {"right": tuple(Line(-0.5, place) for place in places), "left": tuple(Line(0.5, -p) for p in places)}
+        marks = (0.2, 0.4, 0.6)
+        return {"right": tuple(Line(-0.5, mark) for mark in marks), "left": tuple(Line(0.5, -mark) for mark in marks)}
 
     def scenario_of_json(self, text: str | bytes) -> Line:
         """The inverse of `Line.to_json`."""
@@ -156,7 +156,7 @@ class PegTask(PairTask):
             raise InvalidValueError("scenario", "JSON of a line", text) from None
 
     def scenario_vector(self, scenario: Line) -> np.ndarray:
-        """`(2,)`."""
+        """`(2,)` start and mark."""
         return np.array((scenario.start, scenario.mark))
 
     def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> Line:

@@ -1,11 +1,11 @@
-"""Studies of policies: co-planning, partners, people, and how sure a difference is.
+"""Studies of policies: co-planning, simulated partners, people, and paired comparisons with intervals.
 
     from copolicy.evaluate import compare_episodes, coplan_episodes, success
 
     small, paper = (coplan_episodes(run, "holdout") for run in ("outputs/small", "outputs/paper"))
     success(small), compare_episodes(small, paper)
 
-Names are loaded when they are asked for.
+Names are imported on first use.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Studies as functions of episodes, for notebooks: run one, say how sure it is, compare two on the same starts."""
+"""Studies for notebooks: run co-planning, compute the success rate, compare two policies on the same starts."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,40 +25,42 @@ def coplan_episodes(
     limit: int | None = None,
     seed: int = 0,
 ) -> list[Episode]:
-    """The paper's co-planning study: both players act on one action chunk, as in `copolicy-eval coplan`.
+    """Runs the paper's co-planning study: both players execute one action chunk, as in `copolicy-eval coplan`.
 
     Args:
-        policy: a checkpoint, a training run, `pretrained`, or what `load_policy` gives.
-        maps: name of a set of scenarios, a file of maps, or scenarios themselves.
-        n_action_steps: actions of a chunk that are executed before the next one.
-        limit: number of scenarios, the first ones; all if None.
-        seed: of the noise that chunks are denoised from.
+        policy: a checkpoint, a training run, `pretrained`, or a policy loaded by `load_policy`.
+        maps: name of a scenario set, a scenario file, or a sequence of scenarios.
+        n_action_steps: actions of a chunk that are executed before the next chunk is predicted.
+        limit: use only the first `limit` scenarios; all if None.
+        seed: seed of the noise from which chunks are denoised.
 
     Returns:
-        One episode a scenario, at the settings of the world that the policy learned at.
+        One episode per scenario, simulated with the world settings of the policy's training data.
 
     Raises:
-        FileFormatError: no such checkpoint.
-        InvalidValueError: a chunk has fewer actions.
-        UnknownNameError: no such set.
+        FileFormatError: the checkpoint does not exist.
+        InvalidValueError: `n_action_steps` is outside 1 to the policy's chunk size.
+        UnknownNameError: the scenario set does not exist.
     """
     loaded: Any = load_policy(policy) if isinstance(policy, str) else policy
     if not 1 <= n_action_steps <= loaded.chunk_size:
         raise InvalidValueError("n_action_steps", f"1 to {loaded.chunk_size}, the actions of a chunk", n_action_steps)
-    loaded.n_action_steps = loaded.wanted = n_action_steps
+    loaded.n_action_steps = loaded.n_predicted_actions = n_action_steps
     task = get_task(loaded.task)
-    settings, steps = loaded.conditions.physics, task.studies.step_limit
-    settings = settings if steps is None else replace(settings, step_limit=steps)
+    settings, step_limit = loaded.conditions.settings, task.studies.step_limit
+    settings = settings if step_limit is None else replace(settings, step_limit=step_limit)
     robot = PolicyAgent(loaded, task, seed=seed)
     return run_episodes(robot, None, maps, task=loaded.task, limit=limit, seed=seed, settings=settings)
 
 
 def success(episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Share of successes with its binomial standard error and Wilson's 95 % interval (`mean`, `standard_error`,
-    `wilson_95`, `episodes`); it says nothing about other training seeds.
+    """Success rate with its binomial standard error and Wilson's 95 % interval.
+
+    Returns:
+        `mean`, `standard_error`, `wilson_95` and `episodes`. The interval does not cover the choice of training seed.
 
     Raises:
-        InvalidValueError: no episode.
+        InvalidValueError: `episodes` is empty.
     """
     if not episodes:
         raise InvalidValueError("episodes", "at least one", "none")
@@ -66,20 +68,20 @@ def success(episodes: Sequence[Episode]) -> dict[str, Any]:
 
 
 def compare_episodes(first: Sequence[Episode], second: Sequence[Episode]) -> dict[str, Any]:
-    """Mean of `first - second` on the same starts with a 95 % interval, bootstrapped over maps.
+    """Mean difference `first - second` on the same starts with a 95 % interval, bootstrapped over maps.
 
     Returns:
-        For `success`, `time_s` (where both succeeded) and, where the task measures it, `interaction_mean` and
-        `interaction_p95`: `mean`, `bootstrap_95`, `pairs` and `maps`.
+        `mean`, `bootstrap_95`, `pairs` and `maps` for `success`, for `time_s` (episodes in which both succeeded) and,
+        if the task measures interaction, for `interaction_mean` and `interaction_p95`.
 
     Raises:
-        InvalidValueError: episodes of other starts.
+        InvalidValueError: the episodes do not have the same starts.
     """
     starts = [[episode.scenario.digest for episode in episodes] for episodes in (first, second)]
     if starts[0] != starts[1] or not first:
         raise InvalidValueError("second", f"the {len(first)} starts of the first, in order", f"{len(second)} others")
-    one, other = (episode_values(map(_row, range(len(first)), episodes)) for episodes in (first, second))
-    return paired_differences(one, other)
+    values = [episode_values(map(_row, range(len(first)), episodes)) for episodes in (first, second)]
+    return paired_differences(*values)
 
 
 def _row(index: int, episode: Episode) -> dict[str, Any]:

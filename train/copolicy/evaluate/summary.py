@@ -1,4 +1,4 @@
-"""What a study reports: success with its uncertainty, times, forces, by map."""
+"""Summary of a study: success rate with its uncertainty, times and forces, in total and by map."""
 
 import math
 from collections import Counter, defaultdict
@@ -8,22 +8,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import binomtest
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask
 
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
-    from .coplan.rollouts import Outcome
+    from .coplan.rollouts import EpisodeResult
 
-_PARTS = {
+# The part of a task that each measure of the summary needs.
+_REQUIRED_PARTS = {
     "interaction_force": "interaction measure",
-    "robot_share": "outline, which tells forces and ways",
+    "robot_share": "outline, which gives forces and paths",
     "deadlock": "measure of standing still (`studies.at_rest`)",
 }
 
 
 def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
-    """Share of successes with its binomial standard error and Wilson's 95 % interval."""
+    """Success rate with its binomial standard error and Wilson's 95 % interval."""
     n = len(successes)
     p = sum(successes) / n
     interval = binomtest(sum(successes), n).proportion_ci(method="wilson")
@@ -36,32 +38,32 @@ def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
 
 
 def percent(success: Mapping[str, Any]) -> str:
-    """A success rate with its standard error, for a person."""
+    """Formats a success rate and its standard error in percent."""
     return f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f} %"
 
 
-def summarise(outcomes: Sequence["Outcome"], policy: "Checkpoint | None") -> dict[str, Any]:
-    """The summary of `eval.json`. Times to completion count successes only, as the paper's do.
+def summarise(episodes: Sequence["EpisodeResult"], policy: "Checkpoint | None") -> dict[str, Any]:
+    """The summary of `eval.json`. Times to completion count successes only, as in the paper.
 
     Args:
-        policy: whose planning time is told; None where nothing planned.
+        policy: policy whose inference times are reported; None for a scripted robot.
     """
-    planning_seconds, tables = (policy.planning_seconds, sum(policy.batch_sizes)) if policy else ([], 0)
-    rows = [outcome.to_json() for outcome in outcomes]
+    inference_seconds, chunks = (policy.inference_seconds, sum(policy.batch_sizes)) if policy else ([], 0)
+    rows = [episode.to_json() for episode in episodes]
     by_map: dict[str, list[bool]] = defaultdict(list)
     by_obstacles: dict[str, list[bool]] = defaultdict(list)
     for row in rows:
         by_map[row["map_id"]].append(row["success"])
         if "obstacles" in row:
             by_obstacles[str(row["obstacles"])].append(row["success"])
-    forces = [np.abs(outcome.interaction) for outcome in outcomes if outcome.interaction is not None]
+    forces = [np.abs(episode.interaction) for episode in episodes if episode.interaction is not None]
     return {
         "success": success_rate([row["success"] for row in rows]),
         "ended_by": dict(sorted(Counter(row["reason"] for row in rows).items())),
         "time_to_completion_s": _spread([row["time_s"] for row in rows if row["success"]]),
         "interaction_force": _mean_and_p95(np.concatenate(forces)) if forces else None,
-        "planning_ms_per_call": _spread([1e3 * seconds for seconds in planning_seconds]),
-        "planning_ms_per_table": 1e3 * sum(planning_seconds) / tables if tables else None,
+        "planning_ms_per_call": _spread([1e3 * seconds for seconds in inference_seconds]),
+        "planning_ms_per_table": 1e3 * sum(inference_seconds) / chunks if chunks else None,
         **(
             {"by_obstacles": {count: success_rate(flags) for count, flags in sorted(by_obstacles.items())}}
             if by_obstacles
@@ -74,12 +76,12 @@ def summarise(outcomes: Sequence["Outcome"], policy: "Checkpoint | None") -> dic
 
 
 def not_measured(task: PairTask, summary: Mapping[str, Any]) -> dict[str, Any]:
-    """The entry of a result with the reason of each measure that its task lacks and that is null for it."""
-    reasons = {name: task.missing(part) for name, part in _PARTS.items() if name in summary and summary[name] is None}
-    return {"not_measured": reasons} if reasons else {}
+    """The `not_measured` entry of a result: for each measure that is null, the part that the task lacks."""
+    null = [name for name in _REQUIRED_PARTS if name in summary and summary[name] is None]
+    return {"not_measured": {name: task.missing(_REQUIRED_PARTS[name]) for name in null}} if null else {}
 
 
-def _mean_and_p95(values: np.ndarray) -> dict[str, float]:
+def _mean_and_p95(values: Array) -> dict[str, float]:
     return {"mean": float(values.mean()), "p95": float(np.quantile(values, 0.95))}
 
 

@@ -1,4 +1,4 @@
-"""`copolicy-train`: LeRobot's trainer with data sets in memory, and with errors that a user can act on."""
+"""`copolicy-train`: LeRobot's trainer with the data set in memory, and errors as one line."""
 
 import argparse
 import contextlib
@@ -9,12 +9,13 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
-from copolicy.dataset.files.local_path import require_hub_name, similar_path
-from copolicy.dataset.files.staging import about, refusal
+from copolicy.dataset.files.local_path import require_repo_id, similar_path
+from copolicy.dataset.files.staging import disk_error_number, named_errors
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
@@ -22,28 +23,28 @@ from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers
 
 _PROG = "copolicy-train"
-# What draccus puts before the reason, where a section of the configuration may also be absent.
+# draccus puts this before the reason if a section of the configuration is optional.
 _UNDECODED = "Could not decode the value into any of the given types:"
 _SETTINGS = "train_config.json"
 _HELP = """\
 usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
-       copolicy-train export CHECKPOINT --out FOLDER    averaged weights alone, to give away (export --help)
-       copolicy-train pretrained                        where the model that comes with the package is
+       copolicy-train export CHECKPOINT --out FOLDER    write the averaged weights for publication (export --help)
+       copolicy-train pretrained                        print the path of the model that comes with the package
 
-Trains a policy as lerobot-train does (same flags, same batches, same checkpoints, and each resumes the other's runs),
-with the data set in memory: loading goes from hundreds to hundreds of thousands of samples a second.
+Trains a policy like lerobot-train (same flags, batches and checkpoints; each resumes the other's runs), with the data
+set in memory: hundreds of thousands of samples per second are loaded instead of hundreds.
 
-Set unless you give them:
+Defaults other than LeRobot's:
   --policy.type=copolicy         the diffusion co-policy (--policy.preset=small trains on a CPU in minutes)
   --policy.push_to_hub=false     nothing is uploaded
-  --dataset.repo_id=local/NAME   NAME is that of the folder of --dataset.root
+  --dataset.repo_id=local/NAME   NAME is the name of the folder in --dataset.root
   --num_workers=0                batches come from memory
 
-Episodes that the data set marks as discarded or excluded are left out; each checkpoint records which ones were used,
-and a resumed run goes on with these, less what was excluded since. A value that is NaN, infinite or empty is refused
-before the first step; a loss that is not finite ends the run with status 1 and leaves the last good checkpoint.
+Episodes that the data set marks as discarded or excluded are left out. Each checkpoint records the episodes of its run;
+a resumed run uses these, without episodes excluded since. A NaN, infinite or empty value is refused before the first
+step. A loss that is not finite ends the run with status 1 and keeps the last good checkpoint.
 
---config_path and --policy.path take the folder of a run too, which means its newest checkpoint.
+--config_path and --policy.path also take the folder of a run; its newest checkpoint is used.
 
 example:
   copolicy-train --dataset.root=data/table --policy.preset=small --policy.device=cpu \\
@@ -51,23 +52,23 @@ example:
   copolicy-train --config_path=outputs/small/checkpoints/last/pretrained_model/train_config.json \\
       --resume=true --steps=6000
 
-Mixed precision: ACCELERATE_MIXED_PRECISION=bf16 before the command. Several GPUs: accelerate launch --num_processes 2
+Mixed precision: set ACCELERATE_MIXED_PRECISION=bf16. Several GPUs: accelerate launch --num_processes 2
 --mixed_precision bf16 $(which copolicy-train) ...; several processes on a CPU: torchrun --nproc_per_node 2 $(which
-copolicy-train) ... Each process gets --batch_size frames of a step, no two the same.
+copolicy-train) ... Each process trains on --batch_size different frames per step.
 
---json prints one JSON object on stdout, --debug the traceback of an error.
+--json prints one JSON object on stdout, --debug prints the traceback of an error.
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit status (0 done, 1 the data or the run has a problem, 2 the call is wrong)."""
+    """Entry point; returns the exit status: 0 success, 1 problem of the data or the run, 2 wrong call."""
     flags = list(sys.argv[1:] if argv is None else argv)
     if flags and not flags[0].startswith("-"):  # LeRobot's trainer has flags only
         parser, names = policy_parser()
         if flags[0] in names:
             return commandline.run(parser, flags)
-    own = [flag for flag in flags if flag in ("--json", "--debug", "--version")]
-    flags = [flag for flag in flags if flag not in own]
+    common = [flag for flag in flags if flag in ("--json", "--debug", "--version")]
+    flags = [flag for flag in flags if flag not in common]
     parser = argparse.ArgumentParser(prog=_PROG, add_help=False)
     commandline.add_version_flag(parser)
     commandline.add_common_flags(parser)
@@ -75,24 +76,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.set_defaults(handler=_train, needs=TRAINING)
     if "--help" in flags or "-h" in flags:
         parser.set_defaults(handler=_print_help, needs=())
-        own = []
+        common = []
     first = os.environ.get("RANK", "0") == "0"
-    # Of several processes, one says what was done.
+    # Of several processes, only the first prints the summary.
     with contextlib.nullcontext() if first else contextlib.redirect_stdout(io.StringIO()):
-        return commandline.run(parser, [*own, "--", *flags])
+        return commandline.run(parser, [*common, "--", *flags])
 
 
 def with_defaults(flags: Sequence[str]) -> list[str]:
-    """The flags, preceded by the ones that `copolicy-train` sets where they are not given."""
-    given = {flag[2:].partition("=")[0]: flag for flag in flags if flag.startswith("--")}
-    added = [] if "num_workers" in given else ["--num_workers=0"]
-    if "config_path" not in given:
-        if not given.keys() & {"policy.type", "policy.path", "reward_model.type", "reward_model.path"}:
+    """Puts the defaults of `copolicy-train` before the flags, unless the flags set them."""
+    names = {flag[2:].partition("=")[0] for flag in flags if flag.startswith("--")}
+    added = [] if "num_workers" in names else ["--num_workers=0"]
+    if "config_path" not in names:
+        if not names & {"policy.type", "policy.path", "reward_model.type", "reward_model.path"}:
             added.append("--policy.type=copolicy")
-        if "policy.push_to_hub" not in given and not any(name.startswith("reward_model.") for name in given):
+        if "policy.push_to_hub" not in names and not any(name.startswith("reward_model.") for name in names):
             added.append("--policy.push_to_hub=false")
         root = _value("dataset.root", flags)
-        if root and "dataset.repo_id" not in given:
+        if root and "dataset.repo_id" not in names:
             added.append(f"--dataset.repo_id={local_repo_id(Path(root))}")
     return [*added, *flags]
 
@@ -107,7 +108,7 @@ def _value(name: str, flags: Sequence[str]) -> str | None:
     return None
 
 
-def _print_help(arguments: argparse.Namespace) -> dict:
+def _print_help(arguments: argparse.Namespace) -> dict[str, Any]:
     print(_HELP)
     try:
         require_packages(*TRAINING)
@@ -122,13 +123,13 @@ def _print_help(arguments: argparse.Namespace) -> dict:
     return {}
 
 
-def _train(arguments: argparse.Namespace) -> dict:
-    flags = [_newest(flag) for flag in _joined(with_defaults(arguments.flags))]
+def _train(arguments: argparse.Namespace) -> dict[str, Any]:
+    flags = [_with_newest_checkpoint(flag) for flag in _joined(with_defaults(arguments.flags))]
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))
     for name in ("dataset.repo_id", "policy.repo_id"):
         _check_repo_id(name, _value(name, flags))
-    # LeRobot and its libraries print here and there; stdout is for the summary.
+    # LeRobot and its libraries print to stdout, which is reserved for the summary.
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
         from .episode_choice import check_local_dataset
         from .memory_training import train_from_memory
@@ -138,16 +139,16 @@ def _train(arguments: argparse.Namespace) -> dict:
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
-            with about(Path(config.output_dir or "")):
+            with named_errors(Path(config.output_dir or "")):
                 train_from_memory(config)
         except CopolicyError:
             raise
         except Exception as error:
-            if refusal(error) is not None:
+            if disk_error_number(error) is not None:
                 _remove_unfinished(Path(config.output_dir or ""), config.resume)
             if isinstance(error, OSError) and error.errno is not None:
-                raise  # the system's own, of a file; the Hub client's have pages of advice instead
-            raise RunError(f"training stopped: {type(error).__name__}: {_line(error)}") from error
+                raise  # an error of a file; errors of the Hub's client have no errno and a text of many lines
+            raise RunError(f"training stopped: {type(error).__name__}: {_one_line(error)}") from error
     output = Path(config.output_dir or "")
     checkpoint = find_policy_folder(output)
     return {
@@ -158,25 +159,25 @@ def _train(arguments: argparse.Namespace) -> dict:
 
 
 def _remove_unfinished(output: Path, resumed: bool) -> None:
-    """Half a checkpoint that a full disk left, and a run that came to none: nobody can go on with either."""
+    """Removes an incomplete checkpoint (as after a full disk), and a new run without any complete one."""
     checkpoints = output / "checkpoints"
     if resumed and not (checkpoints / "last").is_symlink():
-        return  # which of them is whole cannot be told
+        return  # without the link, complete checkpoints are unknown
     last = (checkpoints / "last").resolve()
     numbered = [folder for folder in checkpoints.glob("*") if folder.name.isdigit() and not folder.is_symlink()]
-    whole = [folder for folder in numbered if last.name.isdigit() and int(folder.name) <= int(last.name)]
-    for folder in set(numbered) - set(whole):
+    complete = [folder for folder in numbered if last.name.isdigit() and int(folder.name) <= int(last.name)]
+    for folder in set(numbered) - set(complete):
         shutil.rmtree(folder, ignore_errors=True)
-    if not whole and not resumed and output != Path():
+    if not complete and not resumed and output != Path():
         shutil.rmtree(output, ignore_errors=True)
 
 
 @contextlib.contextmanager
 def _lerobot(flags: Sequence[str]) -> Iterator[None]:
-    """LeRobot with its plugins, and `flags` where it looks for them: it reads `sys.argv` again and again."""
-    # A state-only data set has no video: that no video decoder loads is 80 lines about nothing.
-    quiet = logging.getLogger("lerobot.utils.import_utils")
-    quiet.addFilter(_no_video)
+    """Registers LeRobot's plugins and puts `flags` into `sys.argv`, which LeRobot reads several times."""
+    # A data set of states has no video, so 80 lines of log about a missing video decoder are suppressed.
+    logger = logging.getLogger("lerobot.utils.import_utils")
+    logger.addFilter(_not_about_decoders)
     before, sys.argv = sys.argv, [_PROG, *flags]
     try:
         from lerobot.utils.import_utils import register_third_party_plugins
@@ -185,15 +186,15 @@ def _lerobot(flags: Sequence[str]) -> Iterator[None]:
         yield
     finally:
         sys.argv = before
-        quiet.removeFilter(_no_video)
+        logger.removeFilter(_not_about_decoders)
 
 
-def _no_video(record: logging.LogRecord) -> bool:
+def _not_about_decoders(record: logging.LogRecord) -> bool:
     return "torchcodec" not in record.getMessage()
 
 
 def _parse():
-    """LeRobot's configuration from `sys.argv`; argparse and draccus exit with a page of usage, here it is one line."""
+    """Parses LeRobot's configuration from `sys.argv`; replaces the usage text of argparse and draccus by one line."""
     from lerobot.configs import parser
     from lerobot.configs.train import TrainPipelineConfig
 
@@ -213,11 +214,11 @@ def _parse():
     except CopolicyError:
         raise
     except Exception as error:
-        raise CopolicyError(_line(error)) from error
+        raise CopolicyError(_one_line(error)) from error
 
 
 def _validate(config) -> None:
-    """LeRobot's own checks, which its trainer repeats, before anything else is done."""
+    """Runs LeRobot's checks of the configuration before any work; its trainer repeats them."""
     output = config.output_dir
     if output is not None and Path(output).is_dir() and not config.resume:
         raise OutputExistsError(output)
@@ -227,11 +228,11 @@ def _validate(config) -> None:
     except CopolicyError:
         raise
     except Exception as error:
-        raise CopolicyError(_line(error)) from error
+        raise CopolicyError(_one_line(error)) from error
 
 
 def _joined(flags: Sequence[str]) -> list[str]:
-    """The flags with `--config_path FILE` and `--policy.path FOLDER` as one word each."""
+    """The flags with `--config_path FILE` and `--policy.path FOLDER` joined by `=`."""
     joined: list[str] = []
     for flag in flags:
         if joined and joined[-1] in ("--config_path", "--policy.path"):
@@ -241,8 +242,8 @@ def _joined(flags: Sequence[str]) -> list[str]:
     return joined
 
 
-def _newest(flag: str) -> str:
-    """A flag that names a run by its folder, or a checkpoint through a link that was not copied, names the newest."""
+def _with_newest_checkpoint(flag: str) -> str:
+    """Replaces the folder of a run, or a path through a `last` link that was not copied, by the newest checkpoint."""
     name, _, value = flag.partition("=")
     if name not in ("--config_path", "--policy.path") or not value:
         return flag
@@ -259,23 +260,24 @@ def _newest(flag: str) -> str:
 
 
 def _check_local_path(name: str, value: str | None) -> None:
-    """A path that is not there must not be taken for the name of a Hub repository."""
+    """Refuses a path that does not exist, which LeRobot would take for the name of a Hub repository."""
     if value is None or Path(value).exists():
         return
     expected = f"a file or folder for --{name}"
     if value.endswith((".json", ".yaml", ".yml")):
         similar = similar_path(value)
         raise FileFormatError(value, expected, "none" if similar is None else f"none; did you mean {similar}?")
-    require_hub_name(value, expected, "from another folder it is looked up on the Hub")
+    require_repo_id(value, expected, "from another folder it is looked up on the Hub")
 
 
 def _check_repo_id(name: str, value: str | None) -> None:
-    """LeRobot takes a name without a user for a local data set; the Hub's other rules hold for it too."""
+    """Checks a name by the Hub's rules; LeRobot also takes a name without a user, for a local data set."""
     if value not in (None, "", "null", "None"):
         checked_repo_id(value if "/" in value else f"local/{value}", f"--{name}")
 
 
-def _line(error: BaseException) -> str:
+def _one_line(error: BaseException) -> str:
+    """The texts of an error and of its causes, up to three, on one line."""
     causes = []
     current: BaseException | None = error
     while current is not None and len(causes) < 3:

@@ -1,7 +1,7 @@
-"""`copolicy-train export`: a checkpoint of a training as a small folder to give away.
+"""`copolicy-train export`: writes a checkpoint as a small folder for publication.
 
-A training's checkpoint holds the weights twice, raw and averaged, and the state and paths of the run. What plans are
-the averaged ones: the exported policy has them as its only weights, in float32, and is checked to make the same plans.
+A checkpoint of a run has raw and averaged weights, and the state and paths of the run. Inference uses the averaged
+weights: the exported policy has only these, in float32, and is checked to predict the same actions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,11 +22,11 @@ from copolicy.dataset.files.staging import new_folder, replace_json
 from copolicy.dataset.task import get_task
 
 from .checkpoint import Checkpoint
-from .recipe import EVALUATION_FILE, RECIPE_FILE, kept_evaluation, training_recipe
+from .recipe import EVALUATION_FILE, RECIPE_FILE, shortened_evaluation, training_recipe
 
 _AVERAGED = "ema.model."
 _RAW = "denoiser."
-_LARGEST_DIFFERENCE = 1e-6  # of a planned force; both are the same arithmetic, so that this is generous
+_TOLERANCE = 1e-6  # of a predicted action; the arithmetic of both policies is the same
 
 
 def export_checkpoint(
@@ -36,22 +36,22 @@ def export_checkpoint(
     commands: Sequence[str] = (),
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Writes policy, processors, `recipe.json` and, where evaluations are given, `eval.json`.
+    """Writes policy, processors, `recipe.json` and, if evaluations are given, `eval.json`.
 
     Args:
         path: a checkpoint of a co-policy.
         out: the folder to write.
         evaluations: results of `copolicy-eval` on that checkpoint or on an export of it.
-        commands: how to make data and policy again, one a line; kept in the recipe.
-        overwrite: replace a policy that is there, with its card.
+        commands: commands that made data and policy; written to the recipe.
+        overwrite: replace an existing policy and its card.
 
     Returns:
-        Where it is, its size, and by how much its plans differ.
+        Path, sha256, size, and the largest difference of its actions from the checkpoint's.
 
     Raises:
-        FileFormatError: no checkpoint of a co-policy, or a file that is no evaluation of it.
-        OutputExistsError: there is something at `out`.
-        RunError: the exported policy plans otherwise than the checkpoint.
+        FileFormatError: `path` is no checkpoint of a co-policy, or a file is no evaluation of it.
+        OutputExistsError: `out` exists and may not be replaced.
+        RunError: the exported policy predicts other actions than the checkpoint.
     """
     source = checkpoint_folder(path)
     if out.exists() and source.resolve() == out.resolve():
@@ -65,15 +65,15 @@ def export_checkpoint(
     with _staged(out, overwrite) as folder:
         _save(policy, source, folder)
         replace_json(folder / RECIPE_FILE, recipe, indent=1)
-        (folder / "model.safetensors").chmod(0o644)  # safetensors writes for its owner alone
+        (folder / "model.safetensors").chmod(0o644)  # safetensors makes it readable by its owner only
         exported = Checkpoint(folder)
         digests = {original.weights_sha256, recipe["weights"]["exported_from"], exported.weights_sha256}
-        results = [kept_evaluation(file, digests) for file in evaluations]
+        results = [shortened_evaluation(file, digests) for file in evaluations]
         if results:
             replace_json(folder / EVALUATION_FILE, {"evaluations": results}, indent=1)
         difference = _difference(policy, exported.policy)
-        if difference > _LARGEST_DIFFERENCE:
-            raise RunError(f"{out}: expected the plans of {source}, found one that differs by {difference:.2g}")
+        if difference > _TOLERANCE:
+            raise RunError(f"{out}: expected the actions of {source}, found one that differs by {difference:.2g}")
     size = sum(file.stat().st_size for file in out.iterdir())
     return {
         "policy": str(out),
@@ -101,7 +101,7 @@ def _save(policy: Any, source: Path, folder: Path) -> None:
 
 
 def _averaged(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The averaged weights under the names of the raw ones."""
+    """The averaged weights under the names of the raw weights."""
     return {
         _RAW + name.removeprefix(_AVERAGED): values.float()
         for name, values in state.items()
@@ -110,34 +110,35 @@ def _averaged(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 
 @torch.inference_mode()
-def _difference(one: Any, other: Any) -> float:
-    """Largest difference between the plans of two policies from the same noise, at the starts of a task's first set."""
-    task, frames = get_task(one.config.task), one.config.n_obs_steps
+def _difference(original: Any, exported: Any) -> float:
+    """Largest difference of the actions of two policies from the same noise, at the starts of the task's first set."""
+    task, frames = get_task(original.config.task), original.config.n_obs_steps
     scenarios = next(iter(task.scenario_sets.values()))
     starts = task.states_of(np.array([task.start_of(scenario) for scenario in scenarios]))
     vectors = np.array([task.scenario_vector(scenario) for scenario in scenarios])
-    still = np.zeros((len(scenarios), len(task.spec.action)))
+    human_actions = np.zeros((len(scenarios), len(task.spec.action)))
     batch = {
         key: torch.tensor(values, dtype=torch.float32)[:, None].repeat(1, frames, 1)
-        for key, values in ((STATE, starts), (ENVIRONMENT_STATE, vectors), (HUMAN_ACTION, still))
+        for key, values in ((STATE, starts), (ENVIRONMENT_STATE, vectors), (HUMAN_ACTION, human_actions))
     }
-    shape = len(scenarios), one.config.horizon, len(task.spec.joint_action)
+    shape = len(scenarios), original.config.horizon, len(task.spec.joint_action)
     noise = torch.randn(*shape, generator=torch.Generator().manual_seed(0))
-    plans = [policy.plan(batch, torch.Generator().manual_seed(1), noise) for policy in (one, other)]
-    return float((plans[0] - plans[1]).abs().max())
+    policies = original, exported
+    expected, actual = (policy.sample_actions(batch, torch.Generator().manual_seed(1), noise) for policy in policies)
+    return float((expected - actual).abs().max())
 
 
 def _check_output(out: Path, overwrite: bool) -> None:
     if not out.exists():
         return
-    # Only what is a policy itself is ever taken away for one.
+    # Only a folder with a policy is ever replaced.
     if not overwrite or not (out / "config.json").is_file():
         raise OutputExistsError(out)
 
 
 @contextmanager
 def _staged(out: Path, overwrite: bool) -> Iterator[Path]:
-    """A folder to write to, which takes the place of `out` when all is written."""
+    """Yields a temporary folder, which becomes or replaces `out` when all is written."""
     with (replaced_folder if out.exists() else new_folder)(out) as folder:
         folder.mkdir()
         yield folder

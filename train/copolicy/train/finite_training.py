@@ -1,4 +1,4 @@
-"""LeRobot's training loop, stopped at the first loss, gradient or weight that is not finite."""
+"""Stops LeRobot's training loop at the first loss, gradient or weight that is not finite."""
 
 import logging
 import math
@@ -15,43 +15,43 @@ from .finite_data import NonFiniteError, NonFiniteLossError
 from .finite_weights import non_finite_weight
 
 
-def guarded(config: TrainPipelineConfig, original: Mapping[str, Callable]) -> dict[str, Callable]:
-    """What takes the place of functions of LeRobot's trainer, by name, while a run is trained.
+def guarded_functions(config: TrainPipelineConfig, original: Mapping[str, Callable]) -> dict[str, Callable]:
+    """Replacements, by name, for functions of LeRobot's trainer that also check that numbers are finite.
 
     Args:
-        config: of the run.
-        original: `update_policy`, `save_checkpoint`, `update_last_checkpoint` and `make_policy`.
+        config: configuration of the run.
+        original: LeRobot's `update_policy`, `save_checkpoint`, `update_last_checkpoint` and `make_policy`.
     """
 
-    def update_policy(tracker: Any, policy: Any, *arguments: Any, **more: Any) -> Any:
+    def update_policy(tracker: Any, policy: Any, *arguments: Any, **kwargs: Any) -> Any:
         step = tracker.steps + 1
         try:
-            result = original["update_policy"](tracker, policy, *arguments, **more)
-        except NonFiniteLossError as error:  # the policy's own check, which may not know of an earlier run's steps
+            result = original["update_policy"](tracker, policy, *arguments, **kwargs)
+        except NonFiniteLossError as error:  # the policy's own check, whose step count starts anew in a resumed run
             raise _stopped(config, step, f"expected a finite loss, found {error.value}") from None
-        accelerator = more.get("accelerator")
-        # With float16 a gradient that overflows is normal: its step is left out and the scale made smaller.
+        accelerator = kwargs.get("accelerator")
+        # With float16 an overflowing gradient is normal: the scaler skips the step and lowers the scale.
         scaled = getattr(accelerator, "scaler", None) is not None
         for name, value in (("loss", tracker.loss.val), *(() if scaled else (("gradient", tracker.grad_norm.val),))):
             if not math.isfinite(value):
                 raise _stopped(config, step, f"expected a finite {name}, found {value}")
         return result
 
-    def save_checkpoint(*, step: int, policy: Any, model_state_dict: Any = None, **more: Any) -> None:
-        unusable = non_finite_weight(policy.state_dict() if model_state_dict is None else model_state_dict)
-        if unusable:
-            raise _stopped(config, step, f"expected finite weights, found {unusable}")
-        original["save_checkpoint"](step=step, policy=policy, model_state_dict=model_state_dict, **more)
+    def save_checkpoint(*, step: int, policy: Any, model_state_dict: Any = None, **kwargs: Any) -> None:
+        non_finite = non_finite_weight(policy.state_dict() if model_state_dict is None else model_state_dict)
+        if non_finite:
+            raise _stopped(config, step, f"expected finite weights, found {non_finite}")
+        original["save_checkpoint"](step=step, policy=policy, model_state_dict=model_state_dict, **kwargs)
 
     def update_last_checkpoint(checkpoint_dir: Path) -> Path:
         return link_last_checkpoint(checkpoint_dir, original["update_last_checkpoint"])
 
-    def make_policy(*arguments: Any, **more: Any) -> Any:
-        policy = original["make_policy"](*arguments, **more)
-        unusable = non_finite_weight(policy.state_dict())
-        if unusable:
-            path = getattr(more.get("cfg"), "pretrained_path", None) or "the new policy"
-            raise FileFormatError(path, "finite weights to start from", unusable)
+    def make_policy(*arguments: Any, **kwargs: Any) -> Any:
+        policy = original["make_policy"](*arguments, **kwargs)
+        non_finite = non_finite_weight(policy.state_dict())
+        if non_finite:
+            path = getattr(kwargs.get("cfg"), "pretrained_path", None) or "the new policy"
+            raise FileFormatError(path, "finite weights to start from", non_finite)
         return policy
 
     return {
@@ -63,21 +63,21 @@ def guarded(config: TrainPipelineConfig, original: Mapping[str, Callable]) -> di
 
 
 def link_last_checkpoint(checkpoint_dir: Path, link: Callable[[Path], Path]) -> Path:
-    """Makes `checkpoints/last` lead to a checkpoint, also in a run that was copied without links.
+    """Makes `checkpoints/last` link to a checkpoint, also in a run that was copied without links.
 
-    What stands in the place of the link is kept under another name. Where no link can be made there is none: the run is
-    then found by its highest number.
+    A file or folder in place of the link is renamed. On a file system without links none is made; the checkpoint with
+    the highest number is then the newest.
 
     Args:
-        link: LeRobot's function, which replaces a link and nothing else.
+        link: LeRobot's function, which replaces only a link.
     """
     last = checkpoint_dir.parent / "last"
     if last.exists() and not last.is_symlink():
-        aside = next(
+        renamed = next(
             path for number in range(1, 1000) if not (path := last.with_name(f"last-copied-{number}")).exists()
         )
-        last.rename(aside)
-        logging.warning("%s was no link, as in a run copied without links; it is %s now", last, aside.name)
+        last.rename(renamed)
+        logging.warning("%s was no link, as in a run copied without links; renamed to %s", last, renamed.name)
     try:
         return link(checkpoint_dir)
     except OSError as error:
@@ -85,7 +85,7 @@ def link_last_checkpoint(checkpoint_dir: Path, link: Callable[[Path], Path]) -> 
         return last
 
 
-def _stopped(config: TrainPipelineConfig, step: int, what: str) -> NonFiniteError:
+def _stopped(config: TrainPipelineConfig, step: int, problem: str) -> NonFiniteError:
     folder = find_policy_folder(Path(config.output_dir or ""))
-    left = f"the last checkpoint is {folder.parent}" if folder else "no checkpoint was written"
-    return NonFiniteError(f"training stopped at step {step}: {what}; {left}")
+    checkpoint = f"the last checkpoint is {folder.parent}" if folder else "no checkpoint was written"
+    return NonFiniteError(f"training stopped at step {step}: {problem}; {checkpoint}")

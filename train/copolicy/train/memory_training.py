@@ -1,4 +1,4 @@
-"""LeRobot's own trainer, fed from memory with episodes and numbers that can be trained on."""
+"""Runs LeRobot's trainer on data sets in memory, after checking their episodes and numbers."""
 
 import logging
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -15,11 +15,11 @@ from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from lerobot.scripts import lerobot_train
 from tqdm import tqdm
 
-from copolicy.dataset.files.listing import on_visible_files
+from copolicy.dataset.files.listing import skipping_hidden_files
 
-from .episode_choice import chosen_episodes, recorded_episodes, resumed_episodes
-from .finite_data import NonFiniteError, mended_statistics, require_finite_frames
-from .finite_training import guarded
+from .episode_choice import recorded_episodes, resumed_episodes, selected_episodes
+from .finite_data import NonFiniteError, replacement_statistics, require_finite_frames
+from .finite_training import guarded_functions
 from .memory_dataset import MemoryDataset
 
 _GUARDED = ("update_policy", "save_checkpoint", "update_last_checkpoint", "make_policy")
@@ -29,32 +29,32 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
     """Runs `lerobot_train.train` with data sets in memory; checkpoints, logs and evaluation are LeRobot's.
 
     Raises:
-        CopolicyError: the data set cannot be trained on, or the training leads nowhere.
+        CopolicyError: the data set cannot be trained on, or the loss, a gradient or a weight is not finite.
     """
-    guards = guarded(config, {name: getattr(lerobot_train, name) for name in _GUARDED})
-    with _datasets_in_memory(), _hidden_files_passed_over(), _replaced(lerobot_train, guards):
+    guards = guarded_functions(config, {name: getattr(lerobot_train, name) for name in _GUARDED})
+    with _datasets_in_memory(), _hidden_files_ignored(), _patched(lerobot_train, guards):
         try:
             lerobot_train.train(config)
         finally:
-            # LeRobot's own is drawn once more when Python forgets it, which would be after the line of an error.
+            # An open progress bar is drawn again when it is garbage-collected, which would be after an error's line.
             for bar in list(getattr(tqdm, "_instances", ())):
                 bar.close()
 
 
 @contextmanager
 def _datasets_in_memory() -> Iterator[None]:
-    # LeRobot's trainer takes no data set or sampler of one's own; it looks these names up in its module at each run.
+    # LeRobot's trainer has no parameter for a data set or a sampler; it looks up these names in its module at each run.
     original = lerobot_train.make_train_eval_datasets
-    ours = {
+    replacements = {
         "make_train_eval_datasets": lambda config: _make_datasets(config, original),
         "EpisodeAwareSampler": WholeEpochSampler,
     }
-    with _replaced(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}), _replaced(lerobot_train, ours):
+    with _patched(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}), _patched(lerobot_train, replacements):
         yield
 
 
 @contextmanager
-def _replaced(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
+def _patched(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
     before = {name: getattr(module, name) for name in values}
     for name, value in values.items():
         setattr(module, name, value)
@@ -66,38 +66,38 @@ def _replaced(module: ModuleType, values: Mapping[str, Any]) -> Iterator[None]:
 
 
 @contextmanager
-def _hidden_files_passed_over() -> Iterator[None]:
-    # LeRobot takes every file in a folder of tables for one, also what macOS leaves beside them.
-    ours = {"load_nested_dataset": on_visible_files(io_utils.load_nested_dataset)}
-    with _replaced(io_utils, ours), _replaced(dataset_reader, ours):
+def _hidden_files_ignored() -> Iterator[None]:
+    # LeRobot reads every file in a folder as Parquet, also hidden files that macOS creates.
+    replacements = {"load_nested_dataset": skipping_hidden_files(io_utils.load_nested_dataset)}
+    with _patched(io_utils, replacements), _patched(dataset_reader, replacements):
         yield
 
 
 def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:
-    # The co-policy says what it reads; any other policy takes what it finds.
-    read = getattr(config.policy, "observation_keys", None)
+    # The co-policy states the columns that it reads; another policy may read any.
+    observation_keys = getattr(config.policy, "observation_keys", None)
     on_host = config.trainable_config.device == "cpu"
     return tuple(
-        None if dataset is None else _in_memory(dataset, read, deferred=not on_host)
+        None if dataset is None else _in_memory(dataset, observation_keys, deferred=not on_host)
         for dataset in _load(config, original)
     )
 
 
 def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
-    """LeRobot's data sets of the episodes to train on, which the configuration and so each checkpoint then names."""
+    """Loads LeRobot's data sets of the selected episodes, which the configuration and thus checkpoints then record."""
     source = config.dataset
     repo_type = "bucket" if source.repo_type == "bucket" else "dataset"
     meta = LeRobotDatasetMetadata(source.repo_id, source.root, source.revision, repo_type=repo_type)
     if config.resume and config.checkpoint_path is not None:
         episodes = resumed_episodes(meta, source.episodes, recorded_episodes(config.checkpoint_path))
     else:
-        episodes = chosen_episodes(meta, source.episodes)
-    whole = episodes == list(range(meta.total_episodes))
-    statistics = mended_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
+        episodes = selected_episodes(meta, source.episodes)
+    all_selected = episodes == list(range(meta.total_episodes))
+    statistics = replacement_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
     local = source.root is not None
     if local:
         require_finite_frames(meta.root, episodes, meta.features)
-    source.episodes = None if whole else episodes  # LeRobot reads all of them sooner than each of them
+    source.episodes = None if all_selected else episodes  # LeRobot loads a whole data set faster without a list
     try:
         datasets = original(config)
     finally:
@@ -108,27 +108,27 @@ def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
                 dataset.episodes = episodes
             if statistics:
                 dataset.meta.stats.update(statistics)
-            if not local:  # by now they are here
+            if not local:  # downloaded by now
                 require_finite_frames(dataset.meta.root, episodes, meta.features)
     return datasets
 
 
-def _in_memory(dataset, read: Collection[str] | None, deferred: bool):
-    if MemoryDataset.can_hold(dataset, read):
+def _in_memory(dataset, observation_keys: Collection[str] | None, deferred: bool):
+    if MemoryDataset.supports(dataset, observation_keys):
         if dataset.meta.video_keys:
-            logging.info("The policy does not look at %s: no video is decoded", ", ".join(dataset.meta.video_keys))
+            logging.info("The policy does not observe %s: no video is decoded", ", ".join(dataset.meta.video_keys))
         return MemoryDataset(dataset, deferred)
     logging.warning(
-        "The policy may look at images of the data set, or it is streamed: frames come through LeRobot's own loader"
+        "The policy may observe images of the data set, or it is streamed: frames come through LeRobot's own loader"
     )
     return dataset
 
 
 class WholeEpochSampler(EpisodeAwareSampler):
-    """LeRobot's sampler in the same order, computed for the whole epoch at its start.
+    """LeRobot's sampler with the same order, computed for the whole epoch at its start.
 
-    LeRobot finds the frame of each position on its own, which at 2.6 us a sample costs more than everything else of
-    loading from memory. At once it is 0.08 us, for a list of the frames in memory.
+    LeRobot computes the frame of each position separately, which takes 2.6 us per sample, longer than all other work of
+    loading from memory. Computed at once it takes 0.08 us per sample, and a list of the frames in memory.
     """
 
     def _iter_epoch(self, epoch: int, start: int) -> Iterator[int]:
@@ -146,21 +146,21 @@ class WholeEpochSampler(EpisodeAwareSampler):
 
 
 class CheckedStream(StreamingLeRobotDataset):
-    """Passes over episodes that were not asked for, which LeRobot's own yields all the same.
+    """LeRobot's streamed data set without the samples of episodes that were not selected.
 
     Raises:
-        NonFiniteError: while it is read, at a sample with a value that is NaN or infinite.
+        NonFiniteError: on iteration, at a sample with a NaN or infinite value.
     """
 
     def __init__(self, *arguments: Any, max_num_shards: int = 1, **settings: Any):
-        # LeRobot passes the number of loading processes, which is 0 here, and then reads nothing.
+        # LeRobot passes the number of worker processes, which is 0 here, and would then read nothing.
         super().__init__(*arguments, max_num_shards=max(1, max_num_shards), **settings)
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        wanted = None if self.episodes is None else frozenset(self.episodes)
+        selected = None if self.episodes is None else frozenset(self.episodes)
         for sample in super().__iter__():
             episode = int(sample["episode_index"])
-            if wanted is not None and episode not in wanted:
+            if selected is not None and episode not in selected:
                 continue
             for name, values in sample.items():
                 if isinstance(values, torch.Tensor) and values.is_floating_point() and not torch.isfinite(values).all():

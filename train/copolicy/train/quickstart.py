@@ -1,6 +1,6 @@
-"""`copolicy-quickstart`: the whole chain, small, on CPU: record, convert, train, evaluate, describe.
+"""`copolicy-quickstart`: record, convert, train, evaluate and describe, at a small scale on a CPU.
 
-It types the rooms' own commands into a log, and imports none of them.
+It runs the commands of the other packages as processes and imports none of their code.
 """
 
 import argparse
@@ -9,13 +9,14 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from copolicy.dataset.command_line.commands import add_common_flags, add_version_flag, run
-from copolicy.dataset.command_line.extras import FIGURES, HUB, TRAINING
+from copolicy.dataset.command_line.extras import FIGURES, TRAINING
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, seed, workers
 from copolicy.dataset.files.staging import replace_json
 
-from .quickstart_chain import LOG_FILE, Step, forget_chain, run_chain
+from .quickstart_chain import LOG_FILE, Step, remove_record, run_chain
 
 REPO_ID = "local/quickstart"
 
@@ -24,22 +25,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point of `copolicy-quickstart`."""
     parser = argparse.ArgumentParser(
         prog="copolicy-quickstart",
-        description="Record simulated pairs, convert, train a small co-policy, evaluate and describe: on CPU, in "
-        "minutes. Simulated pairs stand in for people; nothing it prints is a result about people.",
+        description="Record simulated pairs, convert, train a small co-policy, evaluate and describe: on a CPU, in "
+        "minutes. The data are of simulated pairs; nothing it prints is a result about people.",
         epilog="example:\n  copolicy-quickstart --out outputs/quickstart",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for everything it makes")
+    parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for all outputs")
     add_whole_number(parser, "--episodes", "simulated episodes (default: 376)", 376)
     add_whole_number(parser, "--steps", "training steps of 512 samples (default: 6000)", 6000)
     add_whole_number(parser, "--limit", "evaluate on the first N maps of each set only")
     parser.add_argument("--seed", type=seed(), default=0, help="default: 0")
-    parser.add_argument("--workers", type=workers(), default=os.cpu_count() or 1, help="default: one a core")
+    parser.add_argument("--workers", type=workers(), default=os.cpu_count() or 1, help="default: one per core")
     parser.add_argument(
         "--upstream",
         type=Path,
         metavar="PATH",
-        help="start from files of the original program (raw, processed or zarr) instead of simulated pairs",
+        help="use files of the original program (raw, processed or zarr) instead of simulated pairs",
     )
     add_version_flag(parser)
     add_common_flags(parser)
@@ -48,20 +49,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
-    return (*TRAINING, *FIGURES, *HUB, *(("zarr",) if arguments.upstream else ()))
+    return (*TRAINING, *FIGURES, *(("zarr",) if arguments.upstream else ()))
 
 
-def _quickstart(arguments: argparse.Namespace) -> dict:
+def _quickstart(arguments: argparse.Namespace) -> dict[str, Any]:
     out: Path = arguments.out
     started = perf_counter()
-    run_chain(out, _chain(arguments))
+    run_chain(out, _steps(arguments))
     summary = _summary(arguments, perf_counter() - started)
     replace_json(out / "summary.json", summary, indent=1)
-    forget_chain(out)
+    remove_record(out)
     return summary
 
 
-def _chain(arguments: argparse.Namespace) -> list[Step]:
+def _steps(arguments: argparse.Namespace) -> list[Step]:
     out = arguments.out
     dataset, training = out / "dataset", out / "training"
     if arguments.upstream:
@@ -79,7 +80,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
                 f"Record {arguments.episodes} episodes of simulated pairs, one MCAP file each",
                 (
                     *("copolicy-collect", "simulate", "--episodes", str(arguments.episodes)),
-                    # With 376 episodes and seed 0 these are those of `--recipe pairs-sim-376`.
+                    # With 376 episodes and seed 0 the same as `--recipe pairs-sim-376`.
                     *("--seed", str(arguments.seed), "--maps", "paper36", "--out", recordings),
                     *("--workers", str(arguments.workers)),
                 ),
@@ -109,7 +110,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
     limit = () if arguments.limit is None else ("--limit", str(arguments.limit))
     evaluate = [
         Step(
-            f"Let it carry the table on the {name} maps, both seats from one plan",
+            f"Evaluate it on the {name} maps, both players from one action chunk",
             (
                 *("copolicy-eval", "coplan", "--policy", str(training), "--maps", name),
                 *("--out", str(out / "eval" / f"{name}.json"), *limit),
@@ -120,7 +121,7 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
     ]
     describe = Step(
         "Describe the data set",
-        # A try that broke off may have left half of it; the minimal card of the conversion is replaced in any case.
+        # Replaces the minimal card of the conversion, and a card of an interrupted run.
         ("copolicy-cards", "dataset", str(dataset), "--repo-id", REPO_ID, "--overwrite"),
         (),
     )
@@ -128,25 +129,25 @@ def _chain(arguments: argparse.Namespace) -> list[Step]:
 
 
 def _mixed_precision() -> tuple[tuple[str, str], ...]:
-    """bfloat16 where the processor multiplies it: two and a half times faster than float32 there, slower elsewhere."""
+    """bfloat16 if the processor has instructions for it: 2.5 times faster than float32 with these, slower without."""
     try:
         flags = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    except OSError:  # no Linux
+    except OSError:  # not Linux
         return ()
     return (("ACCELERATE_MIXED_PRECISION", "bf16"),) if "avx512_bf16" in flags or "amx_bf16" in flags else ()
 
 
-def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
+def _summary(arguments: argparse.Namespace, seconds: float) -> dict[str, Any]:
     out: Path = arguments.out
     training = out / "training" / "checkpoints" / "last" / "pretrained_model"
     source = "files of the original program" if arguments.upstream else "simulated pairs"
-    reached = {}
+    rates = {}
     for name in ("holdout", "unseen"):
         success = json.loads((out / "eval" / f"{name}.json").read_text(encoding="utf-8"))["summary"]["success"]
         mean, error = 100 * success["mean"], 100 * success["standard_error"]
-        reached[name] = f"{mean:.1f} ± {error:.1f} % success ({success['episodes']} episodes, one training seed)"
-    where = {} if arguments.upstream else {"recordings": str(out / "recordings")}
-    where |= {
+        rates[name] = f"{mean:.1f} ± {error:.1f} % success ({success['episodes']} episodes, one training seed)"
+    paths = {} if arguments.upstream else {"recordings": str(out / "recordings")}
+    paths |= {
         "data set": str(out / "dataset"),
         "card": str(out / "dataset" / "README.md"),
         "checkpoint": str(training),
@@ -154,16 +155,16 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict:
         "log": str(out / LOG_FILE),
         "pictures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
     }
-    # As the user typed this command: through uv, or from an environment that is on the path.
+    # Suggest commands in the form of the user's: through uv, or from an activated environment.
     prefix = "uv run " if "UV_RUN_RECURSION_DEPTH" in os.environ else ""
     return {
         "what was reached": {
             "label": f"trained on {source}, shortly ({arguments.steps} steps of 512 samples); co-planning in "
             "simulation: no person took part",
-            **reached,
+            **rates,
             "minutes": round(seconds / 60, 1),
         },
-        "where it is": where,
+        "where it is": paths,
         "what to type next": {
             "a longer training": f"{prefix}copolicy-train --policy.type=copolicy --policy.preset=small "
             f"--policy.device=cpu --dataset.repo_id={REPO_ID} --dataset.root={out / 'dataset'} "

@@ -1,6 +1,7 @@
-"""The commands of the quickstart, run one after the other: a line each, a log, and a second try that goes on."""
+"""Runs the commands of the quickstart in sequence, with a log; a second call continues after the last finished one."""
 
 import contextlib
+import itertools
 import json
 import os
 import shlex
@@ -29,65 +30,65 @@ class Step:
     """One command of the chain.
 
     Attributes:
-        purpose: what it is for.
-        makes: files and folders that it writes; they go before it is tried again.
+        purpose: one line for the terminal.
+        outputs: files and folders that it writes; they are removed before it runs.
     """
 
     purpose: str
     command: tuple[str, ...]
-    makes: tuple[Path, ...]
+    outputs: tuple[Path, ...]
     environment: tuple[tuple[str, str], ...] = ()
 
     @property
-    def typed(self) -> str:
-        """The command as one would type it."""
+    def command_line(self) -> str:
+        """The command as typed in a shell."""
         return " ".join([f"{name}={value}" for name, value in self.environment] + [shlex.join(self.command)])
 
 
 def run_chain(out: Path, steps: Sequence[Step]) -> None:
-    """Runs the steps in a new folder, or goes on in one where an earlier try stopped.
+    """Runs the steps in a new folder, or continues in the folder of an interrupted run.
 
-    Steps that a try with the same commands finished are not repeated; what the others left goes first. Everything that
-    the commands say goes into `LOG_FILE` in the folder, a line a step to stderr.
+    Steps that an earlier run finished with the same commands are skipped; outputs of the others are removed first. The
+    commands' output is written to `LOG_FILE` in the folder, one line per step to stderr.
 
     Raises:
-        OutputExistsError: the folder holds something else than an unfinished try.
-        RunError: a command failed, or another quickstart works in the folder.
+        OutputExistsError: the folder has other content than an unfinished run.
+        RunError: a command failed, or another quickstart runs in the folder.
     """
     record = out / _RECORD
     if os.path.lexists(out) and not record.is_file() and not _is_empty(out):
         raise OutputExistsError(out)
     out.mkdir(parents=True, exist_ok=True)
-    refusal = f"{out}: expected a folder that nobody works in, found another quickstart at work"
+    refusal = f"{out}: expected a folder that is not in use, found another quickstart running in it"
     with FolderLock(out / _LOCK, refusal), (out / LOG_FILE).open("a", encoding="utf-8") as log:
-        finished = _common(_finished(record), [step.typed for step in steps])
+        finished = _common_prefix(_finished_commands(record), [step.command_line for step in steps])
         replace_text(record, json.dumps(finished) + "\n")
-        _say(f"Everything that the commands say is in {out / LOG_FILE}\n")
-        for place, step in enumerate(steps):
-            line = f"[{place + 1}/{len(steps)}] {step.purpose}"
-            if place < len(finished):
-                _say(f"{line}: done before\n")
+        _print(f"The commands' output is in {out / LOG_FILE}\n")
+        for index, step in enumerate(steps):
+            line = f"[{index + 1}/{len(steps)}] {step.purpose}"
+            if index < len(finished):
+                _print(f"{line}: done before\n")
                 continue
-            for path in step.makes:
+            for path in step.outputs:
                 _remove(path)
             _execute(step, line, log)
-            finished.append(step.typed)
+            finished.append(step.command_line)
             replace_text(record, json.dumps(finished) + "\n")
 
 
-def forget_chain(out: Path) -> None:
-    """Makes a finished folder one like any other: nothing is to be gone on with there."""
+def remove_record(out: Path) -> None:
+    """Removes the record and lock of a finished run, so that the folder is not continued in."""
     (out / _RECORD).unlink(missing_ok=True)
-    with contextlib.suppress(OSError):  # Windows keeps what another process looks at
+    with contextlib.suppress(OSError):  # Windows cannot remove a file that another process has open
         (out / _LOCK).unlink(missing_ok=True)
 
 
 def _is_empty(folder: Path) -> bool:
-    # A first try that ended before its first command has left its log.
+    # A run that was interrupted before its first command has only a log.
     return folder.is_dir() and all(is_hidden(entry.name) or entry.name == LOG_FILE for entry in folder.iterdir())
 
 
-def _finished(record: Path) -> list[str]:
+def _finished_commands(record: Path) -> list[str]:
     if not record.is_file():
         return []
     try:
@@ -99,14 +100,9 @@ def _finished(record: Path) -> list[str]:
     return finished
 
 
-def _common(finished: Sequence[str], typed: Sequence[str]) -> list[str]:
-    """The commands at the beginning of both."""
-    same = []
-    for one, other in zip(finished, typed, strict=False):
-        if one != other:
-            break
-        same.append(one)
-    return same
+def _common_prefix(finished: Sequence[str], commands: Sequence[str]) -> list[str]:
+    pairs = zip(finished, commands, strict=False)
+    return [command for command, _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)]
 
 
 def _remove(path: Path) -> None:
@@ -121,43 +117,43 @@ def _execute(step: Step, line: str, log: IO[str]) -> None:
     program = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
     if program is None:
         raise RunError(f"expected the program {name} beside this one, found none")
-    # Nothing of the chain needs the network; saying so keeps LeRobot from asking the Hub about a local folder.
+    # The chain needs no network; without this, LeRobot queries the Hub about a local folder.
     environment = {**os.environ, "HF_HUB_OFFLINE": "1", **dict(step.environment)}
-    log.write(f"\n$ {step.typed}\n")
+    log.write(f"\n$ {step.command_line}\n")
     log.flush()
-    began = Path(log.name).stat().st_size
+    log_start = Path(log.name).stat().st_size
     with subprocess.Popen([program, *flags], env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log) as run:
         try:
-            status = _waited(run, line)
+            status = _wait(run, line)
         except BaseException:
-            # Ctrl-C reached it too; a moment to leave nothing half done.
+            # Ctrl-C also interrupts the command; give it time to clean up.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 run.wait(5)
             run.kill()
             raise
     if status:
-        said = Path(log.name).read_bytes()[began:].decode("utf-8", errors="replace").splitlines()
-        _say("".join(f"    {one}\n" for one in said[-_LAST_LINES:]))
+        output = Path(log.name).read_bytes()[log_start:].decode("utf-8", errors="replace").splitlines()
+        _print("".join(f"    {text}\n" for text in output[-_LAST_LINES:]))
         raise RunError(
-            f"this command ended with status {status}: {shlex.join(step.command)}; what it said is in {log.name}; the "
-            "same call again goes on from there"
+            f"this command ended with status {status}: {shlex.join(step.command)}; its output is in {log.name}; the "
+            "same call again continues from there"
         )
 
 
-def _waited(run: subprocess.Popen, line: str) -> int:
-    """Waits for a command beside its line, which shows the seconds as they pass where somebody looks on."""
-    shown = sys.stderr.isatty()
+def _wait(run: subprocess.Popen, line: str) -> int:
+    """Waits for a command; prints its line with the elapsed seconds, updated each second on a terminal."""
+    is_terminal = sys.stderr.isatty()
     started = perf_counter()
-    _say(line)
+    _print(line)
     try:
         while True:
             try:
-                return run.wait(1 if shown else None)
+                return run.wait(1 if is_terminal else None)
             except subprocess.TimeoutExpired:
-                _say(f"\r{line}: {perf_counter() - started:.0f} s")
+                _print(f"\r{line}: {perf_counter() - started:.0f} s")
     finally:
-        _say(("\r" + line if shown else "") + f": {perf_counter() - started:.0f} s\n")
+        _print(("\r" + line if is_terminal else "") + f": {perf_counter() - started:.0f} s\n")
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     print(text, end="", file=sys.stderr, flush=True)

@@ -1,6 +1,6 @@
-"""What an exported policy says of how it was made: training, data, results; without a path of a machine.
+"""`recipe.json` and `eval.json` of an exported policy: its training, data and results, without paths of a machine.
 
-`recipe.json` and `eval.json` stand beside the weights; `copolicy-cards model` writes the card from them.
+They are written beside the weights; `copolicy-cards model` makes the card from them.
 """
 
 from collections import Counter
@@ -12,29 +12,29 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.policies.documents import ReachedStep, TrainingDocument
+from copolicy.dataset.policies.documents import TrainingDocument, TrainingStepDocument
 from copolicy.dataset.scenarios import set_label
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
 
 _TRAINING = ("batch_size", "seed")
-_COUNTED = ("source", "map_set", "license", "pair_id")
-_EPISODE = ("map_id", "start_theta", "partner", "robot", "repeat", "success", "reason", "time_s")
+_COUNTED_COLUMNS = ("source", "map_set", "license", "pair_id")
+_EPISODE_COLUMNS = ("map_id", "start_theta", "partner", "robot", "repeat", "success", "reason", "time_s")
 
 
 def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands: Sequence[str]) -> dict[str, Any]:
-    """How the policy of a checkpoint was trained; a part that is not on record is left out.
+    """The recipe of a checkpoint's policy, without the parts that were not recorded.
 
     Args:
-        folder: of the checkpoint. One that was exported already keeps its recipe.
-        weights_sha256: digest of its weights.
-        averaged: the exported weights are the moving average.
-        commands: how to make it again.
+        folder: folder of the checkpoint; an exported one keeps its recipe.
+        weights_sha256: sha256 of its weights.
+        averaged: whether the exported weights are the moving average.
+        commands: commands that made data and policy.
 
     Raises:
         FileFormatError: `train_config.json` or `recipe.json` cannot be read.
-        InvalidValueError: a command with a path that only this machine has.
+        InvalidValueError: a command has a path in this user's home or in the working directory.
     """
     for command in commands:
         if str(Path.home()) in command or str(Path.cwd()) in command:
@@ -48,7 +48,7 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     training = read_optional_json(folder / "train_config.json", TrainingDocument, "the settings of a training")
     if training:
         step_file = folder.parent / "training_state" / "training_step.json"
-        reached = read_optional_json(step_file, ReachedStep, "a training's step") or {}
+        reached = read_optional_json(step_file, TrainingStepDocument, "a training's step") or {}
         steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
             **{name: training.get(name) for name in _TRAINING},
@@ -57,17 +57,20 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
             "optimizer": training.get("optimizer"),
             "scheduler": training.get("scheduler"),
         }
-        recipe["dataset"] = {**_learned_at(training.get("policy") or {}), **_data_set(training.get("dataset") or {})}
+        # The policy's settings record these also if the data set is not on this machine.
+        policy = training.get("policy") or {}
+        recorded = {name: policy[name] for name in ("fps", "physics", "physics_mixture", "unseen") if policy.get(name)}
+        recipe["dataset"] = {**recorded, **_data_set(training.get("dataset") or {})}
     if commands:
         recipe["commands"] = list(commands)
     return recipe
 
 
-def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
-    """A result of `copolicy-eval` with its summary and the outcome of each episode, without the rest.
+def shortened_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
+    """A result of `copolicy-eval` with its summary and the main columns of each episode.
 
     Raises:
-        FileFormatError: no result, or one of other weights.
+        FileFormatError: the file is no result, or one of other weights.
     """
     result = read_optional_json(path, dict[str, Any], "a result of copolicy-eval")
     try:
@@ -75,7 +78,7 @@ def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
             raise FileFormatError(path, "a result of copolicy-eval", "no such file")
         weights = result["policy"]["weights_sha256"]
         summary = _without(result["summary"], "by_map")
-        episodes = [{key: row[key] for key in _EPISODE if key in row} for row in result.get("episodes", ())]
+        episodes = [{key: row[key] for key in _EPISODE_COLUMNS if key in row} for row in result.get("episodes", ())]
         baselines = [
             {
                 "name": baseline["name"],
@@ -93,12 +96,12 @@ def kept_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:
     return {**shortened, "baselines": baselines} if baselines else shortened
 
 
-def _without(table: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in table.items() if name != key}
+def _without(entries: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in entries.items() if name != key}
 
 
 def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
-    """Name, size, sources and version of the data, as far as its folder is at hand."""
+    """Name of the data set, and its size, sources and version if its folder is on this machine."""
     facts: dict[str, Any] = {"repo_id": settings.get("repo_id"), "revision": settings.get("revision")}
     chosen = settings.get("episodes")
     root = Path(settings.get("root") or "")
@@ -114,18 +117,13 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
         "episodes_used": len(used),
         "frames": info["total_frames"],
         "fps": info["fps"],
-        **{column: counts for column in _COUNTED if (counts := _counts(folder, column, set(used)))},
+        **{column: counts for column in _COUNTED_COLUMNS if (counts := _counts(folder, column, set(used)))},
         **{key: release[key] for key in ("version", "content_hash") if key in release},
     }
 
 
-def _learned_at(policy: dict[str, Any]) -> dict[str, Any]:
-    """What the policy's settings record of the data, which holds also where these are not at hand."""
-    return {name: policy[name] for name in ("fps", "physics", "physics_mixture", "unseen") if policy.get(name)}
-
-
 def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[str, int]:
-    """How many of the used episodes have each value of an episode column."""
+    """The number of used episodes with each value of an episode column, most frequent first."""
     if column not in folder.episodes.column_names:
         return {}
     if column == "map_set":

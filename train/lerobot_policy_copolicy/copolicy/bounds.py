@@ -1,4 +1,4 @@
-"""Between which numbers each setting of the co-policy lies."""
+"""Allowed ranges of the co-policy's numeric settings."""
 
 import math
 from typing import Any, NamedTuple
@@ -7,25 +7,25 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 
 class Bounds(NamedTuple):
-    """What a number may be, in a test that NaN fails, and in words."""
+    """Range of a finite number, and its description for error messages."""
 
-    least: float
-    most: float = math.inf
+    minimum: float
+    maximum: float = math.inf
     expected: str = ""
 
     @property
     def text(self) -> str:
-        """For a message."""
+        """Description for error messages."""
         return self.expected or (
-            f"at least {self.least:g}" if self.most == math.inf else f"{self.least:g} to {self.most:g}"
+            f"at least {self.minimum:g}" if self.maximum == math.inf else f"{self.minimum:g} to {self.maximum:g}"
         )
 
-    def hold(self, value: float) -> bool:
-        """Whether a number lies between them; infinity never does."""
-        return self.least <= value <= self.most and math.isfinite(value)
+    def contains(self, value: float) -> bool:
+        """Whether a number is in the range; false for NaN and infinity."""
+        return self.minimum <= value <= self.maximum and math.isfinite(value)
 
 
-_TINY = math.ulp(0.0)  # so that zero itself lies outside
+_TINY = math.ulp(0.0)  # excludes zero
 _BELOW_ONE = math.nextafter(1.0, 0.0)
 _POSITIVE = Bounds(_TINY, expected="a number above 0")
 _DROPOUT = Bounds(0, _BELOW_ONE, "0 or more and less than 1")
@@ -56,13 +56,13 @@ BOUNDS: dict[str, Bounds] = {
 
 
 def require_bounds(settings: Any) -> None:
-    """Checks every setting of `BOUNDS`; one that is None is left to its preset or its data.
+    """Checks every setting of `BOUNDS` that is not None.
 
     Raises:
-        InvalidValueError: a number outside its bounds, NaN or infinite.
+        InvalidValueError: a number is out of range, NaN or infinite.
     """
     for name, bounds in BOUNDS.items():
         value = getattr(settings, name)
         for number in value if isinstance(value, (tuple, list)) else (value,):
-            if number is not None and not bounds.hold(number):
+            if number is not None and not bounds.contains(number):
                 raise InvalidValueError(name, bounds.text, value)

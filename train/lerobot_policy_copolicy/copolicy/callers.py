@@ -1,7 +1,7 @@
-"""What the caller of a policy's constructor holds, as far as it matters to the policy.
+"""Finds data sets and environments in the local variables of a policy constructor's callers.
 
-LeRobot hands a policy the metadata of the data set or nothing, and neither the episodes that are trained on nor the
-environment that it is tried in. Both are in the variables of the functions that called it.
+LeRobot passes a policy the metadata of the data set at most, but neither the episodes of the training nor the
+environment of an evaluation. Both are local variables of the functions that call the constructor.
 """
 
 import sys
@@ -14,17 +14,17 @@ from torch.utils.data import Dataset
 
 
 def data_sets_of_callers(meta: Any) -> list[Any]:
-    """The data sets around a policy that is made for `meta`: the one with these metadata, and its held-out part."""
-    found = [value for value in _variables() if isinstance(value, Dataset) and hasattr(value, "episodes")]
-    if not any(getattr(value, "meta", None) is meta for value in found):
+    """The callers' data sets with the metadata `meta` or the same folder, which includes a held-out part."""
+    datasets = [value for value in _variables() if isinstance(value, Dataset) and hasattr(value, "episodes")]
+    if not any(getattr(value, "meta", None) is meta for value in datasets):
         return []
     root = meta.root
-    unique = {id(value): value for value in found if getattr(getattr(value, "meta", None), "root", None) == root}
+    unique = {id(value): value for value in datasets if getattr(getattr(value, "meta", None), "root", None) == root}
     return list(unique.values())
 
 
 def environment_of_callers() -> EnvConfig | None:
-    """The settings of the environment that a policy is made for or trained beside."""
+    """The environment settings in the callers' variables or training configuration; None without any."""
     for value in _variables():
         if isinstance(value, EnvConfig):
             return value

@@ -36,35 +36,32 @@ def _identity() -> dict[str, NormalizationMode]:
 class CopolicyConfig(PreTrainedConfig):
     """Settings of the diffusion co-policy, which predicts the actions of both players.
 
-    A setting left open (None) takes the value of `preset`; a value given explicitly wins. The saved configuration
-    holds the values, so changing `preset` of a saved one changes nothing. What a preset wants of a task that the task
-    does not offer is left out.
+    A setting that is None takes the value of `preset`. The saved configuration has all values, so changing its `preset`
+    has no effect. Features and symmetries of a preset that the task does not offer are left out.
 
-    `normalization_mapping` is IDENTITY throughout: LeRobot puts the statistics of the current data set into the
-    processors, also when a checkpoint is fine-tuned on another set, and a column that was constant there (a goal, an
-    obstacle) explodes under them. Instead the policy scales by the fixed bounds of the task, inside the network.
+    `normalization_mapping` is IDENTITY for all features. LeRobot puts the statistics of the current data set into the
+    processors, also when a checkpoint is fine-tuned on another set; a column that is constant there (a goal, an
+    obstacle) then gets huge values. Instead the policy scales by the fixed bounds of the task.
 
     Raises:
-        UnknownNameError: no such preset.
-        InvalidValueError: a setting outside what is allowed.
+        UnknownNameError: the preset does not exist.
+        InvalidValueError: a setting is out of range or not offered by the task.
     """
 
-    task: str | None = None  # whose columns, bounds, features and symmetries; that of the data, or else the table
+    task: str | None = None  # task that defines columns, bounds, features; default: that of the data, else the table
     preset: str = "default"  # "default", "paper" (the paper exactly) or "small" (trains on a CPU in minutes)
     past_human_action: bool = True  # condition on the human's past action (the paper's CoDP-H); false is CoDP
 
-    n_obs_steps: int = 3  # frames of history that a plan is conditioned on, the current one included
-    horizon: int = 12  # actions that a plan holds, from the oldest frame of the history on
-    n_action_steps: int = 8  # actions executed before the next plan, from the current frame on
+    n_obs_steps: int = 3  # frames of history that the policy observes, including the current one
+    horizon: int = 12  # length of the sampled action sequence, from the oldest frame of the history on
+    n_action_steps: int = 8  # actions executed before the next sampling, from the current frame on
     drop_n_last_frames: int | None = None  # frames at the end of an episode that start no training sample
     do_mask_loss_for_padding: bool = False  # leave actions beyond either end of the episode out of the loss
 
-    observation_features: str | None = (
-        None  # "absolute"; of the table also "relative", or "scan": that and a range scan
-    )
-    mirror: bool | None = None  # mirror half of the training samples (the table: in y)
+    observation_features: str | None = None  # "absolute"; for the table also "relative" and "scan" (with a range scan)
+    mirror: bool | None = None  # mirror half of the training samples (for the table in y)
     permute_obstacles: bool | None = None  # shuffle the order of the obstacles in training samples
-    symmetries: list[str] = field(default_factory=list)  # further ones that the task offers, by name
+    symmetries: list[str] = field(default_factory=list)  # names of further symmetries that the task offers
 
     network: str | None = None  # "transformer" decoder or residual "mlp"
     n_layers: int | None = None  # decoder layers, or residual blocks of the mlp
@@ -79,14 +76,14 @@ class CopolicyConfig(PreTrainedConfig):
     prediction_type: str | None = None  # what the network predicts: "epsilon", "sample" or "v_prediction"
     clip_sample_range: float = 1.0  # the sample is clipped to plus and minus this at each sampling step
     sampler: str | None = None  # "ddpm", "ddim" or "dpmsolver++"
-    num_inference_steps: int | None = None  # sampling steps of a plan
-    initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main route
-    planner: str = "fast"  # "fast", or "plain": the same plans without its savings, to compare with
-    compile_model: bool = False  # train the network's layers through torch.compile, for long runs on a GPU
-    backend: str = "auto"  # what runs the network of a plan: "torch", on a CPU "onnx" or "numba"; "auto": the fastest
+    num_inference_steps: int | None = None  # denoising steps
+    initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main mode
+    planner: str = "fast"  # "fast" sampler, or "plain" with diffusers' schedulers and the same result, as a reference
+    compile_model: bool = False  # train the network's layers with torch.compile, for long runs on a GPU
+    backend: str = "auto"  # runs the network in inference: "torch", on a CPU "onnx" or "numba"; "auto" is the fastest
 
-    ema: bool = True  # plan with an exponential moving average of the weights
-    ema_power: float = 0.75  # its decay after n updates is 1 - (1 + n / inv_gamma) ** -power
+    ema: bool = True  # use an exponential moving average of the weights in inference
+    ema_power: float = 0.75  # decay after n updates is 1 - (1 + n / inv_gamma) ** -power
     ema_inv_gamma: float = 1.0  # see ema_power
     ema_max_decay: float = 0.9999  # upper bound of the decay
 
@@ -97,14 +94,14 @@ class CopolicyConfig(PreTrainedConfig):
     scheduler_warmup_steps: int | None = None  # updates over which the learning rate rises
     scheduler_final_lr_fraction: float | None = None  # learning rate of the last update, as a fraction of the peak
 
-    fps: float | None = None  # frames a second of the training data, filled in from them; an action is held as long
-    physics: dict[str, float] | None = None  # of the training episodes, where they share them; filled in from them
-    physics_mixture: dict[str, int] = field(default_factory=dict)  # episodes by physics (JSON), where they differ
-    unseen: str = ""  # what of the training episodes no policy sees, such as differing sizes; filled in from them
+    fps: float | None = None  # actions per second; set from the training data
+    physics: dict[str, float] | None = None  # world settings of the training episodes if equal; set from the data
+    physics_mixture: dict[str, int] = field(default_factory=dict)  # episodes by world settings (JSON) if these differ
+    unseen: str = ""  # properties of the training episodes that policies do not observe; set from the data
 
     normalization_mapping: dict[str, NormalizationMode] = field(default_factory=_identity)  # fixed, see above
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.preset not in PRESETS:
             raise UnknownNameError("preset", self.preset, PRESETS)
@@ -113,14 +110,14 @@ class CopolicyConfig(PreTrainedConfig):
 
     @property
     def filled(self) -> Any:
-        """Itself, for a type checker, which cannot know that the preset has filled in every open setting."""
+        """`self` typed as Any: type checkers cannot know that the preset has set every optional field."""
         return self
 
     def use_task(self, task: PairTask) -> None:
-        """Takes the task of the data that are trained on, unless the settings name theirs.
+        """Sets the task of the training data, unless the settings name one.
 
         Raises:
-            InvalidValueError: they name another task, or something that this one does not offer.
+            InvalidValueError: the settings name another task, or features or symmetries that this one does not offer.
         """
         if "task" in self._open:
             self._fill(task)
@@ -128,38 +125,38 @@ class CopolicyConfig(PreTrainedConfig):
             raise InvalidValueError("task", f"{task.spec.name!r}, that of the data", self.task)
 
     def _fill(self, task: PairTask) -> None:
-        """Gives the open settings their values for a task, and checks all of them."""
+        """Sets the open settings for a task, and checks all settings."""
         self.task = task.spec.name
         for name in self._open - {"task"}:
             setattr(self, name, PRESETS[self.preset][name])
-        lacking = {name: found for name, found in self._lacking(task).items() if name in self._open}
-        for name in lacking:
+        from_preset = {name: problem for name, problem in self._not_offered(task).items() if name in self._open}
+        for name in from_preset:
             setattr(self, name, _GENERIC if name == _FEATURES else False)
-        if lacking:
-            wanted = ", ".join(f"{name}={value}" for name, (_, value) in lacking.items())
-            logging.info("%s", task.missing(f"{wanted} (preset {self.preset!r})"))
-        for name, (expected, found) in self._lacking(task).items():
-            raise InvalidValueError(name, expected, found)
+        if from_preset:
+            values = ", ".join(f"{name}={value}" for name, (_, value) in from_preset.items())
+            logging.info("%s", task.missing(f"{values} (preset {self.preset!r})"))
+        for name, (expected, actual) in self._not_offered(task).items():
+            raise InvalidValueError(name, expected, actual)
         self._validate()
 
-    def _lacking(self, task: PairTask) -> dict[str, tuple[str, Any]]:
-        """Settings that ask for what a task does not offer: what is expected, and what they are."""
+    def _not_offered(self, task: PairTask) -> dict[str, tuple[str, Any]]:
+        """Expected and actual values of the settings that the task does not offer."""
         offered = task.features
-        found: dict[str, tuple[str, Any]] = {}
+        problems: dict[str, tuple[str, Any]] = {}
         if self.observation_features not in (choices := (_GENERIC, *offered.encoders)):
             expected = f"{', '.join(choices)} (the task {self.task!r} offers no other features)"
-            found[_FEATURES] = expected, self.observation_features
+            problems[_FEATURES] = expected, self.observation_features
         for name in _SYMMETRIES:
             if getattr(self, name) and name not in offered.symmetries:
-                found[name] = f"false (the task {self.task!r} has no such symmetry)", True
+                problems[name] = f"false (the task {self.task!r} has no such symmetry)", True
         if not set(self.symmetries) <= offered.symmetries.keys():
             expected = f"some of {', '.join(offered.symmetries) or 'none'} (the task {self.task!r} has no others)"
-            found["symmetries"] = expected, self.symmetries
-        return found
+            problems["symmetries"] = expected, self.symmetries
+        return problems
 
     @property
     def used_symmetries(self) -> frozenset[str]:
-        """Names of the symmetries that training samples are varied by."""
+        """Names of the symmetries that augment training samples."""
         return frozenset(self.symmetries).union(name for name in _SYMMETRIES if getattr(self, name))
 
     def _validate(self) -> None:
@@ -203,7 +200,7 @@ class CopolicyConfig(PreTrainedConfig):
 
     @property
     def action_delta_indices(self) -> list[int]:
-        """Frames of the plan, relative to the current one."""
+        """Frames of the action sequence, relative to the current one."""
         return list(range(1 - self.n_obs_steps, 1 - self.n_obs_steps + self.horizon))
 
     @property
@@ -212,7 +209,7 @@ class CopolicyConfig(PreTrainedConfig):
         return None
 
     def get_optimizer_preset(self) -> AdamWConfig:
-        """AdamW with the settings above."""
+        """AdamW with the `optimizer_*` settings."""
         filled = self.filled
         return AdamWConfig(
             lr=filled.optimizer_lr,
@@ -222,7 +219,7 @@ class CopolicyConfig(PreTrainedConfig):
         )
 
     def get_scheduler_preset(self) -> WarmupCosineSchedulerConfig:
-        """Warm-up and cosine with the settings above."""
+        """Warm-up and cosine decay with the `scheduler_*` settings."""
         return WarmupCosineSchedulerConfig(self.scheduler_warmup_steps, self.filled.scheduler_final_lr_fraction)
 
     def validate_features(self) -> None:
@@ -241,6 +238,6 @@ class CopolicyConfig(PreTrainedConfig):
 def _check_feature(name: str, expected: tuple[int, ...], features: dict[str, PolicyFeature]) -> None:
     if name not in features:
         raise InvalidValueError("features of the data set or environment", name, sorted(features))
-    given = tuple(features[name].shape)
-    if given != expected:
-        raise ShapeError(name, expected, given)
+    actual = tuple(features[name].shape)
+    if actual != expected:
+        raise ShapeError(name, expected, actual)

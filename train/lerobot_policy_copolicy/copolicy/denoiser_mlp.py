@@ -1,4 +1,4 @@
-"""A residual multilayer perceptron that denoises a whole plan at once: the network for a CPU."""
+"""A residual multilayer perceptron that denoises a whole action sequence at once: the network for a CPU."""
 
 import torch
 from torch import Tensor, nn
@@ -9,15 +9,15 @@ _STEP_SIZE = 64
 
 
 class MlpDenoiser(nn.Module):
-    """Denoises a plan; all actions and the whole history are one input vector.
+    """Denoises an action sequence; all actions and the whole history are one input vector.
 
-    Each block adds `out(silu(in(norm(x)) + step))`. The last layer of a block and the head start at zero, so that the
-    untrained network predicts zero.
+    Each block adds `outer(silu(inner(norm(x)) + step))`. The last layer of a block and the head are initialised to
+    zero, so that the untrained network predicts zero.
 
     Args:
         action_size: values of an action.
         condition_size: values of an observation.
-        horizon: actions of a plan, T.
+        horizon: length of the action sequence, T.
         n_obs_steps: frames of the history, To.
         n_layers: residual blocks.
         width: size of the hidden layers.
@@ -46,11 +46,11 @@ class MlpDenoiser(nn.Module):
 
     @property
     def layers(self) -> nn.ModuleList:
-        """What repeats in depth, as the transformer's layers do."""
+        """The residual blocks, by the same name as the transformer's layers."""
         return self.blocks
 
     def forward(self, noisy_actions: Tensor, steps: Tensor, condition: Tensor) -> Tensor:
-        """One evaluation.
+        """Predicts the noise, the actions or the velocity, depending on the training target.
 
         Args:
             noisy_actions: `(B, T, action_size)`.

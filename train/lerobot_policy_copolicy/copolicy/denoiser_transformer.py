@@ -11,15 +11,15 @@ from .step_embedding import SinusoidalEmbedding
 
 
 class TransformerDenoiser(nn.Module):
-    """Denoises a plan; the time-series diffusion transformer of Chi et al. (2023) with the paper's sizes.
+    """The time-series diffusion transformer of Chi et al. (2023) with the paper's sizes.
 
-    The memory is the diffusion step followed by the frames of the history. Action i sees the actions up to i, the
-    step, and the frames up to frame i, so that an action depends on nothing that lies in its future.
+    The memory is the diffusion step followed by the frames of the history. Action i attends to the actions up to i, the
+    step, and the frames up to frame i, so that an action does not depend on later actions or frames.
 
     Args:
         action_size: values of an action.
         condition_size: values of an observation.
-        horizon: actions of a plan, T.
+        horizon: length of the action sequence, T.
         n_obs_steps: frames of the history, To.
         n_layers, width, n_heads, feedforward_width: sizes of the decoder.
         attention_dropout: dropout in the decoder's layers.
@@ -62,14 +62,14 @@ class TransformerDenoiser(nn.Module):
 
         action, memory = torch.arange(horizon)[:, None], torch.arange(1 + n_obs_steps)[None]
         hidden = {"causal_mask": action < torch.arange(horizon)[None], "memory_mask": action < memory - 1}
-        for name, mask in hidden.items():  # an additive mask: attention takes it without converting it each time
+        for name, mask in hidden.items():  # additive masks, which attention need not convert at each call
             self.register_buffer(name, torch.zeros(mask.shape).masked_fill(mask, -torch.inf), persistent=False)
         self.apply(_initialize)
         nn.init.normal_(self.action_position, std=0.02)
         nn.init.normal_(self.condition_position, std=0.02)
 
     def forward(self, noisy_actions: Tensor, steps: Tensor, condition: Tensor) -> Tensor:
-        """One evaluation.
+        """Predicts the noise, the actions or the velocity, depending on the training target.
 
         Args:
             noisy_actions: `(B, T, action_size)`.
@@ -83,8 +83,8 @@ class TransformerDenoiser(nn.Module):
         memory = torch.cat((step, self.condition_embedding(condition)), dim=1)  # (B, 1 + To, width)
         memory = self.condition_encoder(self.embedding_dropout(memory + self.condition_position))
         tokens = self.embedding_dropout(self.action_embedding(noisy_actions) + self.action_position)  # (B, T, width)
-        # Plain products for a dozen tokens: they compile into the layer; 3 % faster on a CPU. On an H100 without
-        # compiling, 20 % faster than fused kernels in float32 and 11 % slower in bf16.
+        # For a dozen tokens, unfused attention compiles into the layer and is 3 % faster on a CPU. On an H100 without
+        # compiling, it is 20 % faster than fused kernels in float32 and 11 % slower in bf16.
         with sdpa_kernel(SDPBackend.MATH) if self.training else nullcontext():
             tokens = self._decoded(tokens, memory)
         return self.head(self.norm(tokens))
@@ -96,7 +96,7 @@ class TransformerDenoiser(nn.Module):
 
 
 class _DecoderLayer(nn.TransformerDecoderLayer):
-    """torch's layer as a class of our own, because `Module.compile` silently leaves torch's classes as they are."""
+    """torch's layer as a subclass, because `Module.compile` silently does not compile torch's own classes."""
 
     def forward(self, tgt: Tensor, memory: Tensor, **masks: Any) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
         return super().forward(tgt, memory, **masks)

@@ -1,4 +1,4 @@
-"""The diffusion over plans: how training samples are noised, and how a plan is sampled from noise."""
+"""Diffusion over action sequences: adds noise to training samples, and samples sequences from noise."""
 
 import warnings
 from collections.abc import Callable
@@ -13,33 +13,33 @@ from torch import Tensor
 from copolicy.dataset.exceptions import UnknownNameError
 
 from .configuration_copolicy import CopolicyConfig
-from .fast.sampler_table import SamplerTable, trailing_timesteps
+from .fast.sampler_coefficients import SamplerCoefficients, trailing_timesteps
 
 
 class ClippedDpmSolver(DPMSolverMultistepScheduler):
-    """diffusers' DPM-Solver++, with the predicted plan clipped as its DDPM and DDIM do.
+    """diffusers' DPM-Solver++ with the predicted clean sample clipped, as in its DDPM and DDIM.
 
-    At the last training step hardly any signal is left (2e-7 of the variance), so that an error of the predicted
-    noise of 2 % is one of 40 of the plan: unclipped, the next step is far from anything that was trained on.
+    At the last training step the signal is 2e-7 of the variance, so an error of 2 % of the predicted noise is an error
+    of 40 of the clean sample: without clipping, the next step is far outside the training distribution.
     """
 
     clip_range: float
 
     def set_timesteps(self, *args, **kwargs) -> None:
-        """diffusers' own; it turns tensors into arrays in a way that NumPy 2 warns of."""
+        """diffusers' method, without NumPy 2's warning about its conversion of tensors."""
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "__array__ implementation", DeprecationWarning)
             super().set_timesteps(*args, **kwargs)
 
     def convert_model_output(self, *args, **kwargs) -> Tensor:
-        """The predicted plan, clipped."""
+        """The predicted clean sample, clipped."""
         return super().convert_model_output(*args, **kwargs).clamp(-self.clip_range, self.clip_range)
 
 
-class PlanDiffusion:
-    """Noise schedule, prediction target and sampler of a policy; holds no weights.
+class ActionDiffusion:
+    """Noise schedule, prediction target and sampler of a policy; has no weights.
 
-    The schedulers are diffusers'; `table` is the same sampler for `FastPlanner`.
+    The schedulers are diffusers'; `coefficients` is the same sampler for `FastSampler`.
     """
 
     def __init__(self, config: CopolicyConfig):
@@ -62,7 +62,7 @@ class PlanDiffusion:
         else:
             raise UnknownNameError("sampler", str(config.sampler), ("ddpm", "ddim", "dpmsolver++"))
         self._set_timesteps(timesteps)
-        self.table = SamplerTable(
+        self.coefficients = SamplerCoefficients(
             config.sampler,
             config.filled.prediction_type,
             self.scheduler.alphas_cumprod,
@@ -75,21 +75,21 @@ class PlanDiffusion:
         self.initial_noise_scale: float = config.filled.initial_noise_scale
 
     def _set_timesteps(self, timesteps: list[int]) -> None:
-        """Resets the scheduler, which for DPM-Solver++ remembers the steps of the plan before."""
+        """Resets the scheduler; DPM-Solver++ keeps state of the previous sampling."""
         if isinstance(self.scheduler, DDIMScheduler):
             self.scheduler.set_timesteps(len(timesteps))
             self.scheduler.timesteps = torch.tensor(timesteps)
         else:
             self.scheduler.set_timesteps(timesteps=timesteps)
 
-    def noised(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """A training sample of each plan, at a random diffusion step.
+    def add_noise(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Adds noise to action sequences, each at a random diffusion step.
 
         Args:
             actions: `(B, T, n)` in [-1, 1].
 
         Returns:
-            The noisy actions `(B, T, n)`, their steps `(B,)` and what the network shall predict `(B, T, n)`.
+            The noisy actions `(B, T, n)`, their steps `(B,)` and the target of the network's prediction `(B, T, n)`.
         """
         noise = torch.randn_like(actions)
         steps = torch.randint(self.num_train_timesteps, (len(actions),), device=actions.device)
@@ -103,10 +103,10 @@ class PlanDiffusion:
     def sample(
         self, denoise: Callable[[Tensor, Tensor], Tensor], noise: Tensor, generator: torch.Generator | None = None
     ) -> Tensor:
-        """A plan from noise, step by step through the scheduler: the reference that `FastPlanner` has to equal.
+        """Samples action sequences with diffusers' scheduler; the reference for `FastSampler`.
 
         Args:
-            denoise: the network for a given history, from noisy actions `(B, T, n)` and steps `(B,)`.
+            denoise: the network for given histories, from noisy actions `(B, T, n)` and steps `(B,)`.
             noise: `(B, T, n)`, standard normal; scaled here by `initial_noise_scale`.
             generator: source of the noise that DDPM adds at each step.
 

@@ -1,4 +1,4 @@
-"""An exponential moving average of a network's weights, kept as a part of the policy so that checkpoints hold it."""
+"""Exponential moving average of a network's weights, as a submodule of the policy so that checkpoints include it."""
 
 import copy
 
@@ -7,14 +7,14 @@ from torch import Tensor, nn
 
 
 class ExponentialMovingAverage(nn.Module):
-    """A slowly following copy of a network.
+    """A copy of a network whose weights are an exponential moving average.
 
     The decay grows as `1 - (1 + n / inv_gamma) ** -power` up to `max_decay`; n counts the updates from the third on,
     the first two copy the weights. This is the schedule of Chi et al. (2023).
 
     Attributes:
-        model: the copy; takes no gradients and stays in evaluation mode.
-        updates: number of updates so far; saved, so that a resumed run goes on with the right decay.
+        model: the copy, without gradients and always in evaluation mode.
+        updates: number of updates so far; saved, so that a resumed run continues with the right decay.
     """
 
     updates: Tensor
@@ -24,7 +24,9 @@ class ExponentialMovingAverage(nn.Module):
         self.model = copy.deepcopy(model).requires_grad_(False).eval()
         self.power, self.inv_gamma, self.max_decay = power, inv_gamma, max_decay
         self.register_buffer("updates", torch.zeros((), dtype=torch.long))
-        self._count: int | None = 0  # mirror of `updates`, so that an update need not wait for the device
+        self._count: int | None = (
+            0  # copy of `updates` on the host, so that an update need not synchronise with the device
+        )
 
     @property
     def decay(self) -> float:
@@ -36,7 +38,7 @@ class ExponentialMovingAverage(nn.Module):
 
     @torch.no_grad()
     def update(self, model: nn.Module) -> None:
-        """Moves the copy towards `model`."""
+        """Updates the average with the weights of `model`."""
         weight = 1 - self.decay
         averaged, current = tuple(self.model.parameters()), tuple(model.parameters())
         torch._foreach_lerp_(averaged, current, weight)  # pyright: ignore[reportPrivateImportUsage]
@@ -44,7 +46,7 @@ class ExponentialMovingAverage(nn.Module):
         self.updates.fill_(self._count)
 
     def train(self, mode: bool = True) -> "ExponentialMovingAverage":
-        """Stays in evaluation mode: the copy is there to plan with, never to be trained."""
+        """Stays in evaluation mode: the copy is used in inference only."""
         return super().train(False)
 
     def _load_from_state_dict(self, *args, **kwargs):

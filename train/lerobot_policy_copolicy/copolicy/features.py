@@ -1,7 +1,7 @@
-"""The generic input of the network, and its actions: columns scaled by the fixed bounds of the task.
+"""Generic input features and actions of the network: columns scaled by the fixed bounds of the task.
 
-The bounds belong to the task, not to a data set, so a checkpoint sees the same numbers wherever it is trained,
-fine-tuned or run.
+The bounds are the task's and not a data set's, so the scaling of a checkpoint is the same in training, fine-tuning and
+inference.
 """
 
 import torch
@@ -12,7 +12,7 @@ from copolicy.dataset.task_spec import TaskSpec
 
 
 class AbsoluteFeatures(nn.Module):
-    """The paper's input: state, scenario and, where it is used, the human's past action, scaled to [-1, 1]."""
+    """The paper's input: state, scenario and, if used, the human's past action, scaled to [-1, 1]."""
 
     scale: Tensor
     offset: Tensor
@@ -25,13 +25,13 @@ class AbsoluteFeatures(nn.Module):
             self.register_buffer(name, torch.from_numpy(values), persistent=False)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """Observation columns `(..., n)` in the units of the task to `(..., size)`."""
+        """Scales observation columns `(..., n)` in the units of the task and joins them to `(..., size)`."""
         columns = torch.cat([observation[key] for key in self.keys], dim=-1)
         return columns * self.scale + self.offset
 
 
 class ActionScale(nn.Module):
-    """Both players' actions, scaled to [-1, 1] for the network and back; nothing is done where that is their bounds."""
+    """Scales both players' actions to [-1, 1] and back; the identity if these are the task's bounds."""
 
     scale: Tensor
     offset: Tensor
@@ -44,7 +44,7 @@ class ActionScale(nn.Module):
         self.register_buffer("offset", torch.from_numpy(offset), persistent=False)
 
     def scaled(self, actions: Tensor) -> Tensor:
-        """`(..., m)` in the units of the task to [-1, 1]."""
+        """Scales actions `(..., m)` in the units of the task to [-1, 1]."""
         return actions * self.scale + self.offset if self._scaled else actions
 
     def physical(self, scaled: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""The learning rate of a run: linear warm-up, then a cosine down to a fraction of the peak at the last step."""
+"""Learning-rate schedule: linear warm-up, then cosine decay to a fraction of the peak at the last step."""
 
 import math
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from torch.optim.lr_scheduler import LambdaLR
 class WarmupCosineSchedulerConfig(LRSchedulerConfig):
     """Warm-up and cosine decay over the whole run.
 
-    LeRobot's own cosine schedules end either at zero or after a fixed number of steps; this one ends at
-    `final_lr_fraction` of the peak whatever the length of the run. With a fraction of zero it is diffusers' "cosine".
+    LeRobot's cosine schedules end at zero or after a fixed number of steps; this one ends at `final_lr_fraction` of the
+    peak at the last step of a run of any length. With a fraction of zero it equals diffusers' "cosine".
     """
 
     num_warmup_steps: int | None = 1000
     final_lr_fraction: float = 0.0
 
     def build(self, optimizer: Optimizer, num_training_steps: int) -> LambdaLR:
-        """A scheduler to be stepped after each update."""
+        """Makes the scheduler, which is stepped after each update."""
         warmup = self.num_warmup_steps or 0
 
         def scale(step: int) -> float:

@@ -1,4 +1,4 @@
-"""The diffusion co-policy: one network plans the actions of both players, the robot executes its half.
+"""The diffusion co-policy: one network predicts the actions of both players, the robot executes its half.
 
 Ng, Liu and Kennedy, "Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks" (2023, arXiv 2305.12171).
 """
@@ -24,10 +24,10 @@ from copolicy.train.finite_weights import non_finite_weight
 from .configuration_copolicy import CopolicyConfig
 from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
-from .diffusion import PlanDiffusion
+from .diffusion import ActionDiffusion
 from .ema import ExponentialMovingAverage
 from .fast.backend import require_backend
-from .fast.planner import FastPlanner
+from .fast.fast_sampler import FastSampler
 from .features import AbsoluteFeatures, ActionScale
 from .training_data import prepare_training, require_same_rate
 
@@ -39,26 +39,14 @@ _NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": 
 
 
 class CopolicyPolicy(PreTrainedPolicy):
-    """Predicts the next actions of both players from the last frames (and the human's past actions).
+    """Predicts the next actions of both players from the last frames and the human's past actions.
 
-    A plan made at frame n, with a history of To = 3 (`n_obs_steps`), T = 12 tokens (`horizon`) and 8 executed
-    (`n_action_steps`); r is the robot's half of an action, h the human's:
+    `select_action` explains which frames are observed and which actions are executed. In training, actions beyond
+    either end of the episode repeat its first or last action; the "paper" preset starts no sample in the last 9 frames,
+    so that only the beginning is padded.
 
-        |frame                       | n-2 | n-1 |  n  | n+1 | ... | n+7 | n+8 | n+9 |
-        |observation is used         | yes | yes | yes |  -  |  -  |  -  |  -  |  -  |
-        |human's past action is used | yes | yes | yes |  -  |  -  |  -  |  -  |  -  |
-        |token                       |  0  |  1  |  2  |  3  | ... |  9  | 10  | 11  |
-        |action is planned           | r h | r h | r h | r h | ... | r h | r h | r h |
-        |r is executed               |  -  |  -  | yes | yes | yes | yes |  -  |  -  |
-        |h is executed when both players follow the plan, and is a prediction beside a real human
-
-    The human's past action of frame n is what the human did in frame n-1. At the start of an episode the history is
-    filled with copies of the first frame, in training and in execution alike. In training, tokens beyond either end
-    of the episode repeat its first or last action; the "paper" preset starts no sample in the last 9 frames, so that
-    only the beginning is padded.
-
-    Everything here is in the units of the task, which for actions of the table is [-1, 1]; the network's input and
-    plans are scaled by the bounds of the task.
+    Inputs and outputs are in the units of the task, [-1, 1] for actions of the table; they are scaled by the bounds of
+    the task inside the policy. To is `n_obs_steps`, T is `horizon`, m the number of values of a joint action.
     """
 
     config_class = CopolicyConfig  # pyright: ignore[reportAssignmentType]
@@ -73,11 +61,11 @@ class CopolicyPolicy(PreTrainedPolicy):
         task = get_task(config.filled.task)
         self._sizes = {name: column["shape"][0] for name, column in features_of(task.spec).items()}
         offered = task.features
-        self._symmetries = [vary for name, vary in offered.symmetries.items() if name in config.used_symmetries]
-        # Episodes that must not come up in a batch, where the constructor could not see which ones are trained on.
+        self._symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
+        # Excluded episodes, to be refused in a batch if the constructor cannot find out the episodes of the training.
         self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
         require_same_rate(config)
-        self._loss: Tensor | None = None  # of a step that nobody has looked at yet
+        self._loss: Tensor | None = None  # of the last step, until it is checked
         self._updates = 0
         unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
         if unused:
@@ -90,34 +78,34 @@ class CopolicyPolicy(PreTrainedPolicy):
         self.denoiser: TransformerDenoiser | MlpDenoiser = network(
             self._sizes[ACTION], self.features.size, **{name: getattr(config, name) for name in names}
         )
-        self.diffusion = PlanDiffusion(config)
+        self.diffusion = ActionDiffusion(config)
         require_backend(config.backend)
-        self._fast = FastPlanner(self.diffusion.table, config.backend) if config.planner == "fast" else None
+        self._fast = FastSampler(self.diffusion.coefficients, config.backend) if config.planner == "fast" else None
         self.ema = (
             ExponentialMovingAverage(self.denoiser, config.ema_power, config.ema_inv_gamma, config.ema_max_decay)
             if config.ema
             else None
         )
         if config.compile_model:
-            # In place, so that weights keep their names, and after the average took its copy. The layers are alike, so
-            # that one is compiled and serves all: seconds instead of minutes. Static shapes: the smaller last batch of
-            # an epoch is compiled once more instead of making all others slower.
+            # In place, so that weights keep their names, and after the copy of the average. All layers share one
+            # compiled graph: seconds instead of minutes. Static shapes: the smaller last batch of an epoch is compiled
+            # separately instead of making all others slower.
             for layer in self.denoiser.layers:
                 layer.compile(dynamic=False)
         self.reset()
 
     def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Two groups, with and without weight decay; the moving average is in neither."""
+        """Two parameter groups, with and without weight decay; the moving average is in neither."""
         decayed, plain = [], []
         for name, parameter in self.denoiser.named_parameters():
             weight = parameter.ndim > 1 and not name.endswith("_position")
             (decayed if weight else plain).append(parameter)
-        # One fused kernel instead of a dozen small ones for each tensor: on a CPU half the time of the optimizer.
+        # One fused kernel instead of a dozen small ones per tensor halves the optimizer's time on a CPU.
         fused = decayed[0].device.type in ("cpu", "cuda")
         return [{"params": decayed, "fused": fused}, {"params": plain, "weight_decay": 0.0, "fused": fused}]
 
     def update(self) -> None:
-        """Moves the average; LeRobot's trainer calls this after each optimizer step.
+        """Updates the moving average; LeRobot's trainer calls this after each optimizer step.
 
         Raises:
             NonFiniteLossError: the loss of that step is NaN or infinite.
@@ -125,23 +113,23 @@ class CopolicyPolicy(PreTrainedPolicy):
         if self.ema is not None:
             self.ema.update(self.denoiser)
         self._updates += 1
-        # The trainer reads the loss next, so that waiting for it here costs nothing.
+        # The trainer reads the loss next, so synchronising with the GPU here costs nothing.
         self._require_finite_loss()
 
     def save_pretrained(self, save_directory: str | Path, **settings) -> str | None:
-        """LeRobot's, for weights that are worth keeping.
+        """LeRobot's method, with a check of the weights.
 
         Raises:
-            NonFiniteError: one of them is NaN or infinite; nothing is written.
+            NonFiniteError: a weight is NaN or infinite; nothing is written.
         """
         state = settings.get("state_dict")
-        unusable = non_finite_weight(self.state_dict() if state is None else state)
-        if unusable:
-            raise NonFiniteError(f"{save_directory}: expected finite weights to save, found {unusable}")
+        non_finite = non_finite_weight(self.state_dict() if state is None else state)
+        if non_finite:
+            raise NonFiniteError(f"{save_directory}: expected finite weights to save, found {non_finite}")
         return super().save_pretrained(save_directory, **settings)
 
     def reset(self) -> None:
-        """Forgets the history and the queued actions; call it whenever the environment is reset."""
+        """Clears the history and the queued actions; call it whenever the environment is reset."""
         self._history: dict[str, deque[Tensor]] = {
             key: deque(maxlen=self.config.n_obs_steps) for key in self.config.observation_keys
         }
@@ -151,26 +139,26 @@ class CopolicyPolicy(PreTrainedPolicy):
         """The training loss: mean squared error of the prediction over all tokens and both players.
 
         Args:
-            batch: observation columns `(B, To, n)`, action `(B, T, m)` of both players, and its padding mask
-                `(B, T)` where `do_mask_loss_for_padding` is set.
-            reduction: "mean", or "none" for one loss a sample (LeRobot's sample weighting).
+            batch: observation columns `(B, To, n)`, `action` `(B, T, m)` of both players, and its padding mask
+                `(B, T)` if `do_mask_loss_for_padding` is set.
+            reduction: "mean", or "none" for one loss per sample (LeRobot's sample weighting).
 
         Returns:
-            The loss, and an empty dict: reading another number here would make a GPU wait before the backward pass.
+            The loss, and an empty dict: reading a number here would synchronise with the GPU before the backward pass.
 
         Raises:
             InvalidValueError: a column is missing.
             ShapeError: a column has another shape.
-            RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
+            RunError: the batch has a frame of an excluded episode, or the loss of the previous step is not finite.
         """
         if self.training:
             self._require_finite_loss()
             self._require_no_excluded(batch)
         sample = self._observation(batch)
         sample[ACTION] = self._column(batch, ACTION, self.config.horizon)
-        for vary in self._symmetries if self.training else ():
-            sample = vary(sample)
-        noisy, steps, target = self.diffusion.noised(self.action_scale.scaled(sample[ACTION]))
+        for augment in self._symmetries if self.training else ():
+            sample = augment(sample)
+        noisy, steps, target = self.diffusion.add_noise(self.action_scale.scaled(sample[ACTION]))
         prediction = self.denoiser(noisy, steps, self.features(sample))
         error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
         loss = self._reduced(error, batch, reduction)
@@ -179,14 +167,14 @@ class CopolicyPolicy(PreTrainedPolicy):
         return loss, {}
 
     def _reduced(self, error: Tensor, batch: dict[str, Tensor], reduction: str) -> Tensor:
-        """The loss of errors `(B, T)`: a number, or `(B,)` one a sample for the reduction "none"."""
+        """The loss of errors `(B, T)`: a scalar, or one per sample `(B,)` for the reduction "none"."""
         if self.config.do_mask_loss_for_padding:
             if _PADDING not in batch:
                 raise InvalidValueError("batch, for do_mask_loss_for_padding", _PADDING, sorted(batch))
-            kept = (~batch[_PADDING]).to(error.dtype)
+            mask = (~batch[_PADDING]).to(error.dtype)
             if reduction == "mean":
-                return (error * kept).sum() / kept.sum()
-            return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1)
+                return (error * mask).sum() / mask.sum()
+            return (error * mask).sum(dim=1) / mask.sum(dim=1).clamp(min=1)
         return error.mean() if reduction == "mean" else error.mean(dim=1)
 
     def _require_finite_loss(self) -> None:
@@ -207,77 +195,90 @@ class CopolicyPolicy(PreTrainedPolicy):
             )
 
     @torch.no_grad()
-    def plan(
+    def sample_actions(
         self,
         batch: dict[str, Tensor],
         generator: torch.Generator | None = None,
         noise: Tensor | None = None,
         actions: int | None = None,
     ) -> Tensor:
-        """A plan for each history; keeps no state.
+        """Samples an action sequence for each history; keeps no state.
 
         Args:
             batch: observation columns `(B, To, n)`, oldest frame first, in physical units.
             generator: source of the noise; the global one if None.
-            noise: `(B, T, m)` standard normal to start from, instead of a draw.
-            actions: how many are wanted from the current frame on. The plan ends there and is the same up to there;
-                the fewer, the faster. All of them if None.
+            noise: `(B, T, m)` standard normal initial noise; drawn if None.
+            actions: number of actions from the current frame on; all if None. Fewer are faster and have equal values.
 
         Returns:
-            `(B, To - 1 + actions, m)` within the bounds of the task, a whole plan being `(B, T, m)`; token `To - 1`
-            is that of the current frame.
+            `(B, To - 1 + actions, m)` within the bounds of the task, `(B, T, m)` for all actions; index `To - 1` is the
+            action of the current frame.
 
         Raises:
-            InvalidValueError: a column is missing, or more actions are wanted than a plan holds.
+            InvalidValueError: a column is missing, or `actions` is not from 1 to T - To + 1.
             ShapeError: a column has another shape.
         """
         condition = self.features(self._observation(batch))
         shape = (len(condition), self.config.horizon, self._sizes[ACTION])
         if noise is None:
-            # On the CPU, so that a seed means the same on every device.
+            # On the CPU, so that a seed gives the same noise on every device.
             noise = torch.randn(shape, generator=generator, device="cpu" if generator is None else generator.device)
         elif noise.shape != shape:
             raise ShapeError("noise", shape, tuple(noise.shape))
         noise, tokens = noise.to(condition.device), self._tokens(actions)
         network = self.denoiser if self.ema is None else self.ema.model
         if self._fast is not None:
-            plan = self._fast.plan(network, condition, noise, tokens, generator)
+            sequence = self._fast.sample(network, condition, noise, tokens, generator)
         else:
-            plan = self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)
-        return self.action_scale.physical(plan[:, :tokens])
+            sequence = self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)
+        return self.action_scale.physical(sequence[:, :tokens])
 
     @property
     def planned_with(self) -> tuple[str, ...]:
-        """Backends that have run the network of a plan so far."""
+        """Backends that have run the network in inference so far."""
         return () if self._fast is None else tuple(sorted(self._fast.used))
 
     @torch.no_grad()
     def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
-        """The actions of a plan that are to be executed, from the current frame on.
+        """Predicts the next `n_action_steps` joint actions, from the current frame on.
 
         Args:
-            batch: whole histories `(B, To, n)`; or single frames `(B, n)`, which are appended to the history kept
-                since `reset`.
-            kwargs: `noise` to start from, see `plan`.
+            batch: whole histories `(B, To, n)`; or single frames `(B, n)`, which are appended to the history since
+                `reset`.
+            kwargs: initial `noise`, see `sample_actions`.
 
         Returns:
             `(B, n_action_steps, m)` within the bounds of the task.
         """
         if all(key in batch and self._is_frame(key, batch[key]) for key in self.config.observation_keys):
             batch = self._observe(batch)
-        plan = self.plan(batch, **kwargs, actions=self.config.n_action_steps)
-        return plan[:, self.config.n_obs_steps - 1 :]
+        sequence = self.sample_actions(batch, **kwargs, actions=self.config.n_action_steps)
+        return sequence[:, self.config.n_obs_steps - 1 :]
 
     @torch.no_grad()
     def select_action(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
-        """The action of the current frame; plans anew when the last plan's actions are used up.
+        """The joint action of the current frame n; predicts a new chunk when the queue of actions is empty.
+
+        A chunk predicted at frame n (legend: o = n_obs_steps, a = n_action_steps, T = horizon; o + a <= T + 1):
+
+            |frame                         | n-o+1 | ... | n-1 |  n  | n+1 | ... | n+a-1 | n+a | ... | n-o+T |
+            |observation is used           |  YES  | YES | YES | YES | NO  | NO  |  NO   | NO  | NO  |  NO   |
+            |human's past action is used   |  YES  | YES | YES | YES | NO  | NO  |  NO   | NO  | NO  |  NO   |
+            |robot's action is in sequence |  YES  | YES | YES | YES | YES | YES |  YES  | YES | YES |  YES  |
+            |human's action is in sequence |  YES  | YES | YES | YES | YES | YES |  YES  | YES | YES |  YES  |
+            |robot's action is executed    |  NO   | NO  | NO  | YES | YES | YES |  YES  | NO  | NO  |  NO   |
+            |human's action is executed    |  NO   | NO  | NO  | (*) | (*) | (*) |  (*)  | NO  | NO  |  NO   |
+
+        (*) in co-planning; with a person at the human's seat it is a prediction only. The human's past action of a
+        frame is the one executed in the frame before it, and is not used if `past_human_action` is false. At the start
+        of an episode the history consists of copies of the first frame. The fast sampler omits actions after n+a-1.
 
         Args:
-            batch: single frames `(B, n)`; call once a frame, so that the history has none missing.
-            kwargs: `noise` to start from, see `plan`.
+            batch: single frames `(B, n)`; call once per frame, so that the history is complete.
+            kwargs: initial `noise`, see `sample_actions`.
 
         Returns:
-            `(B, m)` within the bounds of the task.
+            `(B, m)` within the bounds of the task, the robot's action first.
         """
         history = self._observe(batch)
         if not self._queue:
@@ -285,7 +286,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         return self._queue.popleft()
 
     def _observe(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
-        """Appends a frame to the history, which starts as copies of its first frame; returns the history stacked."""
+        """Appends a frame to the history, which starts with copies of its first frame; returns it `(B, To, n)`."""
         for key, frames in self._history.items():
             frames.append(self._column(batch, key))
             while len(frames) < self.config.n_obs_steps:
@@ -293,23 +294,23 @@ class CopolicyPolicy(PreTrainedPolicy):
         return {key: torch.stack(tuple(frames), dim=1) for key, frames in self._history.items()}
 
     def _is_frame(self, key: str, values: Tensor) -> bool:
-        """Whether a column is of single frames; one of one number a frame may lack its last axis."""
+        """Whether a column has single frames; a column with one value per frame may lack its last axis."""
         return values.ndim == 2 if self._sizes[key] > 1 else values.ndim == 1 or values.shape[1:] == (1,)
 
     def _tokens(self, actions: int | None) -> int:
-        """How many tokens of a plan end with the wanted action."""
-        most = self.config.horizon - self.config.n_obs_steps + 1
-        if actions is not None and not 1 <= actions <= most:
-            raise InvalidValueError("actions", f"1 to {most}", actions)
-        return self.config.n_obs_steps - 1 + (actions or most)
+        """Length of a sequence with the given number of actions from the current frame on."""
+        limit = self.config.horizon - self.config.n_obs_steps + 1
+        if actions is not None and not 1 <= actions <= limit:
+            raise InvalidValueError("actions", f"1 to {limit}", actions)
+        return self.config.n_obs_steps - 1 + (actions or limit)
 
     def _observation(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
         return {key: self._column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
 
     def _column(self, batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
-        """A column of the batch, checked: `(B, frames, n)`, or `(B, n)` without frames.
+        """A column of the batch with its shape checked: `(B, frames, n)`, or `(B, n)` if `frames` is None.
 
-        Columns of one number a frame come from LeRobot without their last axis.
+        LeRobot drops the last axis of columns with one value per frame; it is restored.
         """
         if key not in batch:
             raise InvalidValueError("batch", f"the column {key}", sorted(batch))

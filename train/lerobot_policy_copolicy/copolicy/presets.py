@@ -1,7 +1,7 @@
-"""Named sets of values for the settings that a user left open."""
+"""Presets: named sets of values for settings of `CopolicyConfig` that are None."""
 
 PRESETS: dict[str, dict] = {
-    # The paper, exactly: everything here is in its training configuration or its section IV.
+    # The paper's settings, from its training configuration and its section IV.
     "paper": {
         "network": "transformer",
         "n_layers": 8,
@@ -27,8 +27,8 @@ PRESETS: dict[str, dict] = {
     },
 }
 
-# The paper's network, with what raises closed-loop success: predicting the actions instead of the noise (the largest
-# effect), a table-relative view of goal and obstacles, the task's symmetries, and ten deterministic sampling steps.
+# The paper's network with changes that raise closed-loop success: the network predicts the actions instead of the noise
+# (the largest effect), goal and obstacles relative to the table, the task's symmetries, and ten deterministic steps.
 PRESETS["default"] = {
     **PRESETS["paper"],
     "observation_features": "scan",
@@ -41,7 +41,7 @@ PRESETS["default"] = {
     "optimizer_grad_clip_norm": 10.0,
 }
 
-# The same on a network that a laptop trains in minutes.
+# The same with a network that a laptop trains in minutes.
 PRESETS["small"] = {
     **PRESETS["default"],
     "network": "mlp",

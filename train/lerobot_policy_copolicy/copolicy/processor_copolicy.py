@@ -1,4 +1,4 @@
-"""The processors around the co-policy: they move and batch, and leave the values alone."""
+"""The processors of the co-policy: they batch and move tensors between devices, and do not change values."""
 
 from typing import Any
 
@@ -11,9 +11,8 @@ from .configuration_copolicy import CopolicyConfig
 def make_copolicy_pre_post_processors(
     config: CopolicyConfig, dataset_stats: dict[str, dict[str, torch.Tensor]] | None = None
 ) -> tuple[PolicyProcessorPipeline[dict[str, Any], dict[str, Any]], PolicyProcessorPipeline]:
-    """LeRobot's standard pair: rename, add a batch dimension, move to the device; and back to the CPU.
+    """LeRobot's default processors without statistics: the policy itself scales, see `CopolicyConfig`.
 
-    Observations go in in px, rad and s, actions come out in [-1, 1]. `dataset_stats`, which LeRobot always passes, is
-    not used: see `CopolicyConfig` for why the scaling is in the policy.
+    Inputs and outputs are in the units of the task. `dataset_stats`, which LeRobot always passes, is not used.
     """
     return make_default_pre_post_processors(config, None)

@@ -19,6 +19,6 @@ class SinusoidalEmbedding(nn.Module):
         )
 
     def forward(self, steps: Tensor) -> Tensor:
-        """`(B,)` to `(B, size)`."""
+        """Embeds steps `(B,)` as `(B, size)`."""
         angles = steps[:, None].float() * self.frequencies
         return torch.cat((angles.sin(), angles.cos()), dim=-1)

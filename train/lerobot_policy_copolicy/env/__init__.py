@@ -1,4 +1,4 @@
-"""Tasks for two players as gymnasium environments that `lerobot-train` and `lerobot-eval` can run."""
+"""Gymnasium environments of two-player tasks, for `lerobot-train` and `lerobot-eval` too."""
 
 from .configuration import PairTaskEnvConfig
 from .configuration_table_carrying import TableCarryingEnvConfig

@@ -1,4 +1,4 @@
-"""A pair of pads as one LeRobot teleoperator, `--teleop.type=copolicy_pair`."""
+"""A pair of gamepads as one LeRobot teleoperator, `--teleop.type=copolicy_pair`."""
 
 from .config_copolicy_pair import CopolicyPairConfig
 

@@ -1,4 +1,4 @@
-"""Settings of the pair's teleoperator, and its registration with LeRobot."""
+"""Configuration of the pair's teleoperator, and its registration with LeRobot."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,15 @@ from lerobot.teleoperators.config import TeleoperatorConfig
 @TeleoperatorConfig.register_subclass("copolicy_pair")
 @dataclass
 class CopolicyPairConfig(TeleoperatorConfig):
-    """Settings of `CopolicyPair`; LeRobot finds that class in the module of this one's name without `config_`.
+    """Configuration of `CopolicyPair`; LeRobot finds that class in the module `copolicy_pair`.
 
-    Calibrations are those of `copolicy-collect`, kept by the make of a pad; `calibration_dir` names another folder.
+    Calibrations are shared with `copolicy-collect`, one per model of gamepad; `calibration_dir` names another folder.
     """
 
-    # Bind a pad to each seat by a press of any of its buttons, first the robot's, then the human's. Two pads of one
-    # make cannot be told apart otherwise. False: by the numbers below.
+    # Assign a gamepad to each seat by a press of any of its buttons, first the robot's, then the human's. Two gamepads
+    # of one model cannot be distinguished otherwise. False: assign by the numbers below.
     join: bool = True
-    # Without `join`: which pad, in the order of plugging, sits on which seat.
+    # Without `join`: number of each seat's gamepad, in the order of plugging.
     robot_pad: int = 0
     human_pad: int = 1
     # Seconds to wait for each press, and for each calibration.

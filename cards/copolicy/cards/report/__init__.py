@@ -1,4 +1,4 @@
-"""The report: one HTML page that shows a data set, with everything it needs inside."""
+"""The report of a data set: one self-contained HTML page."""
 
 from .command import add_report_command
 

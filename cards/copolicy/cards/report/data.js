@@ -1,12 +1,12 @@
-/** The data of the page: episodes, their frames, and which of them are chosen. */
+/** The data of the page: episodes and their frames. */
 
 const data = JSON.parse(byId("data").textContent);
 const COLUMNS = Object.keys(data.scales);
 const OUTLINE = data.outline;
 const [WIDTH, HEIGHT] = OUTLINE ? OUTLINE.size : [1200, 600];
-const UNIT = WIDTH / 1200; // of lines and marks in a scene
+const UNIT = WIDTH / 1200; // scale of lines and marks in a scene
 const WORDS = data.words;
-const MISSING = data.left_out; // why something is not on the page, by what the task lacks
+const MISSING = data.left_out; // notes on left out contents, by the missing part of the task
 const FRAME_SECONDS = data.frame_step / data.fps;
 
 const frameValues = decodeFrames(data.frames);
@@ -17,14 +17,14 @@ const episodes = data.episodes.map((row) => ({
   outcome: row.success ? WORDS.success : "did not",
 }));
 
-/** Little-endian 16-bit integers from base64. */
+/** Decodes little-endian 16-bit integers from base64. */
 function decodeFrames(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const view = new DataView(bytes.buffer);
   return Int16Array.from({ length: bytes.length / 2 }, (_, k) => view.getInt16(2 * k, true));
 }
 
-/** One column of an episode's frames, in units. */
+/** One column of an episode's frames, in the unit of the column. */
 function column(episode, name) {
   const offset = COLUMNS.indexOf(name);
   const values = new Float32Array(episode.frames);
@@ -36,16 +36,16 @@ function column(episode, name) {
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** Those of some entries, each with what the task must not lack before it, that are there. */
+/** Of entries `[part, entry]`, those whose part the task does not lack. */
 const offered = (entries) => entries.filter(([part]) => !MISSING[part]).map(([, entry]) => entry);
 
-/** A paragraph with why something is left out. */
-const absent = (part) => make("p", { class: "absent" }, MISSING[part]);
+/** A paragraph that states why a content is left out. */
+const missingNote = (part) => make("p", { class: "missing" }, MISSING[part]);
 
-/** A place in the scene in words. */
+/** A coordinate in the scene as text. */
 const placeText = (value) => value.toFixed(OUTLINE.decimals);
 
-/** Members of a list by the value of a function, in order of appearance. */
+/** Groups a list by the value of a function, in order of appearance. */
 function groupBy(list, key) {
   const groups = new Map();
   for (const item of list) {
@@ -56,14 +56,14 @@ function groupBy(list, key) {
   return groups;
 }
 
-/** Distinct values of an episode column, sorted as people sort. */
+/** Distinct values of an episode column, numbers in text sorted by value. */
 function distinct(name) {
   return [...new Set(episodes.map((episode) => String(episode[name] ?? "")))].sort((a, b) =>
     a.localeCompare(b, "en", { numeric: true }),
   );
 }
 
-/** Wilson's 95 % interval of a share. */
+/** Wilson's 95 % interval of a proportion. */
 function wilson(successes, n) {
   const z = 1.959963984540054;
   const p = successes / n;

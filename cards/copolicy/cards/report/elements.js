@@ -1,14 +1,14 @@
-/** Makes elements of the page; text always goes in as text, never as markup. */
+/** Creates elements of the page; text is always inserted as text, never as markup. */
 
 const byId = (id) => document.getElementById(id);
 
-/** An element with attributes, listeners (`onclick`, ...) and children (nodes or text). */
+/** Creates an element with attributes, listeners (`onclick`, ...) and children (nodes or text). */
 function make(name, attributes = {}, ...children) {
   const node = document.createElement(name);
   return fill(node, attributes, children);
 }
 
-/** The same for SVG. */
+/** Creates an SVG element; see `make`. */
 function makeSvg(name, attributes = {}, ...children) {
   return fill(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
 }
@@ -22,24 +22,24 @@ function fill(node, attributes, children) {
   return node;
 }
 
-/** Words beside a patch of a colour. */
+/** Text beside a patch of a colour. */
 function paintKey(text, paint) {
   const key = make("span", { class: "key" }, text);
   key.style.setProperty("--key", paint);
   return key;
 }
 
-/** Head and body of a table, from the texts of its columns and its rows. */
+/** Head and body of a table, from its column headings and rows. */
 const tableParts = (heads, rows) => [
   make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))),
   make("tbody", {}, ...rows),
 ];
 
-/** A table that scrolls by itself. */
+/** A table in a scrolling region. */
 const scrolling = (label, kind, attributes, heads, rows) =>
   make("div", { class: kind, tabindex: "0", role: "region", "aria-label": label }, make("table", attributes, ...tableParts(heads, rows)));
 
-/** A canvas of `width` x `height` CSS px with sharp pixels on any screen; returns its context in CSS px. */
+/** Sizes a canvas to `width` x `height` CSS px at the screen's resolution; returns its context, scaled to CSS px. */
 function sharpContext(canvas, width, height) {
   const ratio = window.devicePixelRatio || 1;
   canvas.width = Math.round(width * ratio);
@@ -50,7 +50,7 @@ function sharpContext(canvas, width, height) {
   return context;
 }
 
-/** A number with a few significant digits; a dash where there is none. */
+/** A number with `digits` significant digits; a dash for a missing one. */
 function formatNumber(value, digits = 3) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (typeof value !== "number") return String(value);
@@ -58,16 +58,16 @@ function formatNumber(value, digits = 3) {
   return Math.abs(value) >= 1000 ? Math.round(value).toLocaleString("en") : String(Number(value.toPrecision(digits)));
 }
 
-const percent = (share) => `${(100 * share).toFixed(1)} %`;
+const percent = (proportion) => `${(100 * proportion).toFixed(1)} %`;
 
-/** The value below which a share of sorted numbers lies, linear between them. */
-function quantile(sorted, share) {
+/** Quantile of sorted numbers, linearly interpolated. */
+function quantile(sorted, proportion) {
   if (!sorted.length) return null;
-  const place = share * (sorted.length - 1);
-  const low = Math.floor(place);
+  const position = proportion * (sorted.length - 1);
+  const low = Math.floor(position);
   const high = Math.min(low + 1, sorted.length - 1);
-  return sorted[low] + (place - low) * (sorted[high] - sorted[low]);
+  return sorted[low] + (position - low) * (sorted[high] - sorted[low]);
 }
 
-/** Numbers of a list in order, without what is missing. */
+/** The numbers of a list, sorted; other values are dropped. */
 const ordered = (values) => values.filter((value) => typeof value === "number").sort((a, b) => a - b);

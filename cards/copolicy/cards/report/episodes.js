@@ -1,4 +1,4 @@
-/** The sortable table of the chosen episodes. */
+/** The sortable table of the selected episodes. */
 
 const TABLE_COLUMNS = offered([
   ["", ["episode_index", "#"]],
@@ -15,18 +15,18 @@ const TABLE_COLUMNS = offered([
 ]);
 const NUMBERS = new Set(["duration_s", "force_mean", "force_p95", "replay_drift_px"]);
 const PAGE = 25;
-const order = { name: "episode_index", falling: false };
+const order = { name: "episode_index", descending: false };
 let page = 0;
 
-function showEpisodes(chosen, keepPage = false) {
+function showEpisodes(selected, keepPage = false) {
   if (!keepPage) page = 0;
-  const rows = sorted(chosen);
+  const rows = sorted(selected);
   const pages = Math.max(1, Math.ceil(rows.length / PAGE));
   page = Math.min(page, pages - 1);
   const first = page * PAGE;
   byId("episode-count").textContent = rows.length
-    ? `Episodes ${first + 1} to ${Math.min(rows.length, first + PAGE)} of ${rows.length}. Choose a heading to sort, a number to open.`
-    : "No episode fits what is chosen above.";
+    ? `Episodes ${first + 1} to ${Math.min(rows.length, first + PAGE)} of ${rows.length}. Click a heading to sort, a number to open an episode.`
+    : "No episode matches the filters above.";
   byId("episode-table").replaceChildren(
     make("thead", {}, make("tr", {}, ...TABLE_COLUMNS.map(([name, label]) => heading(name, label)))),
     make("tbody", {}, ...rows.slice(first, first + PAGE).map(episodeRow)),
@@ -39,10 +39,10 @@ function showEpisodes(chosen, keepPage = false) {
   );
 }
 
-/** The chosen episodes in the order of the table; what is missing comes last. */
-function sorted(chosen) {
-  const sign = order.falling ? -1 : 1;
-  return [...chosen].sort((a, b) => {
+/** The selected episodes in the order of the table; missing values come last. */
+function sorted(selected) {
+  const sign = order.descending ? -1 : 1;
+  return [...selected].sort((a, b) => {
     const [u, v] = [a[order.name], b[order.name]];
     if (u === null || v === null) return (u === null) - (v === null);
     const difference = typeof u === "number" ? u - v : String(u).localeCompare(String(v), "en", { numeric: true });
@@ -53,14 +53,14 @@ function sorted(chosen) {
 function heading(name, label) {
   const active = order.name === name;
   const sort = () => {
-    order.falling = active && !order.falling;
+    order.descending = active && !order.descending;
     order.name = name;
     showEpisodes(selection);
     byId("episode-table").querySelector(`button[data-column="${name}"]`).focus();
   };
-  const arrow = active ? (order.falling ? " ▼" : " ▲") : "";
+  const arrow = active ? (order.descending ? " ▼" : " ▲") : "";
   return make(
-    "th", { scope: "col", class: NUMBERS.has(name) ? "number" : "", "aria-sort": active ? (order.falling ? "descending" : "ascending") : "none" },
+    "th", { scope: "col", class: NUMBERS.has(name) ? "number" : "", "aria-sort": active ? (order.descending ? "descending" : "ascending") : "none" },
     make("button", { type: "button", "data-column": name, onclick: sort }, label + arrow),
   );
 }

@@ -1,4 +1,4 @@
-/** The bar that chooses episodes; every section shows the chosen ones. */
+/** The filter bar: every section shows the selected episodes. */
 
 const FILTERS = [
   ["source", "Source"],
@@ -11,7 +11,7 @@ const FILTERS = [
 
 let selection = episodes;
 
-/** Builds the bar; `changed` is called with the chosen episodes after each change. */
+/** Builds the filter bar; calls `changed` with the selected episodes after each change. */
 function setUpFilters(changed) {
   const form = byId("filters");
   const search = make("input", { type: "search", id: "filter-text", placeholder: `pair, ${WORDS.scenario}, uuid, flag …` });
@@ -27,11 +27,11 @@ function setUpFilters(changed) {
   form.append(make("button", { type: "reset" }, "Show all"), count);
 
   const apply = () => {
-    const wanted = [...form.querySelectorAll("select")].filter((select) => select.value !== "*");
+    const active = [...form.querySelectorAll("select")].filter((select) => select.value !== "*");
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
     selection = episodes.filter(
       (episode) =>
-        wanted.every((select) => String(episode[select.dataset.column] ?? "") === select.value) &&
+        active.every((select) => String(episode[select.dataset.column] ?? "") === select.value) &&
         words.every((word) => searchText(episode).includes(word)),
     );
     count.textContent = `${selection.length} of ${episodes.length} episodes`;

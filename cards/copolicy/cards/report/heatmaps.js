@@ -1,10 +1,10 @@
-/** Where the body was, and where the players worked against each other. */
+/** Heat maps of the body's position and of the interaction measure. */
 
 let heat = null;
 
 function setUpHeatmaps() {
-  if (!OUTLINE) return byId("heat-figures").replaceChildren(absent("outline"));
-  if (MISSING.interaction) byId("heat-force-figure").replaceChildren(absent("interaction"));
+  if (!OUTLINE) return byId("heat-figures").replaceChildren(missingNote("outline"));
+  if (MISSING.interaction) byId("heat-force-figure").replaceChildren(missingNote("interaction"));
   const options = [60, 40, 20].map((cells) => make("option", { value: WIDTH / cells, selected: cells === 40 }, formatNumber(WIDTH / cells)));
   byId("heat-cell").replaceChildren(...options);
   for (const id of ["heat-layout", "heat-cell"]) byId(id).addEventListener("input", () => showHeatmaps(selection));
@@ -14,20 +14,20 @@ function setUpHeatmaps() {
   }
 }
 
-function showHeatmaps(chosen) {
+function showHeatmaps(selected) {
   if (!OUTLINE) return;
   const select = byId("heat-layout");
-  const kept = select.value;
-  const layouts = [...groupBy(chosen, (episode) => episode.layout).keys()].sort((a, b) => a.length - b.length || a.localeCompare(b));
+  const previous = select.value;
+  const layouts = [...groupBy(selected, (episode) => episode.layout).keys()].sort((a, b) => a.length - b.length || a.localeCompare(b));
   select.replaceChildren(make("option", { value: "*" }, "all"), ...layouts.map((value) => make("option", { value }, value)));
-  select.value = layouts.includes(kept) ? kept : "*";
-  const members = select.value === "*" ? chosen : chosen.filter((episode) => episode.layout === select.value);
+  select.value = layouts.includes(previous) ? previous : "*";
+  const members = select.value === "*" ? selected : selected.filter((episode) => episode.layout === select.value);
 
   heat = accumulate(members, Number(byId("heat-cell").value));
   const visits = ordered([...heat.counts].filter((count) => count > 0));
   const most = visits.length ? visits[visits.length - 1] : 1;
-  const visitShare = (count) => (most > 1 ? Math.log(count) / Math.log(most) : 1);
-  drawHeat(byId("heat-visits"), members, (k) => visitShare(heat.counts[k]),
+  const visitProportion = (count) => (most > 1 ? Math.log(count) / Math.log(most) : 1);
+  drawHeat(byId("heat-visits"), members, (k) => visitProportion(heat.counts[k]),
     `Visitation of ${members.length} episodes; the most visited cell holds ${formatNumber(most * FRAME_SECONDS)} s`);
   showScale("heat-visits-scale", `${formatNumber(FRAME_SECONDS)} s`, `${formatNumber(most * FRAME_SECONDS)} s`);
   if (MISSING.interaction) return;
@@ -38,7 +38,7 @@ function showHeatmaps(chosen) {
   showScale("heat-force-scale", "0", `${formatNumber(strongest)} and more`);
 }
 
-/** Frames and sums of the size of the interaction measure in each cell. */
+/** Number of frames, and sum of the absolute interaction measure, in each cell. */
 function accumulate(members, cell) {
   const columns = Math.round(WIDTH / cell);
   const rows = Math.ceil(HEIGHT / cell - 1e-9);
@@ -57,12 +57,12 @@ function accumulate(members, cell) {
   return { cell, columns, rows, counts, sums };
 }
 
-function drawHeat(canvas, members, share, label) {
+function drawHeat(canvas, members, proportionAt, label) {
   canvas.setAttribute("aria-label", label);
   const context = sceneContext(canvas, canvas.clientWidth || 480);
   heat.counts.forEach((count, k) => {
     if (!count) return;
-    context.fillStyle = heatColour(share(k));
+    context.fillStyle = heatColour(proportionAt(k));
     context.fillRect((k % heat.columns) * heat.cell, Math.floor(k / heat.columns) * heat.cell, heat.cell + 0.5 * UNIT, heat.cell + 0.5 * UNIT);
   });
   drawFixed(context, members, "obstacle", [null, colour("--ink")]);

@@ -1,18 +1,18 @@
-/** Builds the page, and draws it again when episodes are chosen, colours change, or it gets another width. */
+/** Builds the page; redraws it when the selection of episodes, the colours or the width of the page change. */
 
-function show(chosen) {
-  showOverview(chosen);
-  showTrajectories(chosen);
-  showHeatmaps(chosen);
-  showPairs(chosen);
-  showTiming(chosen);
-  showFindings(chosen);
-  showEpisodes(chosen);
+function show(selected) {
+  showOverview(selected);
+  showTrajectories(selected);
+  showHeatmaps(selected);
+  showPairs(selected);
+  showTiming(selected);
+  showFindings(selected);
+  showEpisodes(selected);
 }
 
 function redraw() {
   show(selection);
-  if (byId("player").open) drawFilm();
+  if (byId("player").open) drawPlayback();
 }
 
 for (const section of document.querySelectorAll("main > section")) {

@@ -1,4 +1,4 @@
-"""The data inside the page: episodes as JSON, their frames as 16-bit integers in base64, and the words of the task."""
+"""Builds the data of the page: episodes as JSON, frames as 16-bit integers in base64, and the words of the task."""
 
 import base64
 import math
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.outline import Outline, Shape
 from copolicy.dataset.outline_figure import (
@@ -21,25 +22,25 @@ from copolicy.dataset.outline_figure import (
     decimals,
     label_colours,
     obstacles_of,
-    places_text,
+    positions_text,
 )
 from copolicy.dataset.task_spec import TIMEOUT
 
-from ..artefacts import KeptFindings, estimates, statistics_doubt
+from ..artefacts import StoredFindings, estimates, stale_statistics_reason
 from ..dataset_card import source_text
+from ..episode_frames import EpisodeFrames, read_frames
 from ..facts import DatasetFacts
-from ..frames import EpisodeFrames, read_frames
-from ..markdown import left_out
-from ..routes import route_statistics
+from ..formatting import missing_part_note
+from ..route_statistics import route_statistics
 
 FRAME_SCALES = {
     "x": 20, "y": 20, "theta": 10_000,
     "robot_fx": 32_000, "robot_fy": 32_000, "human_fx": 32_000, "human_fy": 32_000, "interaction": 20_000,
 }  # fmt: skip
-"""Integers in one unit of each column, in a scene of 1,200 px: a step is 0.05 px, 0.1 mrad, 1/32,000 of a force."""
+"""Integers per unit of each column, for a scene of 1,200 px: a step is 0.05 px, 0.1 mrad, 1/32,000 of a force."""
 
 FRAME_BYTES = 6_000_000
-"""Frames take at most this much of the page; a larger data set shows every second, third, ... frame."""
+"""Limit of the size of the frames; a larger data set shows every second, third, ... frame."""
 
 _SCENE = 1200
 _LARGEST = 32_767
@@ -49,25 +50,25 @@ _COLUMNS = (*(name for name in EPISODE_COLUMNS if name != "physics"), "episode_i
 def build_payload(
     facts: DatasetFacts,
     title: str,
-    findings: KeptFindings | None = None,
+    findings: StoredFindings | None = None,
     statistics: dict[str, Any] | None = None,
     frame_bytes: int = FRAME_BYTES,
 ) -> dict[str, Any]:
-    """Everything that the page shows, JSON-able: numbers that are not finite become null.
+    """Builds the data of the page, JSON-able; numbers that are not finite become null.
 
     Args:
-        findings: what `copolicy-dataset check` kept, None where it was not run.
-        statistics: what `copolicy-dataset stats` stored, None where it was not run.
+        findings: stored findings of `copolicy-dataset check`, None if it was not run.
+        statistics: output of `copolicy-dataset stats`, None if it was not run.
 
     Raises:
         FileFormatError: the frames cannot be read.
     """
     outline, spec, words = facts.task.outline, facts.task.spec, facts.words
     step = max(1, math.ceil(facts.info["total_frames"] * 2 * len(FRAME_SCALES) / frame_bytes))
-    missing = {} if outline else {"outline": left_out(facts.task, "outline")}
+    missing = {} if outline else {"outline": missing_part_note(facts.task, "outline")}
     if not facts.task.offers("strategy"):
-        missing["labels"] = left_out(facts.task, "strategy labels")
-    blocks: list[np.ndarray] = []
+        missing["labels"] = missing_part_note(facts.task, "strategy labels")
+    blocks: list[Array] = []
     rows: list[dict[str, Any]] = []
     scenes: dict[tuple[Shape, ...], int] = {}
     start = 0
@@ -76,14 +77,14 @@ def build_payload(
         block = _block(frames, outline, interaction)[::step]
         row = {name: _finite(episode[name]) for name in _COLUMNS} | {"from": start, "frames": len(block)}
         if outline is not None:
-            row["scene"] = scenes.setdefault(outline.fixed(frames.map_config), len(scenes))
+            row["scene"] = scenes.setdefault(outline.fixed(frames.scenario), len(scenes))
         if interaction is not None:
-            size = np.abs(interaction)
-            row |= {"force_mean": float(size.mean()), "force_p95": float(np.quantile(size, 0.95))}
+            magnitude = np.abs(interaction)
+            row |= {"force_mean": float(magnitude.mean()), "force_p95": float(np.quantile(magnitude, 0.95))}
         elif not rows:
-            missing["interaction"] = left_out(facts.task, "interaction measure")
+            missing["interaction"] = missing_part_note(facts.task, "interaction measure")
         if not rows and facts.task.path(frames.states) is None:
-            missing["drift"] = left_out(facts.task, "tracked point")
+            missing["drift"] = missing_part_note(facts.task, "tracked point")
         rows.append(row)
         blocks.append(block)
         start += len(block)
@@ -105,32 +106,32 @@ def build_payload(
         "failures": [reason for reason in spec.reasons if reason not in (*spec.successes, TIMEOUT)],
         "sides": all(set(label) <= {"L", "R"} for label in labels),
         "colours": {
-            "labels": {label: paint for label, paint in label_colours(labels).items() if label},
+            "labels": {label: label_colour for label, label_colour in label_colours(labels).items() if label},
             "seats": [ROBOT, HUMAN], "sides": [BLUE, ORANGE], "goal": GOAL, "failure": FAILURE,
         },
-        "outline": None if outline is None else _drawn(outline),
+        "outline": None if outline is None else _outline_data(outline),
         "scenes": [] if outline is None else _scenes(outline, scenes),
         "scales": scales,
         "episodes": rows,
         "frames": base64.b64encode(integers.astype("<i2").tobytes()).decode(),
         "check": None if findings is None else _check(findings),
         "statistics": None if statistics is None else estimates(statistics),
-        "statistics_doubt": statistics_doubt(statistics or {}, len(facts.episodes)),
+        "statistics_doubt": stale_statistics_reason(statistics or {}, len(facts.episodes)),
         "routes": None if routes is None else routes.to_json(),
     }  # fmt: skip
 
 
-def _check(findings: KeptFindings) -> dict[str, Any]:
-    """What the page shows of the findings; the limits and the names of all rules stay in the file."""
-    kept = {name: findings.document.get(name) for name in ("date", "rules_version", "rules", "findings")}
-    return {**kept, "state": findings.validity.state, "reason": findings.validity.reason}
+def _check(findings: StoredFindings) -> dict[str, Any]:
+    """The part of the findings that the page shows, without the limits and names of all rules."""
+    shown = {name: findings.document.get(name) for name in ("date", "rules_version", "rules", "findings")}
+    return {**shown, "state": findings.validity.state, "reason": findings.validity.reason}
 
 
-def _drawn(outline: Outline) -> dict[str, Any]:
-    """The outline without what differs between episodes."""
+def _outline_data(outline: Outline) -> dict[str, Any]:
+    """The outline without its shapes that differ between episodes."""
     body = [_polygon(outline, shape) for shape in outline.body]
-    plain = {name: getattr(outline, name) for name in ("size", "unit", "arrow", "hands")}
-    return {**plain, "body": body, "decimals": decimals(outline)}
+    fields = {name: getattr(outline, name) for name in ("size", "unit", "arrow", "hands")}
+    return {**fields, "body": body, "decimals": decimals(outline)}
 
 
 def _polygon(outline: Outline, shape: Shape) -> dict[str, Any]:
@@ -139,25 +140,25 @@ def _polygon(outline: Outline, shape: Shape) -> dict[str, Any]:
 
 
 def _scenes(outline: Outline, scenes: Iterable[tuple[Shape, ...]]) -> list[dict[str, Any]]:
-    """What stands still, and where its obstacles are in words, with their sizes where these differ."""
-    found = [(shapes, obstacles_of(shapes)) for shapes in scenes]
-    several = len({size for _, obstacles in found for _, size in obstacles}) > 1
-    listed = []
-    for shapes, obstacles in found:
+    """Fixed shapes of each scene, and a description of its obstacles, with their sizes if these differ."""
+    layouts = [(shapes, obstacles_of(shapes)) for shapes in scenes]
+    several_sizes = len({size for _, obstacles in layouts for _, size in obstacles}) > 1
+    entries = []
+    for shapes, obstacles in layouts:
         name = "no obstacle"
         if obstacles:
             sizes = [f"{width:g}" if width == height else f"{width:g} x {height:g}" for _, (width, height) in obstacles]
-            own = sizes if len(set(sizes)) > 1 else sizes[:1]
-            wide = f" of {', '.join(own)} {outline.unit}" if several else ""
-            some = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}"
-            name = f"{some}{wide} at {places_text(obstacles, outline)}"
+            distinct_sizes = sizes if len(set(sizes)) > 1 else sizes[:1]
+            size = f" of {', '.join(distinct_sizes)} {outline.unit}" if several_sizes else ""
+            count = f"{len(obstacles)} obstacle{'s' * (len(obstacles) > 1)}"
+            name = f"{count}{size} at {positions_text(obstacles, outline)}"
         polygons = [_polygon(outline, shape) for shape in shapes]
-        listed.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
-    return listed
+        entries.append({"name": name, "obstacles": len(obstacles), "shapes": polygons})
+    return entries
 
 
-def _block(frames: EpisodeFrames, outline: Outline | None, interaction: np.ndarray | None) -> np.ndarray:
-    """`(T, n)` the columns that the task offers, in the order of `FRAME_SCALES`."""
+def _block(frames: EpisodeFrames, outline: Outline | None, interaction: Array | None) -> Array:
+    """The columns `(T, n)` that the task offers, in the order of `FRAME_SCALES`."""
     columns = [] if interaction is None else [interaction[:, None]]
     if outline is not None:
         poses = outline.poses(frames.states)
@@ -166,8 +167,8 @@ def _block(frames: EpisodeFrames, outline: Outline | None, interaction: np.ndarr
     return np.hstack(columns) if columns else np.empty((len(frames.states), 0))
 
 
-def _quantised(block: np.ndarray, outline: Outline | None, measured: bool) -> tuple[dict[str, float], np.ndarray]:
-    """Integers in a unit of each column there is, and the columns `(T, n)` in them."""
+def _quantised(block: Array, outline: Outline | None, measured: bool) -> tuple[dict[str, float], Array]:
+    """Integers per unit of each existing column, and the columns `(T, n)` as such integers."""
     scales: dict[str, float] = {}
     if outline is not None:
         scales = dict(FRAME_SCALES)

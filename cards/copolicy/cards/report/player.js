@@ -1,6 +1,6 @@
-/** One episode as a film: the scene, both players' forces, and what they did to each other over time. */
+/** Plays one episode: the scene, both players' forces, and the interaction measure over time. */
 
-const film = { episode: null, columns: {}, time: 0, playing: false, clock: 0, others: [] };
+const playback = { episode: null, columns: {}, time: 0, playing: false, clock: 0, ghosts: [] };
 
 const SEAT_MARKS = ["robot", "human"].map((seat, k) => (OUTLINE?.body.some(({ role }) => role === seat) ? ["▲ ", "● "][k] : ""));
 
@@ -11,29 +11,29 @@ function setUpPlayer() {
     pause();
     history.replaceState(null, "", location.pathname + location.search);
   });
-  byId("play").addEventListener("click", () => (film.playing ? pause() : play()));
+  byId("play").addEventListener("click", () => (playback.playing ? pause() : play()));
   byId("previous").addEventListener("click", () => stepEpisode(-1));
   byId("next").addEventListener("click", () => stepEpisode(1));
   byId("scrub").addEventListener("input", (event) => { pause(); seek(Number(event.target.value)); });
-  byId("ghosts").addEventListener("input", drawFilm);
+  byId("ghosts").addEventListener("input", drawPlayback);
   byId("graph").addEventListener("pointerdown", (event) => { pause(); seekGraph(event); });
   byId("graph").addEventListener("pointermove", (event) => { if (event.buttons) seekGraph(event); });
   dialog.addEventListener("keydown", onKey);
-  const wanted = /^#episode=(\d+)$/.exec(location.hash);
-  const episode = wanted && episodes.find((one) => one.episode_index === Number(wanted[1]));
+  const match = /^#episode=(\d+)$/.exec(location.hash);
+  const episode = match && episodes.find((candidate) => candidate.episode_index === Number(match[1]));
   if (episode) openPlayer(episode);
 }
 
-/** Shows an episode from its start, in a dialog over the page. */
+/** Opens an episode at its start, in a dialog over the page. */
 function openPlayer(episode) {
   if (!OUTLINE) return;
   pause();
-  film.episode = episode;
-  film.time = 0;
-  for (const name of COLUMNS) film.columns[name] = column(episode, name);
-  film.others = episodes
-    .filter((one) => one !== episode && one.map_id === episode.map_id)
-    .map((one) => ({ episode: one, xs: column(one, "x"), ys: column(one, "y") }));
+  playback.episode = episode;
+  playback.time = 0;
+  for (const name of COLUMNS) playback.columns[name] = column(episode, name);
+  playback.ghosts = episodes
+    .filter((other) => other !== episode && other.map_id === episode.map_id)
+    .map((other) => ({ episode: other, xs: column(other, "x"), ys: column(other, "y") }));
   byId("player-title").textContent = `Episode ${episode.episode_index}`;
   const controllers = [episode.controller_0, episode.controller_1].filter(Boolean).join(" and ");
   const facts = [
@@ -47,75 +47,75 @@ function openPlayer(episode) {
   if (!dialog.open) dialog.showModal();
   history.replaceState(null, "", `#episode=${episode.episode_index}`);
   byId("play").focus();
-  drawFilm();
+  drawPlayback();
 }
 
 function stepEpisode(by) {
-  const rows = sorted(selection.includes(film.episode) ? selection : episodes);
-  openPlayer(rows[(rows.indexOf(film.episode) + by + rows.length) % rows.length]);
+  const rows = sorted(selection.includes(playback.episode) ? selection : episodes);
+  openPlayer(rows[(rows.indexOf(playback.episode) + by + rows.length) % rows.length]);
 }
 
 function play() {
-  if (film.time >= film.episode.frames - 1) film.time = 0;
-  film.playing = true;
-  film.clock = performance.now();
+  if (playback.time >= playback.episode.frames - 1) playback.time = 0;
+  playback.playing = true;
+  playback.clock = performance.now();
   showPlayButton();
   requestAnimationFrame(tick);
 }
 
 function pause() {
-  film.playing = false;
+  playback.playing = false;
   showPlayButton();
 }
 
 function showPlayButton() {
-  byId("play").textContent = film.playing ? "⏸" : "▶";
-  byId("play").setAttribute("aria-label", film.playing ? "Pause" : "Play");
+  byId("play").textContent = playback.playing ? "⏸" : "▶";
+  byId("play").setAttribute("aria-label", playback.playing ? "Pause" : "Play");
 }
 
 function tick(now) {
-  if (!film.playing) return;
+  if (!playback.playing) return;
   const speed = Number(byId("speed").value);
-  film.time = Math.min(film.episode.frames - 1, film.time + (Math.max(0, now - film.clock) / 1000) * speed / FRAME_SECONDS);
-  film.clock = now;
-  drawFilm();
-  if (film.time >= film.episode.frames - 1) pause();
+  playback.time = Math.min(playback.episode.frames - 1, playback.time + (Math.max(0, now - playback.clock) / 1000) * speed / FRAME_SECONDS);
+  playback.clock = now;
+  drawPlayback();
+  if (playback.time >= playback.episode.frames - 1) pause();
   else requestAnimationFrame(tick);
 }
 
 function seek(frame) {
-  film.time = Math.min(Math.max(0, frame), film.episode.frames - 1);
-  drawFilm();
+  playback.time = Math.min(Math.max(0, frame), playback.episode.frames - 1);
+  drawPlayback();
 }
 
 function seekGraph(event) {
   const box = byId("graph").getBoundingClientRect();
-  seek(Math.round(((event.clientX - box.left) / box.width) * (film.episode.frames - 1)));
+  seek(Math.round(((event.clientX - box.left) / box.width) * (playback.episode.frames - 1)));
 }
 
 function onKey(event) {
   const inField = event.target.matches("select, input[type=checkbox]");
   const step = event.shiftKey ? Math.round(1 / FRAME_SECONDS) : 1;
   const actions = {
-    ArrowRight: () => seek(Math.round(film.time) + step),
-    ArrowLeft: () => seek(Math.round(film.time) - step),
+    ArrowRight: () => seek(Math.round(playback.time) + step),
+    ArrowLeft: () => seek(Math.round(playback.time) - step),
     Home: () => seek(0),
-    End: () => seek(film.episode.frames - 1),
-    " ": () => (film.playing ? pause() : play()),
+    End: () => seek(playback.episode.frames - 1),
+    " ": () => (playback.playing ? pause() : play()),
     n: () => stepEpisode(1),
     p: () => stepEpisode(-1),
   };
   const action = actions[event.key];
-  // A focused button keeps its own meaning of the space bar, but for the one that does the same.
+  // The space bar activates a focused button, except the play button, which it toggles anyway.
   if (!action || inField || (event.key === " " && event.target.matches("button:not(#play)"))) return;
   event.preventDefault();
   if (event.key !== " ") pause();
   action();
 }
 
-/** A column between frames; angles the shorter way round. */
+/** Interpolates a column between frames; angles along the shorter arc. */
 function at(name, time) {
-  const values = film.columns[name];
+  const values = playback.columns[name];
   const low = Math.floor(time);
   const high = Math.min(low + 1, values.length - 1);
   let difference = values[high] - values[low];
@@ -123,14 +123,14 @@ function at(name, time) {
   return values[low] + (time - low) * difference;
 }
 
-function drawFilm() {
-  const { episode, time } = film;
+function drawPlayback() {
+  const { episode, time } = playback;
   if (!episode) return;
   const canvas = byId("stage");
   const context = sceneContext(canvas, canvas.clientWidth);
   for (const role of ["goal", "obstacle", "start"]) drawFixed(context, [episode], role);
-  if (byId("ghosts").checked) for (const path of film.others) drawPath(context, path, 0.3, 2.5);
-  const { x: xs, y: ys, theta } = film.columns;
+  if (byId("ghosts").checked) for (const path of playback.ghosts) drawPath(context, path, 0.3, 2.5);
+  const { x: xs, y: ys, theta } = playback.columns;
   const end = Math.floor(time) + 1;
   OUTLINE.hands.forEach((grip, seat) => {
     const points = Array.from({ length: end }, (_, k) => onScreen([xs[k], ys[k], theta[k]], grip));
@@ -139,8 +139,8 @@ function drawFilm() {
     strokePath(context, points.map(([u]) => u), points.map(([, v]) => v));
   });
   const pose = ["x", "y", "theta"].map((name) => at(name, time));
-  const held = Math.floor(time); // an action holds until the next frame
-  const force = (seat) => ["fx", "fy"].map((axis) => film.columns[`${seat}_${axis}`][held]);
+  const frame = Math.floor(time); // an action applies until the next frame
+  const force = (seat) => ["fx", "fy"].map((axis) => playback.columns[`${seat}_${axis}`][frame]);
   drawBody(context, pose);
   drawForce(context, pose, 0, force("robot"));
   drawForce(context, pose, 1, force("human"));
@@ -149,35 +149,35 @@ function drawFilm() {
   const seconds = (time * FRAME_SECONDS).toFixed(1);
   const total = ((episode.frames - 1) * FRAME_SECONDS).toFixed(1);
   byId("player-readout").textContent =
-    `${seconds} of ${total} s · robot seat ${SEAT_MARKS[0]}${size("robot")} · human seat ${SEAT_MARKS[1]}${size("human")}${interactionText(held)}`;
+    `${seconds} of ${total} s · robot seat ${SEAT_MARKS[0]}${size("robot")} · human seat ${SEAT_MARKS[1]}${size("human")}${interactionText(frame)}`;
   byId("scrub").value = Math.round(time);
   byId("scrub").setAttribute("aria-valuetext", `${seconds} of ${total} seconds`);
 }
 
-/** ` · interaction 0.12 (pulling apart)`; nothing where the task measures none. */
+/** ` · interaction 0.12 (pulling apart)`; empty if the task has no interaction measure. */
 function interactionText(frame) {
   if (MISSING.interaction) return "";
-  const value = film.columns.interaction[frame];
+  const value = playback.columns.interaction[frame];
   const [apart, together, agreed] = WORDS.interaction_senses;
   return ` · interaction ${value.toFixed(2)} (${value > 0.02 ? apart : value < -0.02 ? together : agreed})`;
 }
 
-/** Interaction (signed, upper half) and both players' sizes of force (lower half) over time. */
+/** Interaction measure (signed, upper half) and magnitudes of both forces (lower half) over time. */
 function drawGraph() {
   const canvas = byId("graph");
   const [width, height] = [canvas.clientWidth, 150];
   const context = sharpContext(canvas, width, height);
-  const place = (k) => (k / Math.max(1, film.episode.frames - 1)) * width;
+  const xAt = (k) => (k / Math.max(1, playback.episode.frames - 1)) * width;
   context.fillStyle = colour("--floor");
   context.fillRect(0, 0, width, height);
-  const xs = Array.from({ length: film.episode.frames }, (_, k) => place(k));
+  const xs = Array.from({ length: playback.episode.frames }, (_, k) => xAt(k));
   context.font = "12px system-ui, sans-serif";
   if (!MISSING.interaction) drawInteraction(context, xs, width);
   context.strokeStyle = colour("--line");
   context.lineWidth = 1;
   strokePath(context, [0, width], [height - 1, height - 1]);
   ["robot", "human"].forEach((seat, k) => {
-    const [fx, fy] = [film.columns[`${seat}_fx`], film.columns[`${seat}_fy`]];
+    const [fx, fy] = [playback.columns[`${seat}_fx`], playback.columns[`${seat}_fy`]];
     context.strokeStyle = SEAT_COLOURS[k];
     context.lineWidth = 2;
     context.setLineDash(k ? [6, 3] : []);
@@ -185,14 +185,14 @@ function drawGraph() {
   });
   context.setLineDash([]);
   context.fillStyle = colour("--muted");
-  context.fillText("size of force: robot seat (line), human seat (dashes)", 6, 103);
+  context.fillText("magnitude of force: robot seat (line), human seat (dashes)", 6, 103);
   context.strokeStyle = colour("--ink");
   context.lineWidth = 1.5;
-  strokePath(context, [place(film.time), place(film.time)], [0, height]);
+  strokePath(context, [xAt(playback.time), xAt(playback.time)], [0, height]);
 }
 
 function drawInteraction(context, xs, width) {
-  const { interaction } = film.columns;
+  const { interaction } = playback.columns;
   const strongest = Math.max(0.25, ...interaction.map(Math.abs));
   const centre = 45;
   const ys = Array.from(interaction, (value) => centre - (value / strongest) * 38);

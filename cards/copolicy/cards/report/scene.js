@@ -1,6 +1,6 @@
-/** Draws a scene into a canvas whose context is scaled to its unit. */
+/** Draws a scene on a canvas, in the unit of the scene. */
 
-/** A context in the unit of the scene, over an empty floor. */
+/** Clears a canvas to an empty floor; returns its context, scaled to the unit of the scene. */
 function sceneContext(canvas, width) {
   const context = sharpContext(canvas, width, (width * HEIGHT) / WIDTH);
   context.scale(width / WIDTH, width / WIDTH);
@@ -16,14 +16,14 @@ function tracePolygon(context, corners) {
   context.closePath();
 }
 
-/** How what stands still is drawn, by its role: colour of the area, and of the line around it. */
+/** Fill and line colour of a fixed shape, by its role. */
 const FIXED = {
   goal: () => [`${GOAL_COLOUR}44`, GOAL_COLOUR],
   start: () => [null, colour("--muted")],
   obstacle: () => [colour("--obstacle"), null],
 };
 
-/** Those shapes of some episodes that have a role, each once; `paints` are the colours of area and line. */
+/** Draws the fixed shapes of episodes with a role, each once; `paints` are the colours of fill and line. */
 function drawFixed(context, members, role, paints = FIXED[role]()) {
   const [area, line] = paints;
   context.lineWidth = 3 * UNIT;
@@ -39,13 +39,13 @@ function drawFixed(context, members, role, paints = FIXED[role]()) {
   }
 }
 
-/** Position in the scene of a point of the body; theta turns counter-clockwise on screen. */
+/** Position in the scene of a point of the body; positive theta is counter-clockwise on screen. */
 function onScreen([x, y, theta], [u, v]) {
   const [c, s] = [Math.cos(theta), Math.sin(theta)];
   return [x + u * c + v * s, y - u * s + v * c];
 }
 
-/** What moves, at a pose (x, y, theta). */
+/** Draws the body at a pose (x, y, theta). */
 function drawBody(context, pose) {
   const paints = { body: ["#b28458", "#74502f"], robot: [SEAT_COLOURS[0], colour("--ink")], human: [SEAT_COLOURS[1], colour("--ink")] };
   context.lineWidth = 3 * UNIT;
@@ -57,7 +57,7 @@ function drawBody(context, pose) {
   }
 }
 
-/** A player's force as an arrow from where that player holds the body. */
+/** Draws a player's force as an arrow from that player's grip on the body. */
 function drawForce(context, pose, seat, [fx, fy]) {
   const size = Math.hypot(fx, fy);
   if (size < 0.03) return;
@@ -76,7 +76,7 @@ function drawForce(context, pose, seat, [fx, fy]) {
   }
 }
 
-/** A line through points given as two columns, up to `end`. */
+/** Draws a line through points given as two columns, up to `end`. */
 function strokePath(context, xs, ys, end = xs.length) {
   context.beginPath();
   for (let k = 0; k < end; k++) {

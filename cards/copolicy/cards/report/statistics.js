@@ -1,10 +1,10 @@
-/** What `copolicy-dataset stats` computed, each statistic with its interval and what chance alone would give. */
+/** The output of `copolicy-dataset stats`: each statistic with its interval and null distribution. */
 
 function showStatistics() {
-  const place = byId("statistic-list");
+  const container = byId("statistic-list");
   if (!data.statistics) {
-    place.replaceChildren(
-      make("p", { class: "absent" }, "copolicy-dataset stats was not run on this data set: no multimodality statistics."),
+    container.replaceChildren(
+      make("p", { class: "missing" }, "copolicy-dataset stats was not run on this data set: no multimodality statistics."),
     );
     return;
   }
@@ -23,16 +23,16 @@ function showStatistics() {
       make("td", {}, entry.note ?? ""),
     ),
   );
-  const heads = ["Statistic", "Value", "Unit", "95 % interval", "By chance", "Episodes", "Note"];
-  place.replaceChildren(
-    ...statisticsDoubt(),
-    make("p", {}, `All episodes of the data set, whatever is chosen above. ${entries.length} statistics.`),
+  const heads = ["Statistic", "Value", "Unit", "95 % interval", "Null distribution", "Episodes", "Note"];
+  container.replaceChildren(
+    ...staleStatisticsNote(),
+    make("p", {}, `${entries.length} statistics of all episodes of the data set; the filters above do not apply.`),
     scrolling("Statistics", "scroll", {}, heads, rows),
   );
 }
 
-/** Why the stored statistics may be those of other data, as a list of at most one paragraph. */
-function statisticsDoubt() {
+/** A note if the stored statistics do not describe the data set, as a list of at most one paragraph. */
+function staleStatisticsNote() {
   if (!data.statistics_doubt) return [];
-  return [make("p", { class: "doubt", role: "note" }, make("strong", {}, "These statistics are stale. "), data.statistics_doubt)];
+  return [make("p", { class: "stale", role: "note" }, make("strong", {}, "These statistics are stale. "), data.statistics_doubt)];
 }

@@ -1,39 +1,39 @@
-/** How well the recording kept its clock, and how well a re-simulation follows the recorded path. */
+/** Timing of the recording, and distance of the re-simulation from the recorded path. */
 
 const TIMING = offered([
   ["", ["achieved_hz", "Achieved rate", "Hz"]],
-  ["", ["late_ticks", "Late ticks", "an episode"]],
+  ["", ["late_ticks", "Late ticks", "per episode"]],
   ["drift", ["replay_drift_px", "Re-simulation drift", OUTLINE?.unit]],
 ]);
 
-function showTiming(chosen) {
-  const rates = ordered(chosen.map((episode) => episode.achieved_hz));
-  const late = sumOf(chosen, "late_ticks");
-  const lateIn = chosen.filter((episode) => episode.late_ticks > 0).length;
-  const drifts = ordered(chosen.map((episode) => episode.replay_drift_px));
+function showTiming(selected) {
+  const rates = ordered(selected.map((episode) => episode.achieved_hz));
+  const late = sumOf(selected, "late_ticks");
+  const lateIn = selected.filter((episode) => episode.late_ticks > 0).length;
+  const drifts = ordered(selected.map((episode) => episode.replay_drift_px));
   const sentences = [
     rates.length
       ? `Recorded at ${formatNumber(rates[0], 4)} to ${formatNumber(rates[rates.length - 1], 4)} Hz of ${data.record_hz} Hz.`
       : "No rate was recorded.",
-    `${formatNumber(late)} late ticks in ${lateIn} of ${chosen.length} episodes.`,
+    `${formatNumber(late)} late ticks in ${lateIn} of ${selected.length} episodes.`,
     drifts.length
       ? `Recorded and re-simulated positions are at most ${formatNumber(drifts[drifts.length - 1])} ${OUTLINE?.unit} apart.`
-      : MISSING.drift ?? "Re-simulation drift is not known.",
+      : MISSING.drift ?? "Re-simulation drift is unknown.",
   ];
-  if (chosen.some((episode) => episode.source === "simulated")) {
-    sentences.push("Simulated pairs have no clock that could be late: their rate is exact by construction.");
+  if (selected.some((episode) => episode.source === "simulated")) {
+    sentences.push("Simulated pairs are not recorded in real time: their rate is exact.");
   }
   byId("timing-text").textContent = sentences.join(" ");
-  byId("timing-plots").replaceChildren(...TIMING.map(([name, label, unit]) => histogram(chosen, name, label, unit)));
+  byId("timing-plots").replaceChildren(...TIMING.map(([name, label, unit]) => histogram(selected, name, label, unit)));
 }
 
 const BINS = 24;
 
-/** Counts of one episode column. */
-function histogram(chosen, name, label, unit) {
-  const values = ordered(chosen.map((episode) => episode[name]));
+/** Histogram of one episode column. */
+function histogram(selected, name, label, unit) {
+  const values = ordered(selected.map((episode) => episode[name]));
   const caption = make("figcaption", {}, make("strong", {}, label), `, ${unit}`);
-  if (!values.length) return make("figure", {}, caption, make("p", {}, "Not known for any of these episodes."));
+  if (!values.length) return make("figure", {}, caption, make("p", {}, "Unknown for all of these episodes."));
   const [low, high] = [values[0], values[values.length - 1]];
   if (high - low < 1e-6) {
     const text = high === low ? formatNumber(low, 4) : `At most ${formatNumber(high)}`;

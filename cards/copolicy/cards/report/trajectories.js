@@ -1,20 +1,20 @@
-/** Paths, one panel for each set of obstacles or scenario. */
+/** Paths of the episodes, one panel per set of obstacles or scenario. */
 
 const FIRST_PANELS = 12;
 let panelLimit = FIRST_PANELS;
 
 function setUpTrajectories() {
-  if (!OUTLINE) return byId("trajectory-figures").replaceChildren(absent("outline"));
+  if (!OUTLINE) return byId("trajectory-figures").replaceChildren(missingNote("outline"));
   byId("grouping").addEventListener("input", () => {
     panelLimit = FIRST_PANELS;
     showTrajectories(selection);
   });
 }
 
-function showTrajectories(chosen) {
+function showTrajectories(selected) {
   if (!OUTLINE) return;
   const key = byId("grouping").value === "map" ? (episode) => episode.map_id : (episode) => episode.layout;
-  const groups = [...groupBy(chosen, key)].sort(
+  const groups = [...groupBy(selected, key)].sort(
     (a, b) => a[1][0].scene.obstacles - b[1][0].scene.obstacles || a[0].localeCompare(b[0], "en", { numeric: true }),
   );
   const panels = byId("panels");
@@ -34,8 +34,8 @@ function showTrajectories(chosen) {
 }
 
 function trajectoryPanel(name, members) {
-  const labelled = MISSING.labels ? [] : [...groupBy(members, (episode) => episode.route_class ?? "")];
-  const counts = labelled.sort((a, b) => b[1].length - a[1].length).map(([label, some]) => [label, `${label || `no ${WORDS.label}`} ${some.length}`]);
+  const byLabel = MISSING.labels ? [] : [...groupBy(members, (episode) => episode.route_class ?? "")];
+  const counts = byLabel.sort((a, b) => b[1].length - a[1].length).map(([label, labelled]) => [label, `${label || `no ${WORDS.label}`} ${labelled.length}`]);
   const words = counts.length ? `; ${WORDS.label}s ${counts.map(([, text]) => text).join(", ")}` : "";
   const canvas = make("canvas", { role: "img", "aria-label": `${name}: ${members.length} episodes${words}` });
   const legend = make("p", { class: "legend" }, ...counts.map(([label, text]) => paintKey(text, labelColour(label))));
@@ -53,28 +53,28 @@ function trajectoryPanel(name, members) {
   const nearest = (event) => {
     const box = canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((value) => (value * WIDTH) / box.width);
-    let [best, found] = [(30 * UNIT) ** 2, null];
+    let [best, closest] = [(30 * UNIT) ** 2, null];
     for (const path of paths) {
       for (let k = 0; k < path.xs.length; k++) {
         const distance = (path.xs[k] - x) ** 2 + (path.ys[k] - y) ** 2;
-        if (distance < best) [best, found] = [distance, path];
+        if (distance < best) [best, closest] = [distance, path];
       }
     }
-    return found;
+    return closest;
   };
   let near = null;
   canvas.addEventListener("pointermove", (event) => {
-    const found = nearest(event);
-    if (found === near) return;
-    near = found;
+    const path = nearest(event);
+    if (path === near) return;
+    near = path;
     canvas.style.cursor = near ? "pointer" : "";
     canvas.title = near ? episodeName(near.episode) : "";
     draw(near);
   });
   canvas.addEventListener("pointerleave", () => draw((near = null)));
   canvas.addEventListener("click", (event) => {
-    const found = nearest(event);
-    if (found) openPlayer(found.episode);
+    const path = nearest(event);
+    if (path) openPlayer(path.episode);
   });
   return { figure, draw };
 }
@@ -92,11 +92,11 @@ function drawPath(context, { episode, xs, ys }, opacity, width) {
   for (const side of [-10 * UNIT, 10 * UNIT]) strokePath(context, [x - 10 * UNIT, x + 10 * UNIT], [y - side, y + side]);
 }
 
-/** What an episode is called where a line must do. */
+/** Name of an episode in one line. */
 function episodeName(episode) {
   const pair = episode.pair_id ? `, pair ${episode.pair_id}` : "";
   return `Episode ${episode.episode_index}${pair}, ${episode.map_id}, ${labelText(episode)}${episode.outcome}`;
 }
 
-/** `route LR, `; nothing where the task has no labels. */
+/** `route LR, `; empty if the task has no labels. */
 const labelText = (episode) => (MISSING.labels ? "" : `${WORDS.label} ${episode.route_class || "none"}, `);

@@ -1,6 +1,6 @@
-"""Who can act at a seat: a person, a simulated player, an earlier recording, a policy.
+"""Agents that act at a seat: a person, a scripted player, an earlier recording, a policy.
 
-Names are loaded when they are asked for: flags need none of them.
+Modules are imported when a name is first used, since command-line flags need none of them.
 """
 
 from typing import TYPE_CHECKING
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from .checkpoint_folder import load_policy
     from .people import PersonAgent
     from .policy import Policy, PolicyAgent
-    from .replay import HeldAgent, RecordedAgent, ReplayAgent
+    from .replay import ConstantAgent, RecordedAgent, ReplayAgent
     from .scripted import ScriptedAgent
 
 __all__ = [
-    "HeldAgent",
+    "ConstantAgent",
     "PersonAgent",
     "Policy",
     "PolicyAgent",
@@ -28,7 +28,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        **dict.fromkeys(("HeldAgent", "RecordedAgent", "ReplayAgent"), "replay"),
+        **dict.fromkeys(("ConstantAgent", "RecordedAgent", "ReplayAgent"), "replay"),
         **dict.fromkeys(("Policy", "PolicyAgent"), "policy"),
         "PersonAgent": "people",
         "ScriptedAgent": "scripted",

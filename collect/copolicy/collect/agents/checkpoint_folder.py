@@ -1,4 +1,4 @@
-"""Where a policy lies on the disk: in a checkpoint, in a training run, or beside LeRobot's plugin of this package."""
+"""Folders of policies: a checkpoint, a training run, or the model that comes with the package."""
 
 from collections.abc import Mapping
 from importlib.metadata import entry_points
@@ -12,21 +12,20 @@ from copolicy.dataset.files.listing import is_hidden
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 
 PRETRAINED = "pretrained"
-"""In the place of a path: the model that comes with the package."""
+"""Name that replaces a path: the model that comes with the package."""
 
 _PLUGIN = "lerobot_policy_copolicy"
 _ENTRY_POINTS = "copolicy.policies"
 
 
 def load_policy(path: Path | str, device: str = "cpu", settings: Mapping[str, Any] | None = None) -> Any:
-    """A policy as it can act at a seat: a `Policy` with the `TrainingConditions` that it learned at, `conditions`.
+    """Loads a `Policy`, with its `TrainingConditions` as the attribute `conditions`.
 
-    Collecting needs no torch: what loads a checkpoint is found by its name, `lerobot`, in the entry point group
-    `copolicy.policies`.
+    The loader is the entry point `lerobot` of the group `copolicy.policies`, so that collecting needs no torch.
 
     Args:
         path: see `checkpoint_folder`.
-        device: where it predicts.
+        device: torch device of the policy.
         settings: fields of the policy's configuration to change, such as `num_inference_steps`.
 
     Raises:
@@ -40,14 +39,14 @@ def load_policy(path: Path | str, device: str = "cpu", settings: Mapping[str, An
 
 
 def checkpoint_folder(path: Path | str) -> Path:
-    """The folder with `config.json` and `model.safetensors`.
+    """Finds the folder with `config.json` and `model.safetensors`.
 
     Args:
-        path: that folder, one that holds `pretrained_model`, that of a training run (its newest checkpoint, see
-            `find_policy_folder`), or `pretrained`.
+        path: that folder, a folder with `pretrained_model` in it, the folder of a training run (its newest checkpoint,
+            see `find_policy_folder`), or `pretrained`.
 
     Raises:
-        FileFormatError: there is none.
+        FileFormatError: there is no checkpoint.
     """
     if str(path) == PRETRAINED:
         return pretrained_folder()
@@ -56,32 +55,28 @@ def checkpoint_folder(path: Path | str) -> Path:
     if folder is not None:
         return folder
     expected = f"a checkpoint folder with {' and '.join(POLICY_FILES)}"
-    raise FileFormatError(path, expected, _found(path) or "an empty folder")
+    found = "no such folder"
+    if path.is_dir():
+        names = sorted(entry.name for entry in path.iterdir() if not is_hidden(entry.name))
+        found = ", ".join(names[:8]) or "an empty folder"
+    raise FileFormatError(path, expected, found)
 
 
 def pretrained_folder() -> Path:
     """The folder of the model that comes with the package.
 
-    The plugin is found by its name, as LeRobot finds it, and not imported: that takes LeRobot, a path does not.
+    The plugin is located without importing it, since its import needs LeRobot.
 
     Raises:
         FileFormatError: this installation lacks the plugin or its model.
     """
     spec = find_spec(_PLUGIN)
-    places = list((spec and spec.submodule_search_locations) or ())
-    if not places:
+    locations = list((spec and spec.submodule_search_locations) or ())
+    if not locations:
         raise FileFormatError(PRETRAINED, f"the package {_PLUGIN} with its model", "no such package")
-    folder = Path(places[0]) / PRETRAINED
+    folder = Path(locations[0]) / PRETRAINED
     missing = [name for name in POLICY_FILES if not (folder / name).is_file()]
     if missing:
         found = f"none named {' and '.join(missing)}; reinstall {_PLUGIN}, or name a checkpoint of your own"
         raise FileFormatError(folder, "the model that comes with the package", found)
     return folder
-
-
-def _found(path: Path) -> str:
-    return (
-        ", ".join(sorted(entry.name for entry in path.iterdir() if not is_hidden(entry.name))[:8])
-        if path.is_dir()
-        else "no such folder"
-    )

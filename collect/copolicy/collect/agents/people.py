@@ -1,15 +1,16 @@
-"""People: a joystick, or one half of the keyboard."""
+"""A person as an agent, with a gamepad or one half of the keyboard."""
 
 import time
 from collections.abc import Callable
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, RunError
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task_spec import Vector
 
-from ..inputs import InputSample, KeyboardHalf, Pad, RestWatch, StickCalibration, keyboard_force
+from ..inputs import Gamepad, InputSample, KeyboardHalf, RestOffsetDetector, StickCalibration, keyboard_force
 from ..rollout import Agent
 
 Force = tuple[float, float]
@@ -18,13 +19,13 @@ _PLANE = Vector(("x", "y"), ("a player's full force",) * 2, (-1.0, -1.0), (1.0, 
 
 
 class PersonAgent(Agent):
-    """A person with a device in hand; which one can change whenever it is unplugged.
+    """A person with an input device, which can be replaced when it is unplugged.
 
-    The device is read in `act` itself, so a reading serves one step and no other. An action of two numbers is where the
-    stick stands, x and y; one of one number is its x, to the right positive. Full deflection is the bound of a number.
+    `act` reads the device, so that each reading is used for one step. An action of two numbers is the deflection of the
+    stick, x and y; an action of one number is its x, positive to the right. Full deflection is the bound of a number.
 
     Attributes:
-        name: of the kind of device.
+        name: kind of the device.
     """
 
     is_person = True
@@ -32,52 +33,53 @@ class PersonAgent(Agent):
     def __init__(self, name: str, clock: Callable[[], int] = time.monotonic_ns, action: Vector = _PLANE):
         """
         Args:
-            action: of one player of the task.
+            clock: monotonic time, ns.
+            action: vector of one player's action in the task.
 
         Raises:
-            InvalidValueError: it has more numbers than a stick, or a player cannot rest.
+            InvalidValueError: the action has more numbers than a stick, or its bounds exclude 0.
         """
         if not (len(action) in (1, 2) and all(low <= 0 <= high for low, high in zip(*action.bounds, strict=True))):
-            expected = "a task whose players act by one or two numbers that can be 0: a stick has no more"
+            expected = "a task with actions of one or two numbers that can be 0, as a stick has"
             raise InvalidValueError(f"--players {name}", expected, action.names)
         self.name = name
         self._bounds = action.bounds
-        self._device: Pad | KeyboardHalf | None = None
+        self._device: Gamepad | KeyboardHalf | None = None
         self._calibration = StickCalibration()
-        self._rest = RestWatch()
+        self._rest_detector = RestOffsetDetector()
         self._clock = clock
 
     @property
-    def device(self) -> Pad | KeyboardHalf | None:
-        """Joystick or half of the keyboard; None until somebody has joined with one."""
+    def device(self) -> Gamepad | KeyboardHalf | None:
+        """Gamepad or half of the keyboard; None until the player has joined."""
         return self._device
 
     @device.setter
-    def device(self, device: Pad | KeyboardHalf | None) -> None:
-        self._device, self._rest = device, RestWatch()
+    def device(self, device: Gamepad | KeyboardHalf | None) -> None:
+        self._device, self._rest_detector = device, RestOffsetDetector()
 
     @property
     def calibration(self) -> StickCalibration:
-        """Of a joystick."""
+        """Calibration of the stick."""
         return self._calibration
 
     @calibration.setter
     def calibration(self, calibration: StickCalibration) -> None:
-        self._calibration, self._rest = calibration, RestWatch()
+        self._calibration, self._rest_detector = calibration, RestOffsetDetector()
 
     @property
     def push_at_rest(self) -> float:
-        """How hard the stick pushes while nobody touches it, share of the full force; 0 where it does not."""
-        return self._rest.push
+        """Force of the stick at rest, as a proportion of the full force; 0 for a centred stick."""
+        return self._rest_detector.force
 
     def watch_rest(self) -> None:
-        """Looks at the stick between the episodes; once a tick."""
+        """Measures the stick between episodes; called once a tick."""
         if self._has_stick:
-            still = RestWatch.MEASURED if self.calibration.measured else RestWatch.BETWEEN
-            self._rest.add(self.force(self.sample()), still)
+            still = RestOffsetDetector.MEASURED if self.calibration.measured else RestOffsetDetector.UNMEASURED
+            self._rest_detector.add(self.force(self.sample()), still)
 
     def sample(self) -> InputSample:
-        """What the device says now.
+        """Reads the device.
 
         Raises:
             RunError: there is no device.
@@ -87,16 +89,16 @@ class PersonAgent(Agent):
         return self.device.sample(self._clock())
 
     def force(self, sample: InputSample) -> Force:
-        """The force that a sample stands for."""
+        """The force of a sample, x and y in [-1, 1]."""
         device = self.device
-        return device.force(sample, self.calibration) if isinstance(device, Pad) else keyboard_force(sample)
+        return device.force(sample, self.calibration) if isinstance(device, Gamepad) else keyboard_force(sample)
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Reads the device, right after the event queue was pumped."""
+    def act(self, states: Array, worlds: Array) -> Array:
+        """Reads the device; the event queue must have been pumped just before."""
         sample = self.sample()
         force = self.force(sample)
         if self._has_stick and not self.calibration.measured:
-            self._rest.add(force, RestWatch.CARRYING)
+            self._rest_detector.add(force, RestOffsetDetector.IN_EPISODE)
         age = self._clock() - sample.time_ns
         self.input = PlayerInput(axes=sample.positions, buttons=sample.buttons, age_ns=age)
         low, high = self._bounds
@@ -106,4 +108,4 @@ class PersonAgent(Agent):
     @property
     def _has_stick(self) -> bool:
         device = self.device
-        return isinstance(device, Pad) and not device.steering(self.calibration).digital
+        return isinstance(device, Gamepad) and not device.steering(self.calibration).digital

@@ -1,4 +1,4 @@
-"""A policy at a seat: history on the data set's grid of frames, action chunks, zero-order hold, replanning."""
+"""A policy as an agent: history of frames, action chunks, zero-order hold, replanning."""
 
 import copy
 import time
@@ -8,25 +8,26 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import frame_actions, stride
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import PairTask, get_task
 
-from ..rollout import Agent, Start
+from ..rollout import Agent, EpisodeStart
 
 
 class Policy(Protocol):
-    """A policy for both players: what `load_policy` gives.
+    """A policy for the joint action of both players, as `load_policy` returns it.
 
     Attributes:
-        name: in recordings.
+        name: name in recordings.
         task: name of the task that it learned.
-        n_obs_steps: frames of history that it wants.
+        n_obs_steps: frames of history in an observation.
         n_action_steps: actions of a chunk that are executed before the next chunk.
         fps: frames a second of the data that it learned from.
-        keeps_history: it remembers frames itself: it must see each one, always of all worlds, and gives one action.
+        keeps_history: it stores past frames itself, so it is called for each frame of all worlds; returns one action.
     """
 
     name: str
@@ -37,45 +38,45 @@ class Policy(Protocol):
     keeps_history: bool
 
     def reset(self, seed: int, /) -> None:
-        """Episodes begin: forgets, and sets the source of what it draws at random."""
+        """Clears the history and seeds the random numbers, before episodes begin."""
         ...
 
-    def predict_action_chunk(self, observations: dict[str, np.ndarray], /) -> np.ndarray:
-        """Joint actions `(B, actions, 2 m)` from the newest frame on, from observations `(B, n_obs_steps, n)`."""
+    def predict_action_chunk(self, observations: dict[str, Array], /) -> Array:
+        """Joint actions `(B, actions, 2 m)` from the newest frame on, for observations `(B, n_obs_steps, n)`."""
         ...
 
 
 class _Chunk(NamedTuple):
-    frame: int  # that its first action is for
-    worlds: np.ndarray  # that it was predicted for
-    actions: np.ndarray  # (worlds, actions, 2 m)
+    frame: int  # of its first action
+    worlds: Array  # for which it was predicted
+    actions: Array  # (worlds, actions, 2 m)
     observed_ns: int
-    seconds: float
+    seconds: float  # of inference
 
 
 class PolicyAgent(Agent):
     """Executes its seat's half of a policy's action chunks (receding horizon).
 
-        frame     0     1     2     3     4        of a policy of 10 Hz: three steps each
-        observe   o0    o1    o2    o3    o4       state, and the partner's action of the frame before
+        frame     0     1     2     3     4        of a policy at 10 Hz: three steps each
+        observe   o0    o1    o2    o3    o4       state, and the partner's action of the previous frame
         chunk A   a0    a1    a2    ..
-        chunk B                     b0    b1       the world waits: predicted where A's n_action_steps are executed
-        chunk B               (o2)  b1    b2       in real time: asked for one frame before; b0 is due meanwhile
+        chunk B                     b0    b1       simulated time: predicted after n_action_steps actions of A
+        chunk B               (o2)  b1    b2       real time: requested one frame earlier; b0 is due during inference
 
-    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. All worlds
-    get their chunks from one call of the policy.
+    A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. One call
+    of the policy predicts the chunks of all worlds.
 
     In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
-    is asked for at the start, while the world rests. A chunk is taken up at the first frame after it is ready, at the
-    action that this frame is due, never from its beginning; where a chunk runs out, its player lets go.
+    is requested at the start, while the world is at rest. A chunk is executed from the first frame after it is ready,
+    starting at the action of that frame; after the last action of a chunk the action is zero.
 
-    A policy acts as the robot. At the human's seat it sees the task's exchange of seats (`PairTask.exchange`); where a
-    task has none, the human's half of its joint actions is executed.
+    A policy acts as the robot. At the human's seat it observes the world with exchanged seats (`PairTask.exchange`); in
+    a task without this exchange, the human's half of its joint actions is executed.
 
     Attributes:
-        task: that it acts in.
-        latencies: seconds that each chunk took.
-        chunks: `(worlds,)` how many each world got.
+        task: of the worlds.
+        latencies: inference time of each chunk, s.
+        chunks: `(worlds,)` number of chunks of each world.
     """
 
     def __init__(
@@ -91,17 +92,18 @@ class PolicyAgent(Agent):
         """
         Args:
             task: the table if None.
-            fps: frames a second that an action is held at; the policy's own if None.
-            seed: of what the policy draws at random; that of the first world if None.
-            real_time: inference runs beside the loop.
+            fps: frames a second; an action is held for one frame. The policy's own rate if None.
+            seed: of the policy's random numbers; that of the first world if None.
+            real_time: run inference in its own thread.
+            clock: monotonic time, ns.
 
         Raises:
-            InvalidValueError: the policy has learned another task.
+            InvalidValueError: the policy learned another task.
         """
-        self.name = policy.name
+        self.name: str = policy.name
         self.latencies: list[float] = []
         self._policy = policy
-        self.task = task or get_task()
+        self.task: PairTask = task or get_task()
         if policy.task != self.task.spec.name:
             expected = f"a policy that has learned the task {self.task.spec.name!r}"
             raise InvalidValueError(policy.name, expected, policy.task)
@@ -110,133 +112,134 @@ class PolicyAgent(Agent):
         self._pending: Future[_Chunk] | None = None
         self._chunk: _Chunk | None = None
 
-    def begin(self, seat: int, starts: Sequence[Start]) -> None:
-        """Forgets; in real time, asks for the first chunk."""
+    def begin(self, seat: int, starts: Sequence[EpisodeStart]) -> None:
+        """Clears the history; in real time, requests the first chunk."""
         if self._pending is not None:
             self._pending.cancel()
         self._pending, self._chunk = None, None
-        # Another policy may be behind the same name now.
+        # The policy may have been replaced since the last episode, so its rate is read here.
         self._seat, spec = seat, self.task.spec
         self._rate = self._fps or self._policy.fps
-        self._hold = stride(self._rate, spec.record_hz)
+        self._stride = stride(self._rate, spec.record_hz)
         self._exchange = self.task.exchange if seat == 1 else None
         count, frames, size = len(starts), self._policy.n_obs_steps, len(spec.action)
         self._size = size
         scenarios, states = [start.scenario for start in starts], np.array([start.state for start in starts])
         if self._exchange is not None:
-            scenarios, states = [self._exchange.scenario(one) for one in scenarios], self._exchange.states(states)
-        self._scenarios = np.array([self.task.scenario_vector(one) for one in scenarios])
-        # Before the start there is nothing: the first observation is repeated, as it is padded in training.
+            scenarios = [self._exchange.scenario(scenario) for scenario in scenarios]
+            states = self._exchange.states(states)
+        self._scenarios = np.array([self.task.scenario_vector(scenario) for scenario in scenarios])
+        # The first observation is repeated before the start, like the padding in training.
         self._states = np.repeat(states[:, None], frames, axis=1)  # (worlds, n_obs_steps, n)
-        self._partner = np.zeros((count, frames, size))
-        self._held: list[np.ndarray] = []  # joint actions (worlds, 2 m) of the steps of this frame
+        self._partner_actions = np.zeros((count, frames, size))
+        self._step_actions: list[Array] = []  # joint actions (worlds, 2 m) of the steps of this frame
         self._bounds = spec.joint_action.bounds
         self._joint = np.zeros((count, 2 * size))  # of the present frame
-        self._age_from = 0
-        self.chunks = np.zeros(count, int)
+        self._observed_ns = 0  # of the present chunk; 0 without one
+        self.chunks: Array = np.zeros(count, int)
         self._step = 0
         seed = starts[0].seed if self._seed is None else self._seed
         if self._worker is None:
             self._policy.reset(seed)
         else:
-            self._worker.submit(self._policy.reset, seed)  # after a chunk that is still being made
-            self._ask(0, np.arange(count))
+            self._worker.submit(self._policy.reset, seed)  # after the inference that still runs
+            self._request_chunk(0, np.arange(count))
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         """Its half of the joint actions of the present frame."""
-        frame, within = divmod(self._step, self._hold)
-        if within == 0:
+        frame, step_in_frame = divmod(self._step, self._stride)
+        if step_in_frame == 0:
             if frame > 0:
                 self._observe(states, worlds)
             self._next_action(frame, worlds)
-        own = self.half(self._seat, worlds)
+        actions = self.half(self._seat, worlds)
         if self._worker is not None:
-            age = self._clock() - self._age_from if self._age_from else 0
-            self.input = PlayerInput(axes=own[0].tolist(), age_ns=age)
-        return own
+            age = self._clock() - self._observed_ns if self._observed_ns else 0
+            self.input: PlayerInput | None = PlayerInput(axes=actions[0].tolist(), age_ns=age)
+        return actions
 
-    def half(self, seat: int, worlds: np.ndarray) -> np.ndarray:
-        """The half `(B, m)` of a seat of the joint actions of the present frame."""
+    def half(self, seat: int, worlds: Array) -> Array:
+        """A seat's half `(B, m)` of the joint actions of the present frame."""
         return self._joint[worlds, seat * self._size : (seat + 1) * self._size]
 
-    def acted(self, actions: np.ndarray, worlds: np.ndarray) -> None:
-        """Keeps the actions for the history."""
+    def acted(self, actions: Array, worlds: Array) -> None:
+        """Adds the joint actions to the history."""
         joint = np.zeros_like(self._joint)
         joint[worlds] = actions
-        self._held.append(joint)
+        self._step_actions.append(joint)
         self._step += 1
 
-    def other_half(self) -> Agent:
+    def human_half(self) -> Agent:
         """An agent for the human's seat that executes the human's half of the same chunks, as in co-planning."""
-        return _OtherHalf(self)
+        return _HumanHalf(self)
 
     def branch(self, count: int) -> "PolicyAgent":
-        """An agent for `count` worlds in the state of this one's only world, which predicts anew there."""
-        other = copy.copy(self)
-        for name in ("_scenarios", "_states", "_partner", "_joint", "chunks"):
-            setattr(other, name, np.repeat(getattr(self, name), count, axis=0))
-        other._held = [np.repeat(actions, count, axis=0) for actions in self._held]
-        other._chunk = None
-        return other
+        """A copy of this agent of one world for `count` copies of that world; it predicts a new chunk in each."""
+        branch = copy.copy(self)
+        for name in ("_scenarios", "_states", "_partner_actions", "_joint", "chunks"):
+            setattr(branch, name, np.repeat(getattr(self, name), count, axis=0))
+        branch._step_actions = [np.repeat(actions, count, axis=0) for actions in self._step_actions]
+        branch._chunk = None
+        return branch
 
     @property
-    def predicted(self) -> np.ndarray:
+    def predicted(self) -> Array:
         """`(worlds, actions, 2 m)` the present chunks."""
         assert self._chunk is not None, "a chunk before the first step"
         return self._chunk.actions
 
     def wait(self, timeout_s: float | None = None) -> None:
-        """Waits for the chunk that is being made, if there is one."""
+        """Waits for the pending chunk, if there is one."""
         if self._pending is not None:
             self._pending.result(timeout_s)
 
     def close(self) -> None:
-        """Ends the thread after the chunk that it is making."""
+        """Ends the inference thread after the chunk that it predicts."""
         if self._worker is not None:
             self._worker.shutdown(cancel_futures=True)
 
-    def _observe(self, states: np.ndarray, worlds: np.ndarray) -> None:
-        held = np.array(self._held)  # (hold, worlds, 2 m)
-        joint = frame_actions(held.reshape(len(held), -1), self._rate, record_hz=self.task.spec.record_hz)[0]
-        mean = joint.reshape(held.shape[1:])[worlds]
-        self._held = []
+    def _observe(self, states: Array, worlds: Array) -> None:
+        steps = np.array(self._step_actions)  # (stride, worlds, 2 m)
+        joint = frame_actions(steps.reshape(len(steps), -1), self._rate, record_hz=self.task.spec.record_hz)[0]
+        mean = joint.reshape(steps.shape[1:])[worlds]
+        self._step_actions = []
         if self._exchange is not None:
             states, mean = self._exchange.states(states), self._exchange.actions(mean)
-        for history, newest in ((self._states, states), (self._partner, mean[:, self._size :])):
+        for history, newest in ((self._states, states), (self._partner_actions, mean[:, self._size :])):
             history[worlds] = np.concatenate((history[worlds, 1:], newest[:, None]), axis=1)
 
-    def _next_action(self, frame: int, worlds: np.ndarray) -> None:
+    def _next_action(self, frame: int, worlds: Array) -> None:
         if self._pending is not None and self._pending.done():
-            self._take(self._pending.result())
+            self._accept_chunk(self._pending.result())
         ahead = int(self._worker is not None)
         if self._pending is None:
             chunk = self._chunk
             if chunk is None or frame - chunk.frame + ahead >= min(self._policy.n_action_steps, chunk.actions.shape[1]):
-                # A single action that is made meanwhile acts a frame later.
-                self._ask(frame + ahead * self._policy.keeps_history, worlds)
+                # In real time a single action is ready one frame later.
+                self._request_chunk(frame + ahead * self._policy.keeps_history, worlds)
         chunk = self._chunk
         if chunk is None or frame - chunk.frame >= chunk.actions.shape[1]:
-            self._joint, self._age_from = np.zeros_like(self._joint), 0
+            self._joint, self._observed_ns = np.zeros_like(self._joint), 0
             return
         joint = np.clip(chunk.actions[:, frame - chunk.frame], *self._bounds)
         self._joint = joint if self._exchange is None else self._exchange.actions(joint)
-        self._age_from = chunk.observed_ns
+        self._observed_ns = chunk.observed_ns
 
-    def _ask(self, frame: int, worlds: np.ndarray) -> None:
+    def _request_chunk(self, frame: int, worlds: Array) -> None:
         if self._policy.keeps_history:
             worlds = np.arange(len(self._states))
         observations = {
             STATE: self._states[worlds],
             ENVIRONMENT_STATE: np.repeat(self._scenarios[worlds, None], self._states.shape[1], axis=1),
-            HUMAN_ACTION: self._partner[worlds],
+            HUMAN_ACTION: self._partner_actions[worlds],
         }
         request = (frame, worlds, observations, self._clock())
         if self._worker is None:
-            self._take(self._predict(*request))
+            self._accept_chunk(self._predict(*request))
         else:
             self._pending = self._worker.submit(self._predict, *request)
 
-    def _predict(self, frame: int, worlds: np.ndarray, observations: dict[str, np.ndarray], observed_ns: int) -> _Chunk:
+    def _predict(self, frame: int, worlds: Array, observations: dict[str, Array], observed_ns: int) -> _Chunk:
         started = time.perf_counter()
         predicted = self._policy.predict_action_chunk(observations)
         seconds = time.perf_counter() - started
@@ -244,16 +247,16 @@ class PolicyAgent(Agent):
         actions[worlds] = predicted
         return _Chunk(frame, worlds, actions, observed_ns, seconds)
 
-    def _take(self, chunk: _Chunk) -> None:
+    def _accept_chunk(self, chunk: _Chunk) -> None:
         self._chunk, self._pending = chunk, None
         self.chunks[chunk.worlds] += 1
         self.latencies.append(chunk.seconds)
 
 
-class _OtherHalf(Agent):
+class _HumanHalf(Agent):
     def __init__(self, agent: PolicyAgent):
         self.name = agent.name
         self._agent = agent
 
-    def act(self, states: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+    def act(self, states: Array, worlds: Array) -> Array:
         return self._agent.half(1, worlds)

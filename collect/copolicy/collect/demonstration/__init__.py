@@ -1,1 +1,1 @@
-"""A policy at work: episodes with a simulated partner, as a film that says so."""
+"""Videos of a policy that acts with a simulated partner; the video says that no person takes part."""

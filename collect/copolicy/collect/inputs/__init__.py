@@ -1,13 +1,13 @@
-"""What the players hold in their hands: gamepads and the keyboard, their calibration, and what a press means."""
+"""Input devices: gamepads and the keyboard, their calibration and mapping, and the commands that they give."""
 
 from .calibration import CalibrationRun, StickCalibration
 from .calibration_store import CalibrationStore, user_config_folder
 from .commands import Command, CommandReader, Press
-from .gamepads import GamepadMapping, MappingRun, MappingStore
-from .joysticks import InputSample, Pad, Pads
+from .duplicates import DuplicateDetector, PressLog
+from .gamepads import Gamepad, Gamepads, InputSample
 from .keyboard import HALVES, KeyboardHalf, keyboard_force
-from .rest import RestWatch
-from .twins import PressLog, TwinWatch
+from .mapping import GamepadMapping, MappingRun, MappingStore
+from .rest_offset import RestOffsetDetector
 
 __all__ = [
     "HALVES",
@@ -15,18 +15,18 @@ __all__ = [
     "CalibrationStore",
     "Command",
     "CommandReader",
+    "DuplicateDetector",
+    "Gamepad",
     "GamepadMapping",
+    "Gamepads",
     "InputSample",
     "KeyboardHalf",
     "MappingRun",
     "MappingStore",
-    "Pad",
-    "Pads",
     "Press",
     "PressLog",
-    "RestWatch",
+    "RestOffsetDetector",
     "StickCalibration",
-    "TwinWatch",
     "keyboard_force",
     "user_config_folder",
 ]

@@ -1,16 +1,16 @@
-"""What a press means: the same few commands from any joystick and from the keyboard."""
+"""Commands of the players: the same set from any gamepad and from the keyboard."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
 
 from ..sdl import pygame
-from .gamepads import UNKNOWN, GamepadMapping
-from .joysticks import Pads
+from .gamepads import Gamepads
 from .keyboard import HALVES
+from .mapping import UNKNOWN, GamepadMapping
 
 
 class Command(Enum):
-    """What a player can ask for, wherever it comes from."""
+    """The commands that a player can give."""
 
     UP = auto()
     DOWN = auto()
@@ -27,19 +27,19 @@ class Command(Enum):
     SWAP = auto()
     HELP = auto()
     OTHER = auto()
-    """A button without a meaning; it joins, as any button does."""
+    """A button without a command; like any button, it joins the session."""
 
 
 Device = int | str
-"""Instance id of a joystick; `wasd`, `arrows` or `keyboard` for keys."""
+"""Instance id of a gamepad; `wasd`, `arrows` or `keyboard` for keys."""
 
 
 @dataclass(frozen=True)
 class Press:
-    """One command and where it came from.
+    """One command and the device that gave it.
 
     Attributes:
-        moved: it is a stick's deflection, not a button: a stick is also moved to try it.
+        moved: given by moving a stick, not by a button; players also move a stick only to test it.
     """
 
     command: Command
@@ -78,54 +78,54 @@ _KEYS_OF = {
     Command.HELP: (pygame.K_F1, pygame.K_h),
 }
 _KEYS = {key: command for command, keys in _KEYS_OF.items() for key in keys}
-_HALF_OF = {key: half.name for half in HALVES.values() for key in (*half.keys, half.accept, half.following)}
-_TIPPED, _LEVEL = 0.65, 0.35  # a stick gives one command when it passes the first, the next after it passed the second
+_HALF_OF = {key: half.name for half in HALVES.values() for key in (*half.keys, half.accept_key, half.next_key)}
+_PRESS, _RELEASE = 0.65, 0.35  # a stick gives a command beyond the first value, and the next one after the second
 
 
 class CommandReader:
-    """Turns events into presses; sees every event, for the edges of sticks."""
+    """Turns events into presses; needs every event, to follow the sticks."""
 
-    def __init__(self, pads: Pads | None = None):
+    def __init__(self, gamepads: Gamepads | None = None):
         """
         Args:
-            pads: what the buttons of each one mean; without them all are taken as unknown.
+            gamepads: give the mapping of each device; without them, all use the mapping of unknown devices.
         """
-        self._pads = pads
-        self._tipped: dict[tuple[int, int], bool] = {}
+        self._gamepads = gamepads
+        self._deflected: dict[tuple[int, int], bool] = {}
 
     def read(self, event: pygame.event.Event) -> Press | None:
-        """The press behind an event, if there is one."""
+        """Returns the press that an event stands for, or None."""
         if event.type == pygame.KEYDOWN and event.key in _KEYS:
             return Press(_KEYS[event.key], _HALF_OF.get(event.key, "keyboard"))
         if event.type == pygame.JOYBUTTONDOWN:
-            control = self._mapping(event).of_button(event.button)
+            control = self._mapping(event).control_of_button(event.button)
             return Press(_CONTROLS.get(control or "", Command.OTHER), event.instance_id)
         if event.type == pygame.JOYHATMOTION:
             x, y = event.value
             if not x and not y:
                 return None
             direction = (1 if y > 0 else 4) if y else (2 if x > 0 else 8)
-            control = self._mapping(event).of_hat(event.hat, direction)
+            control = self._mapping(event).control_of_hat(event.hat, direction)
             return Press(_CONTROLS.get(control, Command.OTHER), event.instance_id)
         if event.type == pygame.JOYAXISMOTION:
             return self._stick(event.instance_id, event.axis, event.value, self._mapping(event))
         return None
 
     def _mapping(self, event: pygame.event.Event) -> GamepadMapping:
-        pad = self._pads.get(event.instance_id) if self._pads is not None else None
-        return UNKNOWN if pad is None else pad.mapping
+        gamepad = self._gamepads.get(event.instance_id) if self._gamepads is not None else None
+        return UNKNOWN if gamepad is None else gamepad.mapping
 
     def _stick(self, instance_id: int, axis: int, value: float, mapping: GamepadMapping) -> Press | None:
-        axes, invert = mapping.stick("left") or mapping.cross_axes or ((0, 1), (False, False))
+        axes, invert = mapping.stick("left") or mapping.dpad_axes or ((0, 1), (False, False))
         if axis not in axes:
             return None
-        place = axes.index(axis)
-        value = -value if invert[place] else value
+        index = axes.index(axis)
+        value = -value if invert[index] else value
         key = (instance_id, axis)
-        if abs(value) < _LEVEL:
-            self._tipped[key] = False
-        elif abs(value) > _TIPPED and not self._tipped.get(key):
-            self._tipped[key] = True
-            commands = ((Command.LEFT, Command.RIGHT), (Command.UP, Command.DOWN))[place]
+        if abs(value) < _RELEASE:
+            self._deflected[key] = False
+        elif abs(value) > _PRESS and not self._deflected.get(key):
+            self._deflected[key] = True
+            commands = ((Command.LEFT, Command.RIGHT), (Command.UP, Command.DOWN))[index]
             return Press(commands[value > 0], instance_id, moved=True)
         return None

@@ -1,30 +1,31 @@
-"""Two players on one keyboard: each half has four keys for the force, and two for the lobby."""
+"""Two players on one keyboard: each half has four keys for the force and two for the lobby."""
 
 import math
 from dataclasses import dataclass
 
 from ..sdl import pygame
-from .joysticks import InputSample
+from .gamepads import InputSample
 
 
 @dataclass(frozen=True)
 class KeyboardHalf:
-    """Keys of one player; several at once add up, so that any direction of eight is possible.
+    """The keys of one player; pressed keys add up, which gives eight directions.
 
     Attributes:
         keys: left, right, up, down.
-        accept: joins, and chooses in the lobby.
-        following: moves on in the lobby.
+        accept_key: joins, and chooses an item of the lobby's menu.
+        next_key: moves to the next item.
+        hint: text for the screen.
     """
 
     name: str
     keys: tuple[int, int, int, int]
-    accept: int
-    following: int
+    accept_key: int
+    next_key: int
     hint: str
 
     def sample(self, time_ns: int) -> InputSample:
-        """The keys as two axes and four buttons, as of the last pump of the event queue."""
+        """Reads the keys as two axes and four buttons, as of the last pump of the event queue."""
         pressed = pygame.key.get_pressed()
         left, right, up, down = (bool(pressed[key]) for key in self.keys)
         return InputSample((float(right - left), float(down - up)), (left, right, up, down), time_ns)
@@ -42,11 +43,11 @@ HALVES = {
         "arrow keys, with Enter and right Shift",
     ),
 }
-"""Left and right half of the keyboard."""
+"""The left and right half of the keyboard."""
 
 
 def keyboard_force(sample: InputSample) -> tuple[float, float]:
-    """The force of a half: full in the direction of its keys, the diagonals no stronger than the rest."""
+    """Returns the force `(x, y)` of a keyboard half: of size 1 in each of the eight directions, or 0."""
     x, y = sample.axes
     size = math.hypot(x, y)
     return (x / size, y / size) if size > 1 else (x, y)

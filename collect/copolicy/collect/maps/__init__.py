@@ -1,1 +1,1 @@
-"""Files of one's own maps, and sheets of any set."""
+"""Map files of a lab, and sheets that show a set of maps."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command, add_group
+from copolicy.dataset.command_line.commands import Commands, add_command, add_group
 from copolicy.dataset.command_line.flag_numbers import seed, whole_number
 from copolicy.dataset.command_line.maps_flag import add_task_flag
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
@@ -18,13 +18,13 @@ from copolicy.dataset.task import PairTask, get_task
 _MOST_MAPS = 10_000
 
 
-def add_maps_command(commands: argparse._SubParsersAction) -> None:
+def add_maps_command(commands: Commands) -> None:
     """Adds `maps` with its steps to the commands of `copolicy-collect`."""
     steps = add_group(
         commands,
         "maps",
-        "files of one's own maps: check, show and make them; every --maps takes such a file",
-        "Files of one's own maps, in YAML or JSON, for every --maps.",
+        "check, show and make files of your own maps; every --maps accepts such a file",
+        "Files of your own maps, in YAML or JSON, for every --maps.",
         (
             "copolicy-collect maps make --count 20 --seed 1 --out lab.yaml",
             "copolicy-collect maps check lab.yaml",
@@ -33,7 +33,7 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
         ),
     )
     command = add_command(
-        steps, "check", _check, "say in one line each what is wrong with a file", "copolicy-collect maps check lab.yaml"
+        steps, "check", _check, "print each problem of a file in one line", "copolicy-collect maps check lab.yaml"
     )
     command.add_argument("file", type=Path, metavar="FILE", help="maps in YAML or JSON")
     add_task_flag(command)
@@ -41,11 +41,11 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
         steps,
         "show",
         _show,
-        "draw every map of a set or file on one sheet",
+        "draw all maps of a set or file in one image",
         "copolicy-collect maps show unseen --out unseen.png\n  copolicy-collect maps show lab.yaml#test --out test.png",
     )
     command.add_argument("maps", metavar="NAME|FILE[#SPLIT]", help="a set, a file of maps, or one of its splits")
-    command.add_argument("--out", type=Path, required=True, help="the sheet to write, a PNG")
+    command.add_argument("--out", type=Path, required=True, help="the image to write, a PNG")
     command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
     command.add_argument("--width", type=whole_number("--width", 300, 10_000), default=1800, help="px (default 1800)")
     add_task_flag(command)
@@ -53,17 +53,17 @@ def add_maps_command(commands: argparse._SubParsersAction) -> None:
         steps,
         "make",
         _make,
-        "draw maps at random and write them into a file that passes `check`",
+        "write random maps to a file that passes `check`",
         "copolicy-collect maps make --count 50 --seed 1 --bounds obstacles=2:3 obstacle_size=40:80 --out lab.yaml",
     )
     command.add_argument("--count", type=whole_number("--count", 1, _MOST_MAPS), required=True, help="how many maps")
-    command.add_argument("--seed", type=seed(), default=0, help="the same seed and bounds, the same maps (default 0)")
+    command.add_argument("--seed", type=seed(), default=0, help="equal seeds and bounds give equal maps (default 0)")
     command.add_argument(
         "--bounds", nargs="+", default=[], metavar="NAME=LOW:HIGH",
-        help="within which maps are drawn, or NAME=VALUE for one value; the summary says all of them, with the "
-        "defaults of those that are not given",
+        help="bounds of the random values, or NAME=VALUE for one value; the summary lists all bounds with their "
+        "defaults",
     )  # fmt: skip
-    command.add_argument("--name", help="of the set (default: the name of the file)")
+    command.add_argument("--name", help="name of the set (default: the name of the file)")
     command.add_argument("--out", type=Path, required=True, help="the file to write, .yaml or .json")
     add_task_flag(command)
     command = add_command(
@@ -81,16 +81,16 @@ def _files(task: PairTask) -> ScenarioFiles:
 def _check(arguments: argparse.Namespace) -> dict[str, Any]:
     files = _files(get_task(arguments.task))
     problems = [str(problem) for problem in files.problems(arguments.file)]
-    about: dict[str, Any] = {"file": str(arguments.file), "problems": problems if arguments.json else len(problems)}
+    result: dict[str, Any] = {"file": str(arguments.file), "problems": problems if arguments.json else len(problems)}
     if problems:
         if not arguments.json:
             print("\n".join(problems))
             sys.stdout.flush()
-        return {**about, "passed": False, "exit_status": 1}
-    chosen = files.read(arguments.file)
-    splits = {name: len(places) for name, places in chosen.splits.items()}
+        return {**result, "passed": False, "exit_status": 1}
+    map_set = files.read(arguments.file)
+    splits = {name: len(indices) for name, indices in map_set.splits.items()}
     return {
-        **about, **chosen.describe(), "maps": len(chosen.scenarios), **({"splits": splits} if splits else {}),
+        **result, **map_set.describe(), "maps": len(map_set.scenarios), **({"splits": splits} if splits else {}),
         "passed": True,
     }  # fmt: skip
 
@@ -100,13 +100,13 @@ def _show(arguments: argparse.Namespace) -> dict[str, Any]:
         raise InvalidValueError("--out", "a name that ends with .png", str(arguments.out))
     require_new(arguments.out)
     task = get_task(arguments.task)
-    chosen = task.scenario_set(arguments.maps)
+    map_set = task.scenario_set(arguments.maps)
     if arguments.orientations:
-        chosen = task.turned(chosen)
+        map_set = task.turned(map_set)
     from .sheet import write_map_sheet  # pygame
 
-    size = write_map_sheet(task, chosen, arguments.out, arguments.width)
-    return {**chosen.describe(), "maps": len(chosen.scenarios), "out": str(arguments.out), "size": list(size)}
+    size = write_map_sheet(task, map_set, arguments.out, arguments.width)
+    return {**map_set.describe(), "maps": len(map_set.scenarios), "out": str(arguments.out), "size": list(size)}
 
 
 def _make(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -126,24 +126,24 @@ def _make(arguments: argparse.Namespace) -> dict[str, Any]:
 def _text(content: Mapping[str, Any], as_json: bool) -> str:
     if as_json:
         return json.dumps(content, indent=1) + "\n"
-    import yaml  # what no other command needs
+    import yaml  # slow to import, and no other command needs it
 
     return yaml.safe_dump(dict(content), sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
 
 
-def _bounds(texts: Sequence[str], known: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+def _bounds(texts: Sequence[str], defaults: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     bounds = {}
     for text in texts:
         name, equals, values = text.partition("=")
-        if equals and name not in known:
-            raise UnknownNameError("bound", name, known)
+        if equals and name not in defaults:
+            raise UnknownNameError("bound", name, defaults)
         low, colon, high = values.partition(":")
         try:
             pair = float(low), float(high if colon else low)
         except ValueError:
             raise InvalidValueError("--bounds", "NAME=LOW:HIGH or NAME=VALUE, in numbers", text) from None
         if not (-1e6 < pair[0] <= pair[1] < 1e6):
-            raise InvalidValueError("--bounds", "a lowest value that is not above the highest", text)
+            raise InvalidValueError("--bounds", "LOW not above HIGH, both within 1e6 of 0", text)
         bounds[name] = pair
     return bounds
 

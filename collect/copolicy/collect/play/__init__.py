@@ -1,1 +1,1 @@
-"""`copolicy-collect play`: two players, one table, and every episode on the disk."""
+"""`copolicy-collect play`: two players act together, and every episode is recorded."""

@@ -1,6 +1,7 @@
-"""The loop: the task's ticks, and between them as many pictures as there is time for."""
+"""The main loop of a session: one step per tick, and frames drawn in the time between ticks."""
 
 from collections import Counter, deque
+from typing import Any
 
 from ..inputs import Command, CommandReader, Press
 from ..screen import Canvas
@@ -12,51 +13,51 @@ from .finished import Failure, Finished
 from .game import Game
 from .lobby import Lobby
 from .paused import Paused
-from .phase import Phase, To
+from .phase import NextPhase, Phase
 from .ready import Countdown, Ready
-from .result import Result
+from .result import ResultPhase
 from .running import Running
 
-_PHASES: dict[To, type[Phase]] = {
-    To.LOBBY: Lobby,
-    To.READY: Ready,
-    To.COUNTDOWN: Countdown,
-    To.RUNNING: Running,
-    To.PAUSED: Paused,
-    To.RESULT: Result,
-    To.FAILURE: Failure,
-    To.FINISHED: Finished,
+_PHASES: dict[NextPhase, type[Phase]] = {
+    NextPhase.LOBBY: Lobby,
+    NextPhase.READY: Ready,
+    NextPhase.COUNTDOWN: Countdown,
+    NextPhase.RUNNING: Running,
+    NextPhase.PAUSED: Paused,
+    NextPhase.RESULT: ResultPhase,
+    NextPhase.FAILURE: Failure,
+    NextPhase.FINISHED: Finished,
 }
-_MARGIN_NS = 2 * 10**6  # between the end of a picture and the next tick
-_STARVED_NS = 10**8  # a machine too slow to draw between ticks draws ten pictures a second, and is flagged
+_MARGIN_NS = 2 * 10**6  # between the end of a frame and the next tick
+_MAX_FRAME_NS = 10**8  # if no frame fits between ticks, one is drawn at this interval; late ticks are flagged
 
 
 class Application:
     """Runs the phases of a session.
 
     Every tick pumps SDL's events once and then lets the phase read the sticks, so a reading is never older than its
-    tick. A picture is drawn right after a tick and half-way to the next one, if it fits: drawing never makes a step
-    wait where the machine can draw in time at all.
+    tick. A frame is drawn right after a tick and half-way to the next one, if there is time for it: on a machine that
+    can draw a frame between two ticks, drawing does not delay a step.
 
     Attributes:
-        phase: the present one.
-        pictures: drawn so far.
+        phase: the current one.
+        frames: number of frames drawn so far.
     """
 
-    def __init__(self, game: Game, window: Window | None, first: To = To.LOBBY):
+    def __init__(self, game: Game, window: Window | None, first: NextPhase = NextPhase.LOBBY):
         self.game = game
         self.phase: Phase = _PHASES[first](game)
-        self.pictures = 0
+        self.frames = 0
         self._window = window
-        self._commands = CommandReader(game.roster.pads)
+        self._commands = CommandReader(game.roster.gamepads)
         self._help = False
-        self._refused = ""
+        self._refusal = ""
         self._drawn_ns = 0
-        self._drawing: deque[int] = deque([0], maxlen=20)
+        self._draw_times_ns: deque[int] = deque([0], maxlen=20)
         self._halfway_ns = 0
 
     def run(self) -> None:
-        """Runs until the session ends, and ends a running episode in order."""
+        """Runs until the session ends; completes the recording of a running episode."""
         game, ticker = self.game, self.game.ticker
         self.phase.enter()
         ticker.restart()
@@ -71,22 +72,22 @@ class Application:
                     self._draw()
                 else:
                     self._sleep(remaining)
-            self._break_off()
+            self._end_trial()
         except BaseException as error:
             if game.trial is not None:
                 game.trial.abandon(error)
             raise
 
-    def _break_off(self) -> None:
+    def _end_trial(self) -> None:
         game = self.game
         try:
-            game.break_off(game.stop or "quit")
+            game.end_trial(game.stop or "quit")
         except OSError as error:
-            game.lose_trial(error)
-            raise game.no_room() from None
+            game.abandon_trial(error)
+            raise game.storage_error() from None
 
-    def summary(self) -> dict:
-        """What the command prints."""
+    def summary(self) -> dict[str, Any]:
+        """Returns what the command prints, JSON-able."""
         game = self.game
         verdicts = Counter(verdict for _, verdict in game.results)
         return {
@@ -95,7 +96,7 @@ class Application:
             "discarded": verdicts["discard"] + verdicts["redo"],
             "unwritten": verdicts["lost"],
             "outcomes": dict(sorted(Counter(outcome for outcome, _ in game.results).items())),
-            "kept_in_session": game.folder.counts.kept_here.total(),
+            "kept_in_session": game.folder.counts.kept_in_session.total(),
             "episodes": game.settings.episodes,
             "complete": game.finished,
             "ended_by": game.stop or "end",
@@ -108,26 +109,26 @@ class Application:
             return False
         self._follow_devices()
         following = self.phase.tick(tick)
-        if following is To.END:
+        if following is NextPhase.END:
             return False
-        if following is not To.STAY:
+        if following is not NextPhase.STAY:
             self.phase = _PHASES[following](self.game)
             self.phase.enter()
         return True
 
     def _follow_devices(self) -> None:
-        """Lets devices join that had to wait, and looks for faulty ones between the episodes."""
+        """Lets waiting devices join, and between episodes checks for faulty ones."""
         game, roster = self.game, self.game.roster
         for player in roster.tick():
             self.phase.joined(player)
         if not self.phase.realtime:
-            player = roster.watch()
+            player = roster.check_devices()
             if player:
                 self.phase.device_lost(player)
-        if roster.refused not in ("", self._refused):
+        if roster.refusal not in ("", self._refusal):
             game.sounds.play("alarm")
-            game.say(roster.refused)
-        self._refused = roster.refused
+            game.show_message(roster.refusal)
+        self._refusal = roster.refusal
 
     def _handle(self, event: pygame.event.Event) -> None:
         game, phase = self.game, self.phase
@@ -137,11 +138,11 @@ class Application:
         if event.type == pygame.WINDOWFOCUSLOST and self._window:
             phase.focus_lost()
             return
-        added, removed = game.roster.pads.handle(event)
+        added, removed = game.roster.gamepads.handle(event)
         if added and game.settings.headless:
-            game.roster.give(added)
+            game.roster.assign(added)
         if removed:
-            player = game.roster.take_away(removed)
+            player = game.roster.release(removed)
             if player:
                 phase.device_lost(player)
         if phase.entry is not None:
@@ -153,12 +154,12 @@ class Application:
                 self._window.toggle_fullscreen()
             else:
                 game.sounds.mute = not game.sounds.mute
-                game.say("sound off" if game.sounds.mute else "sound on")
+                game.show_message("sound off" if game.sounds.mute else "sound on")
             return
         press = self._commands.read(event)
         if press:
-            game.roster.note(press)
-        if phase.takes(event):
+            game.roster.log_press(press)
+        if phase.consume(event):
             return
         if press:
             self._press(press)
@@ -171,13 +172,13 @@ class Application:
         if press.command == Command.HELP:
             self._help = True
         if not isinstance(phase, Lobby) and not isinstance(phase, Running) and game.roster.join(press):
-            return  # a press that gives a lost seat a device chooses nothing
-        if not isinstance(phase, Lobby) and game.roster.is_stray(press):
+            return  # a press that joins gives no other command
+        if not isinstance(phase, Lobby) and game.roster.is_unassigned(press):
             return
         phase.handle(press)
 
-    def _fits(self, remaining_ns: int) -> bool:
-        return not self.phase.realtime or max(self._drawing) + _MARGIN_NS < remaining_ns
+    def _frame_fits(self, remaining_ns: int) -> bool:
+        return not self.phase.realtime or max(self._draw_times_ns) + _MARGIN_NS < remaining_ns
 
     def _draw(self) -> None:
         window, game = self._window, self.game
@@ -185,24 +186,24 @@ class Application:
             return
         now, dt_ns = game.clock(), game.ticker.dt_ns
         self._halfway_ns = now + dt_ns // 2
-        starved = now - self._drawn_ns > _STARVED_NS
-        if not self._fits(game.ticker.remaining_ns()) and not starved:
+        overdue = now - self._drawn_ns > _MAX_FRAME_NS
+        if not self._frame_fits(game.ticker.remaining_ns()) and not overdue:
             return
         canvas = Canvas(window.surface)
         canvas.clear()
         trial = game.trial
-        share = (now - trial.step_ns) / dt_ns if trial and self.phase.realtime else 1.0
-        self.phase.draw(canvas, min(1.0, max(0.0, share)))
+        fraction = (now - trial.step_ns) / dt_ns if trial and self.phase.realtime else 1.0
+        self.phase.draw(canvas, min(1.0, max(0.0, fraction)))
         if game.toast:
             draw_toast(canvas, game.toast)
         if self._help:
-            draw_help(canvas, game.roster.labels(), game.task.spec.name)
+            draw_help(canvas, game.roster.labels(), game.task.words.noun)
         window.show()
-        self.pictures += 1
+        self.frames += 1
         self._drawn_ns = game.clock()
-        self._drawing.append(self._drawn_ns - now)
+        self._draw_times_ns.append(self._drawn_ns - now)
         if not self.phase.realtime:
-            self._halfway_ns = self._drawn_ns + 10 * dt_ns  # nothing moves between the ticks
+            self._halfway_ns = self._drawn_ns + 10 * dt_ns  # nothing moves between ticks
 
     def _sleep(self, remaining_ns: int) -> None:
         wait = remaining_ns

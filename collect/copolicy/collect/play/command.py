@@ -5,34 +5,34 @@ import logging
 import math
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import number, seed, whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, add_task_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..angular_limit import ANGULAR_LIMITS, LIMIT, angular_limit_of, limited
-from .settings import PilotSpec, PlaySettings
+from ..angular_limit import ANGULAR_LIMITS, LIMIT_SETTING, angular_limit_of, with_angular_limit
+from .settings import PlayerSpec, PlaySettings
 
-_AS_GIVEN = (
+_COPIED_FLAGS = (
     "task", "pair", "out", "orientations", "episodes", "practice", "seed", "license", "headless", "fullscreen", "mute",
     "new_session",
 )  # fmt: skip
 
 
-def add_play_command(commands: argparse._SubParsersAction) -> None:
+def add_play_command(commands: Commands) -> None:
     """Adds `play` to the commands of `copolicy-collect`."""
     command = add_command(
         commands,
         "play",
         _play,
-        help="two players carry the table (or act in another task) together: a lobby, a session of episodes, one "
-        "recording each",
+        help="let two players act together in a session of episodes, and record each episode",
         example="copolicy-collect play --players keyboard policy:pretrained\n"
         "  copolicy-collect play --pair P01 --out recordings --consent-0 C-17 --consent-1 C-18",
-        needs=lambda arguments: POLICIES if any(who.startswith("policy") for who in arguments.players or ()) else (),
+        needs=lambda arguments: POLICIES if any(text.startswith("policy") for text in arguments.players or ()) else (),
     )
     command.add_argument(
         "--pair", default="guest", help="pseudonym of the pair; its players are PAIR-a and PAIR-b (default: guest)"
@@ -41,118 +41,123 @@ def add_play_command(commands: argparse._SubParsersAction) -> None:
         "--out",
         type=Path,
         default=Path("outputs/sessions"),
-        help="folder of all sessions; a session continues there (default: outputs/sessions)",
+        help="folder of all sessions; an unfinished session there is continued (default: outputs/sessions)",
     )
     command.add_argument(
         "--players",
         nargs=2,
         metavar=("A", "B"),
-        help="who plays: joystick, keyboard, scripted[:PAIR], replay:FILE, policy:CKPT or policy:pretrained, the model "
-        "that comes with the package; A begins on the robot's seat, unless B alone is a policy "
-        "(default: the joysticks that are plugged in, the keyboard beside them)",
+        help="the players: joystick (any gamepad), keyboard, scripted[:PAIR], replay:FILE, policy:CKPT or "
+        "policy:pretrained (the model in the package); A starts in the robot seat, unless only B is a policy "
+        "(default: the connected gamepads, else the keyboard)",
     )
     add_task_flag(command)
-    add_maps_flag(command, "training", given=False)
-    command.add_argument("--orientations", action="store_true", help="each map with four start orientations")
+    add_maps_flag(command, "training", use_default=False)
+    command.add_argument("--orientations", action="store_true", help="use each map with four start orientations")
     command.add_argument(
-        "--episodes", type=whole_number("--episodes"), default=36, help="episodes to keep in a session (default 36)"
+        "--episodes",
+        type=whole_number("--episodes"),
+        default=36,
+        help="number of episodes to keep in the session (default 36)",
     )
     command.add_argument(
         "--practice",
         type=whole_number("--practice", 0),
         default=0,
-        help="practice episodes before them, marked and discarded",
+        help="number of practice episodes before them, marked and discarded (default 0)",
     )
-    command.add_argument("--seed", type=seed(), default=0, help="of the schedule and of simulated players (default 0)")
+    command.add_argument(
+        "--seed", type=seed(), default=0, help="seed of the schedule and of scripted players (default 0)"
+    )
     command.add_argument(
         "--seats",
         choices=("swap", "fixed"),
-        help="swap: the players change seats in the middle of the session (default for two people); fixed: they do not",
+        help="swap: change seats in the middle of the session (default for two people); fixed: keep them",
     )
-    command.add_argument("--consent-0", default="", metavar="ID", help="record id of player a's consent, no name")
-    command.add_argument("--consent-1", default="", metavar="ID", help="record id of player b's consent, no name")
-    command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
+    command.add_argument("--consent-0", default="", metavar="ID", help="id of player a's consent record (not a name)")
+    command.add_argument("--consent-1", default="", metavar="ID", help="id of player b's consent record (not a name)")
+    command.add_argument("--license", default="", help="license of the recordings, by its id on the Hub (cc-by-4.0)")
     command.add_argument(
         "--angular-limit",
         choices=ANGULAR_LIMITS,
-        help="angular acceleration, rad/s^2 (default: what a policy at the table learned with, else pi/2)",
+        help="bound on the angular acceleration, rad/s^2 (default: that of a policy's training data, else pi/2)",
     )
     command.add_argument(
         "--countdown", type=number("--countdown", 0, 60), default=3.0, help="seconds before each episode (default 3)"
     )
-    command.add_argument("--new-session", action="store_true", help="do not continue the pair's unfinished session")
-    command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")
-    command.add_argument("--fullscreen", action="store_true", help="begin in full screen (F11 changes it)")
-    command.add_argument("--window", metavar="WxH", help="size of the window (default: what suits the desktop)")
+    command.add_argument("--new-session", action="store_true", help="start a new session instead of continuing one")
+    command.add_argument("--headless", action="store_true", help="no window; plays in real time, keeps every episode")
+    command.add_argument("--fullscreen", action="store_true", help="start in full screen (F11 toggles it)")
+    command.add_argument("--window", metavar="WxH", help="size of the window (default: fits the desktop)")
     command.add_argument("--mute", action="store_true", help="no sounds")
     command.add_argument(
-        "--config-dir", type=Path, help="folder of the sticks' calibrations (default: the user's settings)"
+        "--config-dir", type=Path, help="folder of calibrations and mappings (default: the user's settings folder)"
     )
 
 
-def settings_of(arguments: argparse.Namespace) -> PlaySettings:
-    """The settings behind the flags.
+def settings_from_flags(arguments: argparse.Namespace) -> PlaySettings:
+    """Returns the settings of a session from its flags.
 
     Raises:
-        CopolicyError: a value that cannot be.
+        CopolicyError: a value is invalid.
     """
-    task, pilots = get_task(arguments.task), None
+    task, specs = get_task(arguments.task), None
     if arguments.players:
-        first, second = (PilotSpec.parse(text, arguments.task) for text in arguments.players)
-        pilots = (first, second)
+        first, second = (PlayerSpec.parse(text, arguments.task) for text in arguments.players)
+        specs = (first, second)
     return PlaySettings(
-        **{name: getattr(arguments, name) for name in _AS_GIVEN},
-        pilots=pilots,
-        maps=set_name(task, arguments.maps, "training"),
+        **{name: getattr(arguments, name) for name in _COPIED_FLAGS},
+        players=specs,
+        maps=map_set_name(task, arguments.maps, "training"),
         swap_seats={"swap": True, "fixed": False, None: None}[arguments.seats],
         consents=(arguments.consent_0, arguments.consent_1),
-        angular_limit=_angular_limit(pilots or (), arguments.angular_limit, task),
+        angular_limit=_angular_limit(specs or (), arguments.angular_limit, task),
         window=_size(arguments.window),
         config_folder=arguments.config_dir,
         countdown_s=arguments.countdown,
     )
 
 
-def _angular_limit(pilots: Iterable[PilotSpec], flag: str | None, task: PairTask | None = None) -> float | None:
-    """The limit that the policies in the session learned with; a flag wins, and is said to contradict them."""
-    # What a session without a policy does without.
+def _angular_limit(specs: Iterable[PlayerSpec], flag: str | None, task: PairTask | None = None) -> float | None:
+    """Returns the flag's limit, or that of the policies' training data; logs a warning where the two differ."""
+    # Imported here, since only a session with a policy needs it.
     from ..agents.checkpoint_folder import checkpoint_folder
     from ..agents.training_conditions import training_conditions
 
     task = task or get_task()
-    usual = task.settings_type()
-    bound = angular_limit_of(usual)
-    given = None if flag is None else angular_limit_of(limited(task, usual, flag))
-    learned: dict[str, float] = {}
-    for pilot in pilots:
-        if pilot.kind == "policy":
-            conditions = training_conditions(checkpoint_folder(pilot.detail))
+    defaults = task.settings_type()
+    default_limit = angular_limit_of(defaults)
+    flag_limit = None if flag is None else angular_limit_of(with_angular_limit(task, defaults, flag))
+    trained: dict[str, float] = {}
+    for spec in specs:
+        if spec.kind == "policy":
+            conditions = training_conditions(checkpoint_folder(spec.detail))
             if conditions.task != task.spec.name:
                 expected = f"a policy that has learned the task {task.spec.name!r}"
-                raise InvalidValueError(f"policy:{pilot.detail}", expected, conditions.task)
+                raise InvalidValueError(f"policy:{spec.detail}", expected, conditions.task)
             for note in conditions.notes:
-                logging.info("%s: %s", pilot.detail, note)
-            rest = conditions.physics
-            if bound is not None:
-                learned[pilot.detail] = getattr(conditions.physics, LIMIT)
-                rest = limited(task, rest, bound)
-            if rest != usual:
-                logging.warning("%s: learned under other physics than those of play: %s", pilot.detail, rest)
-    if given is None:
-        if len(set(learned.values())) > 1:
+                logging.info("%s: %s", spec.detail, note)
+            settings = conditions.settings
+            if default_limit is not None:
+                trained[spec.detail] = getattr(settings, LIMIT_SETTING)
+                settings = with_angular_limit(task, settings, default_limit)
+            if settings != defaults:
+                logging.warning("%s: trained with other physics than those of play: %s", spec.detail, settings)
+    if flag_limit is None:
+        if len(set(trained.values())) > 1:
             raise InvalidValueError(
-                "--angular-limit", "a choice, since the policies learned with different ones", learned
+                "--angular-limit", "one value, since the policies were trained with different ones", trained
             )
-        return next(iter(learned.values()), bound)
-    for name, limit in learned.items():
-        if not math.isclose(limit, given):
-            logging.warning("--angular-limit %s: %s learned with %.4g rad/s^2", flag, name, limit)
-    return given
+        return next(iter(trained.values()), default_limit)
+    for name, limit in trained.items():
+        if not math.isclose(limit, flag_limit):
+            logging.warning("--angular-limit %s: %s was trained with %.4g rad/s^2", flag, name, limit)
+    return flag_limit
 
 
-def _play(arguments: argparse.Namespace) -> dict:
-    settings = settings_of(arguments)
-    # Loading pygame takes a moment that `--help` should not.
+def _play(arguments: argparse.Namespace) -> dict[str, Any]:
+    settings = settings_from_flags(arguments)
+    # Imported here, since pygame is slow to import and `--help` does not need it.
     from .session_run import play
 
     return play(settings)

@@ -1,4 +1,4 @@
-"""The ends of a session: complete, or stopped by a disk that refuses."""
+"""The phases at the end of a session: it is complete, or a recording cannot be written."""
 
 from collections import Counter
 from typing import ClassVar
@@ -10,13 +10,13 @@ from ..screen.palette import GREEN, MUTED, VERMILION
 from ..ticker import Tick
 from .game import Game
 from .menu_phase import MenuPhase
-from .phase import To
+from .phase import NextPhase
 
-_ALONE_S = 2.0
+_UNATTENDED_S = 2.0  # a session without people then closes
 
 
 class Finished(MenuPhase):
-    """Thanks the pair; the last keep can still be undone."""
+    """Shows a summary; the last keep can still be undone."""
 
     shortcuts: ClassVar = {Command.UNDO: "undo"}
 
@@ -24,31 +24,30 @@ class Finished(MenuPhase):
         super().__init__(game, "The session is complete", [("close", "close"), ("undo the last keep", "undo")])
 
     def enter(self) -> None:
-        """Notes it."""
+        """Writes an entry to the journal."""
         self.game.folder.journal("finished")
         self.game.sounds.play("goal")
 
-    def tick(self, tick: Tick) -> To:
-        """Follows the choice."""
-        game, choice = self.game, self.take()
+    def tick(self, tick: Tick) -> NextPhase:
+        """Follows the players' choice; without people or a window, the session closes."""
+        game, choice = self.game, self.pop_choice()
         self.ticks += 1
-        if choice == "close" or self.alone(_ALONE_S) or game.settings.headless:
-            return To.END
+        if choice == "close" or self.unattended(_UNATTENDED_S) or game.settings.headless:
+            return NextPhase.END
         if choice == "undo":
             game.undo()
             if not game.finished:
-                return To.READY
-        return To.STAY
+                return NextPhase.READY
+        return NextPhase.STAY
 
-    def draw(self, canvas: Canvas, share: float) -> None:
+    def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the summary."""
         canvas.box(0, 0, *SIZE)
         outcomes = Counter(outcome for outcome, verdict in self.game.results if verdict == "keep")
         successes = self.game.task.spec.successes
         count, noun = sum(outcomes[reason] for reason in successes), "goals" if "goal" in successes else "successes"
-        kept = self.game.folder.counts.kept_here.total()
         lines = [
-            Line(f"episodes kept: {kept}", 38),
+            Line(f"episodes kept: {self.game.folder.counts.kept_in_session.total()}", 38),
             Line(f"{noun} today: {count} of {outcomes.total()}", 30, MUTED),
             Line("Thank you both.", 34),
         ]
@@ -56,36 +55,36 @@ class Finished(MenuPhase):
 
 
 class Failure(MenuPhase):
-    """A recording could not be written: earlier ones are complete, this one stays as `.part`."""
+    """A recording could not be written: it stays as `.part`, and earlier ones are complete."""
 
     def __init__(self, game: Game):
         super().__init__(game, "The recording cannot be written", [("try again", "again"), ("quit", "quit")])
         self._problem = game.problem
 
     def enter(self) -> None:
-        """Tells; without a window nobody can be asked.
+        """Plays a tone.
 
         Raises:
-            RunError: there is no window.
+            RunError: there is no window, so that nobody can choose.
         """
         self.game.sounds.play("alarm")
         if self.game.settings.headless:
-            raise self.game.no_room()
+            raise self.game.storage_error()
 
-    def tick(self, tick: Tick) -> To:
-        """Follows the choice."""
-        choice = self.take()
+    def tick(self, tick: Tick) -> NextPhase:
+        """Follows the players' choice."""
+        choice = self.pop_choice()
         if choice == "quit":
             self.game.stop = self._problem
-            return To.END
-        return To.READY if choice == "again" else To.STAY
+            return NextPhase.END
+        return NextPhase.READY if choice == "again" else NextPhase.STAY
 
-    def draw(self, canvas: Canvas, share: float) -> None:
+    def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the message."""
         canvas.box(0, 0, *SIZE)
         lines = [
             Line(self._problem, 36, VERMILION),
-            Line("Finished episodes are complete. What there is of this one", 26, MUTED),
+            Line("Finished episodes are safe. The recorded part of this one", 26, MUTED),
             Line("stays in the session's folder and can be recovered.", 26, MUTED),
         ]
         draw_dialog(canvas, self.menu.title, lines, self.menu.labels, self.menu.cursor, VERMILION, 860)

@@ -1,4 +1,4 @@
-"""What all phases of a session share: the players, the folder, the schedule, the clock, what the screen needs."""
+"""The state of a session that its phases share: players, folder, schedule, clock and messages."""
 
 import uuid
 from importlib.metadata import version
@@ -14,9 +14,9 @@ from ..recording.wall_clock import WallClockAnchor
 from ..rollout import Agent
 from ..screen.hud import Hud, SeatStatus
 from ..screen.outline_view import scene_view
-from ..session import Balance, SessionFolder
+from ..session import BalancedSchedule, SessionFolder
 from ..ticker import MonotonicClock, Ticker
-from .player import Player, replayed_map
+from .player import SeatedPlayer, replayed_scenario
 from .roster import Roster
 from .settings import PlaySettings
 from .sounds import Sounds
@@ -26,18 +26,19 @@ _TOAST_NS = 3 * 10**9
 
 
 class Game:
-    """The state of a session that outlives its phases.
+    """The state of a session that its phases share.
 
     Attributes:
         task: that is played.
-        roster: the players and what they hold.
-        swapped: the players changed the seats that the schedule gave them.
-        trial: the episode that is played or about to be.
+        roster: the players and their devices.
+        schedule: of scenarios and seats.
+        practice_left: practice episodes still to play.
+        swapped: the players exchanged the seats that the schedule gave them.
+        trial: the current or next episode.
         stop: why the session is to end; empty while it goes on.
         pause_reason: of the last pause, `player`, `device_lost` or `focus_lost`.
         problem: why the last recording could not be written.
-        toast: a short message for the screen.
-        results: outcome of every episode of this run, by its verdict.
+        results: outcome and verdict of every episode of this run.
     """
 
     def __init__(
@@ -59,11 +60,13 @@ class Game:
         self.anchor = WallClockAnchor.now()
         people = all(player.person for player in players)
         swap = people if settings.swap_seats is None else settings.swap_seats
-        replayed = replayed_map(players)
-        self.maps = settings.map_configs() if replayed is None else (replayed,)
-        # A policy learned the robot's half of the plans, and to listen to the human's.
-        robot = int([player.spec.kind == "policy" for player in players] == [False, True])
-        self.balance = Balance(self.maps, settings.episodes, settings.seed, settings.pair, swap, robot, self.task)
+        replayed = replayed_scenario(players)
+        self.scenarios = settings.scenarios if replayed is None else (replayed,)
+        # A policy was trained to act in the robot seat.
+        seating = int([player.spec.kind == "policy" for player in players] == [False, True])
+        self.schedule = BalancedSchedule(
+            self.scenarios, settings.episodes, settings.seed, settings.pair, swap, seating, self.task
+        )
         self.practice_left = 0 if folder.continued else settings.practice
         self.swapped = False
         self.trial: Trial | None = None
@@ -71,50 +74,48 @@ class Game:
         self.pause_reason = "player"
         self.problem = ""
         self.results: list[tuple[str, str]] = []
-        self._again: tuple[Any, int] | None = None
+        self._redo: tuple[Any, int] | None = None
         self._last_seating: int | None = None
         self._toast = ("", 0)
         self._view: tuple[Any, SceneView] | None = None
 
-    # The schedule.
-
-    def play_by(self, balance: Balance, robot: Agent) -> None:
-        """Plays by another schedule, with an agent at the robot's seat; before the first episode."""
-        self.balance, self.players[0].agent = balance, robot
+    def set_schedule(self, schedule: BalancedSchedule, robot: Agent) -> None:
+        """Replaces the schedule and player a's agent; to be called before the first episode."""
+        self.schedule, self.players[0].agent = schedule, robot
 
     @property
     def finished(self) -> bool:
-        """The session has kept all it was to keep."""
-        return self.practice_left == 0 and self.folder.counts.kept_here.total() >= self.settings.episodes
+        """The session has kept all its episodes."""
+        return self.practice_left == 0 and self.folder.counts.kept_in_session.total() >= self.settings.episodes
 
     def next_trial(self) -> Trial:
-        """Prepares the next episode of the schedule, or the same again after a redo."""
+        """Prepares the next episode: that of the schedule, or the last one again after a redo."""
         practice = self.practice_left > 0
-        if self._again is not None:
-            config, seating = self._again
+        if self._redo is not None:
+            scenario, seating = self._redo
         elif practice:
-            config = self.balance.practice(self.settings.practice - self.practice_left)
-            seating = self.balance.seating(self.folder.counts)
+            scenario = self.schedule.practice(self.settings.practice - self.practice_left)
+            seating = self.schedule.seating(self.folder.counts)
         else:
-            config, seating = self.balance.next(self.folder.counts)
-        self.trial = trial = self._make_trial(config, seating, practice)
+            scenario, seating = self.schedule.next(self.folder.counts)
+        self.trial = trial = self._make_trial(scenario, seating, practice)
         if self._last_seating not in (None, trial.seating):
-            self.say("You have changed seats: look at your colours")
+            self.show_message("You have changed seats: check your colour")
         self._last_seating = trial.seating
         return trial
 
-    def reseat(self) -> None:
-        """Swaps the seats of the players, for the episode that is about to begin and the rest of the block."""
+    def exchange_seats(self) -> None:
+        """Swaps the seats of the players, in the next episode and all later ones."""
         self.swapped = not self.swapped
         self.folder.journal("swap", swapped=self.swapped)
         if self.trial is not None and not self.trial.began:
-            self.trial = self._make_trial(self.trial.map_config, self._planned, self.trial.practice)
+            self.trial = self._make_trial(self.trial.scenario, self._scheduled_seating, self.trial.practice)
 
-    def _make_trial(self, config: Any, planned: int, practice: bool) -> Trial:
-        self._planned = planned
-        seating = planned ^ self.swapped
+    def _make_trial(self, scenario: Any, scheduled_seating: int, practice: bool) -> Trial:
+        self._scheduled_seating = scheduled_seating
+        seating = scheduled_seating ^ self.swapped
         robot, human = self.players[seating], self.players[1 - seating]
-        attempt = len(self.results) + self.folder.counts.tried.total()
+        attempt = len(self.results) + self.folder.counts.attempted.total()
         entropy = [self.settings.seed, *self.settings.pair.encode(), *self.folder.session_id.encode(), attempt]
         consents = [player.consent for player in (robot, human) if player.consent]
         meta = EpisodeMeta(
@@ -125,7 +126,7 @@ class Game:
             player_1_id=human.player_id,
             controller_0=robot.agent.name,
             controller_1=human.agent.name,
-            **self.task.name_of(config).columns,
+            **self.task.name_of(scenario).columns,
             seed=int(np.random.SeedSequence(entropy).generate_state(1)[0]),
             source="human" if robot.person or human.person else "simulated",
             consent_id=",".join(consents),
@@ -134,17 +135,15 @@ class Game:
         )
         agents = (robot.agent, human.agent)
         return Trial(
-            self.folder.next_path(), self.task, config, seating, agents, meta, self.anchor, self.settings.physics,
-            practice, self.clock,
+            self.folder.next_path(), self.task, scenario, seating, agents, meta, self.anchor,
+            self.settings.world_settings, practice, self.clock,
         )  # fmt: skip
 
-    # Verdicts.
-
     def close_trial(self, verdict: str, reason: str = "") -> None:
-        """Completes the recording of the episode: `keep`, `redo` or `discard`.
+        """Completes the recording of the episode with a verdict: `keep`, `redo` or `discard`.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the recording cannot be written.
         """
         trial = self.trial
         assert trial is not None
@@ -152,14 +151,14 @@ class Game:
             trial.finish(verdict != "keep", reason)
         else:
             trial.interrupt("operator_discard", reason)
-        self._closed(trial, verdict, reason)
-        self._again = (trial.map_config, trial.seating ^ self.swapped) if verdict == "redo" else None
+        self._count_trial(trial, verdict, reason)
+        self._redo = (trial.scenario, trial.seating ^ self.swapped) if verdict == "redo" else None
 
-    def break_off(self, reason: str) -> None:
-        """Ends the running episode in order, since the session ends: one that had its outcome is kept as it is.
+    def end_trial(self, reason: str) -> None:
+        """Completes the recording of the current episode when the session ends; keeps it if it has an outcome.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the recording cannot be written.
         """
         trial = self.trial
         if trial is None or not trial.began:
@@ -167,14 +166,14 @@ class Game:
             return
         if trial.outcome.done:
             trial.finish()
-            self._closed(trial, "keep", reason)
+            self._count_trial(trial, "keep", reason)
         else:
             termination = reason if reason in ("device_lost", "focus_lost") else "operator_discard"
             trial.interrupt(termination, reason)
-            self._closed(trial, "discard", reason)
+            self._count_trial(trial, "discard", reason)
 
-    def lose_trial(self, error: OSError) -> None:
-        """Lets go of an episode that could not be written; `problem` says why."""
+    def abandon_trial(self, error: OSError) -> None:
+        """Drops an episode that could not be written; sets `problem`."""
         trial = self.trial
         self.trial = None
         if trial is not None and trial.began:
@@ -183,22 +182,23 @@ class Game:
         self.problem = error.strerror or str(error)
 
     def undo(self) -> None:
-        """Takes the last keep back and says so."""
+        """Undoes the last keep and shows a message."""
         try:
             undone = self.folder.undo_last_keep()
         except OSError as error:
-            self.say(f"not undone: {error.strerror}")
+            self.show_message(f"not undone: {error.strerror}")
             return
-        self.say(f"undone: {undone.path.name}; its map comes again" if undone else "nothing to undo")
+        repeated = f"its {self.task.words.scenario} will be repeated"
+        self.show_message(f"undone: {undone.path.name}; {repeated}" if undone else "nothing to undo")
 
-    def no_room(self) -> RunError:
-        """What to tell where nobody can be asked what to do."""
+    def storage_error(self) -> RunError:
+        """Returns the error for a recording that could not be written."""
         return RunError(
-            f"{self.folder.path}: expected room for a recording, found: {self.problem}; "
-            "finished episodes are complete, what there is of this one stays as .part"
+            f"{self.folder.path}: expected space for a recording, found: {self.problem}; "
+            "finished episodes are complete, this one is kept as .part"
         )
 
-    def _closed(self, trial: Trial, verdict: str, reason: str) -> None:
+    def _count_trial(self, trial: Trial, verdict: str, reason: str) -> None:
         self.trial = None
         self.results.append((trial.outcome.reason or "interrupted", verdict))
         if trial.practice:
@@ -210,65 +210,57 @@ class Game:
             practice=trial.practice,
         )  # fmt: skip
 
-    # The seats.
-
-    def seats(self, trial: Trial | None = None) -> tuple[Player, Player]:
-        """Who sits on the robot's and on the human's seat."""
-        seating = trial.seating if trial else self.balance.seating(self.folder.counts) ^ self.swapped
+    def seats(self, trial: Trial | None = None) -> tuple[SeatedPlayer, SeatedPlayer]:
+        """Returns the players of the robot seat and the human seat, of an episode or by the schedule."""
+        seating = trial.seating if trial else self.schedule.seating(self.folder.counts) ^ self.swapped
         return self.players[seating], self.players[1 - seating]
 
     def describe_devices(self, trial: Trial) -> dict[str, str]:
-        """For the recording's record `devices`."""
+        """Returns the entries of the recording's metadata record `devices`."""
         return {
             f"seat_{seat}_{key}": text
             for seat, player in enumerate(self.seats(trial))
             for key, text in player.describe().items()
         }
 
-    # The screen.
-
-    def say(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Shows a short message for three seconds."""
         self._toast = (text, self.clock() + _TOAST_NS)
 
     @property
     def toast(self) -> str:
-        """The message that is to be shown now."""
+        """The message to show now; empty if there is none."""
         return self._toast[0] if self.clock() < self._toast[1] else ""
 
-    def view(self, config: Any) -> SceneView:
-        """The view of a map, kept as long as the map is the same."""
-        if self._view is None or self._view[0] != config:
-            self._view = config, scene_view(self.task, config)
+    def view(self, scenario: Any) -> SceneView:
+        """Returns the view of a scenario, cached for the last one."""
+        if self._view is None or self._view[0] != scenario:
+            self._view = scenario, scene_view(self.task, scenario)
         return self._view[1]
 
-    def title(self, trial: Trial) -> str:
-        """Where the session is."""
+    def hud(self, trial: Trial, running: bool = True) -> Hud:
+        """Returns the content of the bars around the world, for a running or a coming episode."""
+        kept, episodes = self.folder.counts.kept_in_session.total(), self.settings.episodes
+        position = f"episode {min(kept + 1, episodes)} of {episodes}"
         if trial.practice:
-            return f"{self.settings.pair}   practice, {self.practice_left} left"
-        kept = self.folder.counts.kept_here.total()
-        return f"{self.settings.pair}   episode {min(kept + 1, self.settings.episodes)} of {self.settings.episodes}"
-
-    def hud(self, trial: Trial, carrying: bool = True) -> Hud:
-        """What the bars show of an episode, or of one that is about to begin."""
-        robot, human = self.seats(trial)
-        forces = ((trial.forces[0], trial.forces[1]), (trial.forces[2], trial.forces[3]))
+            position = f"practice, {self.practice_left} left"
+        forces = (trial.forces[:2], trial.forces[2:])
         statuses = [
-            SeatStatus(player.label if carrying else f"{player.player_id}: {player.label}", force, player.missing)
-            for player, force in zip((robot, human), forces, strict=True)
+            SeatStatus(player.label if running else f"{player.player_id}: {player.label}", force, player.lacks_device)
+            for player, force in zip(self.seats(trial), forces, strict=True)
         ]
         return Hud(
-            title=self.title(trial),
-            done=self.folder.counts.kept_here.total() / self.settings.episodes,
+            title=f"{self.settings.pair}   {position}",
+            progress=kept / episodes,
             seconds=trial.seconds,
             limit_s=trial.step_limit / self.task.spec.record_hz,
             score=trial.score,
             seats=(statuses[0], statuses[1]),
             interaction=trial.interaction,
-            senses=self.task.words.interaction_senses,
-            missing=self.task.missing("interaction measure"),
-            late=trial.loop.late + trial.loop.skipped,
+            interaction_senses=self.task.words.interaction_senses,
+            interaction_missing=self.task.missing("interaction measure"),
+            late_ticks=trial.loop.late + trial.loop.skipped,
             hz=trial.loop.achieved_hz,
             practice=trial.practice,
-            carrying=carrying,
+            running=running,
         )

@@ -1,4 +1,4 @@
-"""Choosing one of several things, and writing a line, with whatever the players hold."""
+"""Menus and text fields, used with gamepads or the keyboard."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from ..inputs import Command, Press
 from ..sdl import pygame
 
 Item = tuple[str, str]
-"""What stands in a menu, and what choosing it means."""
+"""The label of a menu item, and the value that choosing it returns."""
 
 BACK = "back"
 
@@ -18,7 +18,9 @@ class Menu:
     """A list with a cursor.
 
     Attributes:
-        rows: of each column, where it is drawn in several: left and right go to the column beside it.
+        items: label and value of each item.
+        cursor: index of the selected item.
+        rows: per column, in a menu of several columns, where left and right change the column; else None.
     """
 
     def __init__(self, title: str, items: Sequence[Item], rows: int | None = None):
@@ -29,17 +31,17 @@ class Menu:
 
     @property
     def labels(self) -> list[str]:
-        """What stands in it."""
+        """The labels of the items."""
         return [label for label, _ in self.items]
 
     def handle(self, press: Press) -> str | None:
-        """Moves the cursor, or returns the choice; `back` where the player wants back."""
+        """Moves the cursor; returns the value of a chosen item, or `BACK`."""
         if press.command in (Command.UP, Command.DOWN):
             step = 1 if press.command == Command.DOWN else -1
             self.cursor = (self.cursor + step) % len(self.items)
         elif press.command in (Command.LEFT, Command.RIGHT) and self.rows:
-            beside = self.cursor + (self.rows if press.command == Command.RIGHT else -self.rows)
-            self.cursor = beside if 0 <= beside < len(self.items) else self.cursor
+            index = self.cursor + (self.rows if press.command == Command.RIGHT else -self.rows)
+            self.cursor = index if 0 <= index < len(self.items) else self.cursor
         elif press.command == Command.ACCEPT:
             return self.items[self.cursor][1]
         elif press.command == Command.BACK:
@@ -48,38 +50,38 @@ class Menu:
 
 
 class TextEntry:
-    """A line that is written on the keyboard.
+    """A text field of one line.
 
     Attributes:
-        text: so far.
-        done: it is finished (with Enter).
-        left: it was left (with Esc).
+        text: entered so far.
+        done: confirmed with Enter.
+        cancelled: closed with Esc.
     """
 
     def __init__(self, title: str, limit: int = 200):
         self.title = title
         self.text = ""
-        self.done = self.left = False
+        self.done = self.cancelled = False
         self._limit = limit
 
     def handle(self, event: pygame.event.Event) -> None:
-        """Takes an event of the keyboard."""
+        """Handles a keyboard event."""
         if event.type == pygame.TEXTINPUT:
             self.text = (self.text + event.text)[: self._limit]
         elif event.type == pygame.KEYDOWN:
             if event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
                 self.done = True
             elif event.key == pygame.K_ESCAPE:
-                self.left = True
+                self.cancelled = True
             elif event.key == pygame.K_BACKSPACE:
                 self.text = self.text[:-1]
 
 
 def note_menu() -> Menu:
-    """Notes that need no keyboard, and one that does."""
-    return Menu("Note (no names)", [*((note, f"note:{note}") for note in NOTES), ("write it on the keyboard", "write")])
+    """Returns a menu of predefined notes, and of writing one on the keyboard."""
+    return Menu("Note (no names)", [*((note, f"note:{note}") for note in NOTES), ("type a note", "write")])
 
 
 def reason_menu() -> Menu:
-    """Reasons to discard an episode."""
-    return Menu("Discard: why?", [(reason, f"discard:{reason}") for reason in REASONS])
+    """Returns a menu of reasons to discard an episode."""
+    return Menu("Why discard this episode?", [(reason, f"discard:{reason}") for reason in REASONS])

@@ -1,4 +1,4 @@
-"""Phases that the players leave by a menu: how choices are taken, and what may be written about an episode."""
+"""Phases with a menu, and phases with notes about an episode."""
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
@@ -6,15 +6,15 @@ from typing import ClassVar
 from ..inputs import Command, Press
 from .game import Game
 from .menu import BACK, Item, Menu, TextEntry, note_menu, reason_menu
-from .phase import Phase, To
+from .phase import NextPhase, Phase
 
 
 class MenuPhase(Phase):
-    """A phase with a menu, above which others open; `back` closes these.
+    """A phase with a menu and submenus, which `BACK` closes.
 
     Attributes:
-        shortcuts: choices by the command that makes them at once, where the menu has them.
-        top: the menu below all others.
+        shortcuts: value of an item, by the command that chooses it directly if the menu has it.
+        top: the first menu.
         ticks: since the phase began.
     """
 
@@ -29,47 +29,47 @@ class MenuPhase(Phase):
 
     @property
     def menu(self) -> Menu:
-        """The one in front."""
+        """The open menu or submenu."""
         return self._menus[-1]
 
     def handle(self, press: Press) -> None:
-        """Moves in the menu, or takes a short cut."""
+        """Moves in the menu, or chooses by a shortcut."""
         choice = self.shortcuts.get(press.command)
         if choice is None or choice not in [value for _, value in self.menu.items]:
             choice = self.menu.handle(press)
         self._choice = choice or self._choice
 
-    def take(self) -> str:
-        """The choice of this tick; empty where there is none."""
+    def pop_choice(self) -> str:
+        """Returns and clears the choice of this tick; empty if there is none."""
         choice, self._choice = self._choice, ""
         return choice
 
-    def alone(self, seconds: float) -> bool:
-        """Nobody is there to choose, and the phase has lasted for so long."""
+    def unattended(self, seconds: float) -> bool:
+        """Whether no player is a person and the phase has lasted this long."""
         people = any(player.person for player in self.game.players)
         return not people and self.ticks * self.game.ticker.dt_ns > seconds * 1e9
 
 
 class NotesPhase(MenuPhase):
-    """A phase of an episode that has begun, with notes about it and reasons to discard it."""
+    """A phase in which players add notes to an episode or discard it with a reason."""
 
-    def tick_notes(self) -> To:
-        """Takes what was written, then follows the choice; a disk that refuses ends the episode."""
-        if self.entry and (self.entry.done or self.entry.left):
+    def tick_notes(self) -> NextPhase:
+        """Adds an entered note, then follows the choice; leads to FAILURE if the recording cannot be written."""
+        if self.entry and (self.entry.done or self.entry.cancelled):
             if self.entry.done and self.entry.text.strip():
                 self._note(self.entry.text.strip())
             self.entry = None
-        choice = self.take()
+        choice = self.pop_choice()
         try:
-            return self.follow(choice) if choice else To.STAY
+            return self.follow(choice) if choice else NextPhase.STAY
         except OSError as error:
-            self.game.lose_trial(error)
-            return To.FAILURE
+            self.game.abandon_trial(error)
+            return NextPhase.FAILURE
 
-    def follow(self, choice: str) -> To:
-        """What a choice leads to; a phase adds its own."""
-        kind, _, detail = choice.partition(":")
-        match kind:
+    def follow(self, choice: str) -> NextPhase:
+        """Carries out a choice and returns the next phase; subclasses add their own choices."""
+        action, _, detail = choice.partition(":")
+        match action:
             case "note" if not detail:
                 self._menus.append(note_menu())
             case "note":
@@ -81,9 +81,9 @@ class NotesPhase(MenuPhase):
                 self._menus.append(reason_menu())
             case _ if choice == BACK and len(self._menus) > 1:
                 self._menus.pop()
-        return To.STAY
+        return NextPhase.STAY
 
     def _note(self, text: str) -> None:
         self.trial.note(text)
         self._menus = [self.top]
-        self.game.say("note added")
+        self.game.show_message("note added")

@@ -1,8 +1,8 @@
-"""One state of a session: the lobby, an episode about to begin, the episode itself, its result, the end."""
+"""The interface of the phases of a session: lobby, count-down, episode, result and so on."""
 
 from enum import Enum, auto
 
-from copolicy.dataset.outline import between
+from copolicy.dataset.outline import interpolate_pose
 
 from ..inputs import Press
 from ..screen import WORLD, Canvas
@@ -11,12 +11,12 @@ from ..sdl import pygame
 from ..ticker import Tick
 from .game import Game
 from .menu import TextEntry
-from .player import Player
+from .player import SeatedPlayer
 from .trial import Trial
 
 
-class To(Enum):
-    """Where a phase leads."""
+class NextPhase(Enum):
+    """The phase that follows; STAY for the same one, END to leave the session."""
 
     STAY = auto()
     LOBBY = auto()
@@ -31,11 +31,11 @@ class To(Enum):
 
 
 class Phase:
-    """What the loop asks of every phase; a phase overrides what concerns it.
+    """The interface of a phase, which the application's loop calls.
 
     Attributes:
-        entry: a line that is being written; it gets all keys while there is one.
-        realtime: a step hangs on every tick, so drawing must not be in its way.
+        realtime: every tick is a step of the world, so drawing must not delay it.
+        entry: the open text field, which receives all keys; None if there is none.
     """
 
     realtime = False
@@ -45,41 +45,41 @@ class Phase:
         self.entry: TextEntry | None = None
 
     def enter(self) -> None:
-        """It begins."""
+        """Called once when the phase begins."""
 
-    def takes(self, event: pygame.event.Event) -> bool:
-        """The phase wants an event of a joystick for itself; it commands nothing then."""
+    def consume(self, event: pygame.event.Event) -> bool:
+        """Handles a raw gamepad event; returns True if it must not be read as a command."""
         return False
 
     def handle(self, press: Press) -> None:
-        """A player asks for something."""
+        """Handles a command of a player."""
 
-    def tick(self, tick: Tick) -> To:
-        """A step of the task; says what follows."""
-        return To.STAY
+    def tick(self, tick: Tick) -> NextPhase:
+        """Advances the phase by one tick; returns the phase that follows."""
+        return NextPhase.STAY
 
-    def draw(self, canvas: Canvas, share: float) -> None:
-        """Draws itself; `share` in [0, 1] of the time between two steps is over."""
+    def draw(self, canvas: Canvas, fraction: float) -> None:
+        """Draws the phase; `fraction` is the elapsed part of the current step, in [0, 1]."""
 
-    def joined(self, player: Player) -> None:
-        """A player has a device now that had to wait."""
+    def joined(self, player: SeatedPlayer) -> None:
+        """Called when a player has joined with a device that had to wait."""
 
-    def device_lost(self, player: Player) -> None:
-        """The device of a player is gone."""
+    def device_lost(self, player: SeatedPlayer) -> None:
+        """Called when the device of a player is gone."""
 
     def focus_lost(self) -> None:
-        """The window is no longer the one that gets the keys."""
+        """Called when the window loses the keyboard focus."""
 
     @property
     def trial(self) -> Trial:
-        """The episode that is played or about to be."""
-        assert self.game.trial is not None, "a phase of an episode without one"
+        """The current or next episode."""
+        assert self.game.trial is not None, "the phase needs an episode"
         return self.game.trial
 
-    def draw_world(self, canvas: Canvas, trial: Trial, share: float = 1.0, carrying: bool = True) -> None:
-        """Draws the world and the bars around it; before the episode the bars say who sits where."""
-        view = self.game.view(trial.map_config)
-        pose = between(trial.before, trial.pose, share)
+    def draw_world(self, canvas: Canvas, trial: Trial, fraction: float = 1.0, running: bool = True) -> None:
+        """Draws the world and the bars around it; with `running` False the bars name the players of the seats."""
+        view = self.game.view(trial.scenario)
+        pose = interpolate_pose(trial.previous_pose, trial.pose, fraction)
         trail = [*trial.trail, pose]
         view.draw(canvas.surface, canvas.rect(*WORLD), pose, trial.forces, trail)
-        draw_hud(canvas, self.game.hud(trial, carrying))
+        draw_hud(canvas, self.game.hud(trial, running))

@@ -1,4 +1,4 @@
-"""The end of an episode: how it went, and what is to become of its recording."""
+"""The phase after an episode: shows its result and asks for a verdict."""
 
 from typing import ClassVar
 
@@ -9,16 +9,16 @@ from ..screen.palette import MUTED, YELLOW
 from ..ticker import Tick
 from .game import Game
 from .menu_phase import NotesPhase
-from .phase import To
+from .phase import NextPhase
 
-_LEFT = 310.0
-_ALONE_S = 1.5  # without people the result stands for so long
-_DEAF_TICKS = 12  # a button that was meant for the episode is no verdict
-_PRACTICE = [("go on", "keep"), ("once more", "redo"), ("quit for now", "quit")]
+_DIALOG_X = 310.0
+_UNATTENDED_S = 1.5  # a session without people then keeps the episode
+_IGNORED_TICKS = 12  # a button pressed this early was still meant for the episode
+_PRACTICE = [("continue", "keep"), ("once more", "redo"), ("quit for now", "quit")]
 
 
-class Result(NotesPhase):
-    """Waits for the verdict: keep, redo, discard with a reason; notes before it, the last keep undone."""
+class ResultPhase(NotesPhase):
+    """Waits for the verdict: keep, redo, or discard with a reason; notes and an undo of the last keep come before."""
 
     shortcuts: ClassVar = {
         Command.KEEP: "keep", Command.REDO: "redo", Command.DISCARD: "discard", Command.NOTE: "note",
@@ -26,46 +26,46 @@ class Result(NotesPhase):
     }  # fmt: skip
 
     def __init__(self, game: Game):
-        assert game.trial is not None, "a result of an episode without one"
-        items = [("keep", "keep"), ("redo now", "redo"), ("discard: comes again later", "discard")]
+        assert game.trial is not None, "the phase needs an episode"
+        items = [("keep", "keep"), ("redo now", "redo"), ("discard, repeat later", "discard")]
         items += [("add a note", "note"), ("keep, and quit for now", "quit")]
-        if game.folder.kept:
-            items.insert(4, ("undo the keep before", "undo"))
+        if game.folder.kept_recordings:
+            items.insert(4, ("undo the previous keep", "undo"))
         title = outcome_text(game.trial.outcome.reason)
         super().__init__(game, title[:1].upper() + title[1:], _PRACTICE if game.trial.practice else items)
 
     def handle(self, press: Press) -> None:
-        """Moves in the menu, or takes a short cut."""
-        if self.ticks >= _DEAF_TICKS:
+        """Moves in the menu, or chooses by a shortcut."""
+        if self.ticks >= _IGNORED_TICKS:
             super().handle(press)
 
-    def tick(self, tick: Tick) -> To:
-        """Follows the players' choice; without people, or without a window, every episode is kept."""
+    def tick(self, tick: Tick) -> NextPhase:
+        """Follows the players' choice; without people or a window, the episode is kept."""
         self.ticks += 1
-        if self.alone(_ALONE_S) or self.game.settings.headless:
+        if self.unattended(_UNATTENDED_S) or self.game.settings.headless:
             self._choice = "keep"
         return self.tick_notes()
 
-    def follow(self, choice: str) -> To:
-        """The verdict."""
+    def follow(self, choice: str) -> NextPhase:
+        """Carries out the verdict."""
         game = self.game
-        kind, _, detail = choice.partition(":")
-        match kind:
+        action, _, detail = choice.partition(":")
+        match action:
             case "keep" | "redo":
-                game.close_trial(kind, "redo" if kind == "redo" else "")
+                game.close_trial(action, "redo" if action == "redo" else "")
             case "discard" if detail:
                 game.close_trial("discard", detail)
             case "undo":
                 game.undo()
-                return To.STAY
+                return NextPhase.STAY
             case "quit":
                 game.stop = "quit"
-                return To.END
+                return NextPhase.END
             case _:
                 return super().follow(choice)
-        return To.FINISHED if game.finished else To.READY
+        return NextPhase.FINISHED if game.finished else NextPhase.READY
 
-    def draw(self, canvas: Canvas, share: float) -> None:
+    def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the result over the world."""
         trial = self.trial
         self.draw_world(canvas, trial)
@@ -75,13 +75,13 @@ class Result(NotesPhase):
         menu = self.menu
         lines = [Line(f"{trial.seconds:.1f} s,  score {trial.score:+.0f}", 34)]
         if trial.loop.slow:
-            lines.append(Line(f"the loop was too slow ({trial.loop.skipped} skipped ticks): flagged", 24, YELLOW))
+            lines.append(Line(f"flagged: this computer was too slow ({trial.loop.skipped} ticks skipped)", 24, YELLOW))
         if trial.notes:
             lines.append(Line(f"notes: {'; '.join(trial.notes)}", 24, MUTED))
         hint = ""
         if menu is self.top and not trial.practice:
             hint = self.game.roster.hint(("a", "K", "keep"), ("x", "R", "redo"), ("y", "X", "discard"))
         colour = outcome_colour(trial.task.spec, trial.outcome.reason)
-        # Beside the body, so that everybody sees what happened.
-        middle = _LEFT if trial.pose[0] > trial.task.required_outline.size[0] / 2 else SIZE[0] - _LEFT
+        # On the side away from the body, so that the end of the episode stays visible.
+        middle = _DIALOG_X if trial.pose[0] > trial.task.required_outline.size[0] / 2 else SIZE[0] - _DIALOG_X
         draw_dialog(canvas, menu.title, lines, menu.labels, menu.cursor, colour, 560, hint, middle)

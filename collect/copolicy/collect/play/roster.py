@@ -1,188 +1,193 @@
-"""Who holds what: joysticks and halves of the keyboard come, go and come back."""
+"""The players and their devices: gamepads and halves of the keyboard are assigned, lost and assigned again."""
 
 import time
 from collections.abc import Callable
 
 from ..inputs import (
+    HALVES,
     CalibrationStore,
+    DuplicateDetector,
+    Gamepad,
+    Gamepads,
     KeyboardHalf,
-    Pad,
-    Pads,
     Press,
     PressLog,
     StickCalibration,
-    TwinWatch,
 )
-from ..inputs.gamepads import Labels
-from .player import Player, keyboard_half
+from ..inputs.mapping import Labels
+from .player import SeatedPlayer
 
 
 class Roster:
     """The two players and their devices.
 
-    A device belongs to who pressed a button on it, by SDL's number of it: never by its place among the devices, and
-    never by its make, which two of them may share. A second device joins once it was pressed without the first one:
-    some drivers list one pad twice.
+    A device is assigned to the player who presses a button on it, by SDL's instance id: not by its index, and not by
+    its model, which two devices may share. A second gamepad joins only after a press without the first one, since some
+    drivers list one gamepad twice.
 
     Attributes:
         players: a and b.
-        pads: that are plugged in.
-        refused: what to tell a player whose device did not join; empty where there is nothing to tell.
+        gamepads: that are connected.
+        refusal: message for a player whose device could not join; empty if there is none.
     """
 
     def __init__(
         self,
-        players: tuple[Player, Player],
-        pads: Pads,
+        players: tuple[SeatedPlayer, SeatedPlayer],
+        gamepads: Gamepads,
         store: CalibrationStore,
         journal: Callable[..., None],
         clock: Callable[[], int] = time.monotonic_ns,
     ):
         self.players = players
-        self.pads = pads
-        self.refused = ""
+        self.gamepads = gamepads
+        self.refusal = ""
         self._store = store
         self._journal = journal
         self._clock = clock
         self._presses = PressLog()
-        self._waiting: list[Pad] = []
-        self._twins = TwinWatch()
-        self._watched: tuple[Pad, Pad] | None = None
+        self._waiting: list[Gamepad] = []
+        self._duplicates = DuplicateDetector()
+        self._compared: tuple[Gamepad, Gamepad] | None = None
 
-    def player_of(self, press: Press) -> Player | None:
-        """Whose device a press came from."""
-        return next((one for one in self.players if one.device_id == press.device), None)
+    def player_of(self, press: Press) -> SeatedPlayer | None:
+        """Returns the player whose device gave a press, or None."""
+        return next((player for player in self.players if player.device_id == press.device), None)
 
-    def missing(self) -> list[Player]:
-        """People without a device."""
-        return [player for player in self.players if player.missing]
+    def without_device(self) -> list[SeatedPlayer]:
+        """Returns the people without a device."""
+        return [player for player in self.players if player.lacks_device]
 
-    def note(self, press: Press) -> None:
-        """Sees every press, for telling one device from another."""
+    def log_press(self, press: Press) -> None:
+        """Logs a press, to detect a gamepad that is listed twice; needs every press."""
         if isinstance(press.device, int) and not press.moved:
             self._presses.press(press.device, self._clock())
 
-    def join(self, press: Press) -> Player | None:
-        """Gives the device behind a press to the first person who waits for one of its kind.
+    def join(self, press: Press) -> SeatedPlayer | None:
+        """Assigns the device of a press to the first person who needs a device of its kind.
 
-        A joystick beside that of the other player may have to wait for two ticks, see `tick`.
+        A second gamepad may have to wait for two ticks, see `tick`.
 
         Returns:
-            Who that is; None where the device is taken, cannot steer, has to wait, or nobody waits for it.
+            The player; None if the device is in use, cannot steer, has to wait, or is not needed.
         """
         if press.moved or self.player_of(press):
             return None
-        device = self.pads.get(press.device) if isinstance(press.device, int) else keyboard_half(press.device)
-        if device is None or not any(player.wants(device) for player in self.players):
+        device = self.gamepads.get(press.device) if isinstance(press.device, int) else HALVES.get(press.device)
+        if device is None or not any(player.can_use(device) for player in self.players):
             return None
-        if isinstance(device, Pad):
-            if not device.steerings:
+        if isinstance(device, Gamepad):
+            if not device.steering_options:
                 self._refuse(device, f"{device.name} has neither a stick nor a d-pad: it cannot steer")
                 return None
-            if not all(self._presses.told_apart(device.instance_id, pad.instance_id) for pad in self._held()):
+            used = self._gamepads_in_use()
+            if not all(self._presses.distinct(device.instance_id, gamepad.instance_id) for gamepad in used):
                 self._waiting.append(device)
                 return None
-        return self.give(device)
+        return self.assign(device)
 
-    def tick(self) -> list[Player]:
-        """Ends a tick; returns who joined now with a device that had to wait."""
+    def tick(self) -> list[SeatedPlayer]:
+        """Ends a tick; returns the players who joined with a gamepad that had to wait."""
         self._presses.tick()
-        joined: list[Player] = []
-        for pad in list(self._waiting):
-            number = pad.instance_id
-            if any(self._presses.together(number, held.instance_id) for held in self._held() if held is not pad):
-                self._waiting.remove(pad)
-                self._refuse(
-                    pad,
-                    f"{pad.name} and the other gamepad were pressed at once: press one alone, it may be listed twice",
-                )
+        joined: list[SeatedPlayer] = []
+        for gamepad in list(self._waiting):
+            number = gamepad.instance_id
+            partners = [used.instance_id for used in self._gamepads_in_use() if used is not gamepad]
+            if any(self._presses.simultaneous(number, partner) for partner in partners):
+                self._waiting.remove(gamepad)
+                reason = "and the other gamepad were pressed at once: press one alone, it may be listed twice"
+                self._refuse(gamepad, f"{gamepad.name} {reason}")
             elif self._presses.settled(number):
-                self._waiting.remove(pad)
-                player = self.give(pad) if self.pads.get(number) is pad else None
+                self._waiting.remove(gamepad)
+                player = self.assign(gamepad) if self.gamepads.get(number) is gamepad else None
                 joined += [player] if player else []
         return joined
 
-    def watch(self) -> Player | None:
-        """Looks at the devices between the episodes; once a tick.
+    def check_devices(self) -> SeatedPlayer | None:
+        """Checks the devices for faults; called once a tick between episodes.
 
         Returns:
-            Who lost their device, since it is that of the other player, listed twice.
+            The player whose device was removed because it is the partner's, listed twice; else None.
         """
         for player in self.players:
             if player.person:
                 player.person.watch_rest()
-        pads = self._held()
-        if len(pads) < 2:
+        gamepads = self._gamepads_in_use()
+        if len(gamepads) < 2:
             return None
-        first, second = pads
-        if self._watched != (first, second):
-            self._watched, self._twins = (first, second), TwinWatch()
-        self._twins.add(first.sample(0), second.sample(0))
-        if not self._twins.twins:
+        first, second = gamepads
+        if self._compared != (first, second):
+            self._compared, self._duplicates = (first, second), DuplicateDetector()
+        self._duplicates.add(first.sample(0), second.sample(0))
+        if not self._duplicates.duplicate:
             return None
-        self._watched = None
+        self._compared = None
         self._refuse(second, f"{second.name} and {first.name} never differ: one gamepad is listed twice")
-        return self.take_away(second)
+        return self.release(second)
 
-    def give(self, device: Pad | KeyboardHalf) -> Player | None:
-        """Gives a device that can steer to the first person who waits for one of its kind."""
-        if isinstance(device, Pad) and not device.steerings:
+    def assign(self, device: Gamepad | KeyboardHalf) -> SeatedPlayer | None:
+        """Assigns a device that can steer to the first person who needs one of its kind; returns the player."""
+        if isinstance(device, Gamepad) and not device.steering_options:
             return None
         for player in self.players:
-            if player.person and player.wants(device):
+            if player.person and player.can_use(device):
                 player.person.device = device
-                if isinstance(device, Pad):
-                    player.person.calibration = self._store.of(device)
-                self.refused = ""
+                if isinstance(device, Gamepad):
+                    player.person.calibration = self._store.for_gamepad(device)
+                self.refusal = ""
                 self._journal("join", player=player.player_id, device=player.label)
                 return player
         return None
 
-    def take_away(self, pad: Pad) -> Player | None:
-        """A joystick is gone; returns whose it was."""
+    def release(self, gamepad: Gamepad) -> SeatedPlayer | None:
+        """Removes a gamepad from the player who used it; returns the player."""
         for player in self.players:
-            if player.person and player.device is pad:
+            if player.person and player.device is gamepad:
                 player.person.device = None
-                self._journal("device_lost", player=player.player_id, device=pad.name)
+                self._journal("device_lost", player=player.player_id, device=gamepad.name)
                 return player
         return None
 
-    def calibrate(self, player: Player, calibration: StickCalibration) -> None:
-        """Sets and keeps the calibration of a player's joystick, and of all others of its kind.
+    def calibrate(self, player: SeatedPlayer, calibration: StickCalibration) -> None:
+        """Sets and stores the calibration of a player's gamepad, and of the partner's if it is the same model.
 
         Raises:
-            OSError: it cannot be kept; it holds for this session.
+            OSError: it cannot be stored; it applies to this session only.
         """
         device = player.device
-        if not isinstance(device, Pad):
+        if not isinstance(device, Gamepad):
             return
-        for one in self.players:
-            if one.person and isinstance(one.device, Pad) and one.device.guid == device.guid:
-                one.person.calibration = calibration
+        for user in self.players:
+            if user.person and isinstance(user.device, Gamepad) and user.device.guid == device.guid:
+                user.person.calibration = calibration
         self._store.put(device.guid, calibration)
 
     def labels(self) -> list[Labels]:
-        """What is printed on the gamepads in hand, each kind once."""
-        names = ("a", "b", "x", "y")
-        return list({tuple(pad.labels[name] for name in names): pad.labels for pad in self._held()}.values())
+        """Returns the button labels of the gamepads in use, each set of labels once."""
+        names, used = ("a", "b", "x", "y"), self._gamepads_in_use()
+        return list({tuple(gamepad.labels[name] for name in names): gamepad.labels for gamepad in used}.values())
 
     def hint(self, *actions: tuple[str, str, str]) -> str:
-        """How to choose: each action by its control of a gamepad, its key and its word; for all devices in hand."""
-        ways = [[labels[control] for control, _, _ in actions] for labels in self.labels()]
+        """Returns a line with the buttons and keys of some actions, for the devices in use.
+
+        Args:
+            actions: each a gamepad control, a key and the action's name.
+        """
+        bindings = [[labels[control] for control, _, _ in actions] for labels in self.labels()]
         if any(isinstance(player.device, KeyboardHalf) for player in self.players):
-            ways.append([key for _, key, _ in actions])
-        words = [word for _, _, word in actions]
-        texts = ("   ".join(f"{how} {word}" for how, word in zip(way, words, strict=True) if how) for way in ways)
+            bindings.append([key for _, key, _ in actions])
+        names = [name for _, _, name in actions]
+        texts = ("   ".join(f"{key} {name}" for key, name in zip(keys, names, strict=True) if key) for keys in bindings)
         return "     |     ".join(texts)
 
-    def is_stray(self, press: Press) -> bool:
-        """A press came from a joystick that nobody holds, in a session of joysticks: a spare one, or a copy."""
-        joysticks = any(player.spec.kind == "joystick" for player in self.players)
-        return isinstance(press.device, int) and joysticks and self.player_of(press) is None
+    def is_unassigned(self, press: Press) -> bool:
+        """Whether a press came from a gamepad of no player, in a session that uses gamepads: a spare or a duplicate."""
+        expected = any(player.spec.kind == "joystick" for player in self.players)
+        return isinstance(press.device, int) and expected and self.player_of(press) is None
 
-    def _held(self) -> list[Pad]:
-        return [player.device for player in self.players if isinstance(player.device, Pad)]
+    def _gamepads_in_use(self) -> list[Gamepad]:
+        return [player.device for player in self.players if isinstance(player.device, Gamepad)]
 
-    def _refuse(self, pad: Pad, why: str) -> None:
-        self.refused = why
-        self._journal("refused", device=pad.name, reason=why)
+    def _refuse(self, gamepad: Gamepad, reason: str) -> None:
+        self.refusal = reason
+        self._journal("refused", device=gamepad.name, reason=reason)

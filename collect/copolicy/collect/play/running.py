@@ -1,4 +1,4 @@
-"""The episode itself."""
+"""The phase of a running episode."""
 
 import gc
 
@@ -8,12 +8,12 @@ from ..inputs import Command, Press
 from ..screen import Canvas
 from ..ticker import Tick
 from .game import Game
-from .phase import Phase, To
-from .player import Player
+from .phase import NextPhase, Phase
+from .player import SeatedPlayer
 
 
 class Running(Phase):
-    """One step a tick until the episode ends or somebody pauses it."""
+    """Makes one step a tick until the episode ends or is paused."""
 
     realtime = True
 
@@ -21,10 +21,10 @@ class Running(Phase):
         super().__init__(game)
         self._pause = ""
         self._events: list[tuple[str, str]] = []
-        self._failed: OSError | None = None
+        self._open_error: OSError | None = None
 
     def enter(self) -> None:
-        """Opens the recording, or goes on with it; the first step is due a whole step later."""
+        """Opens or resumes the recording; the first step is due one tick later."""
         trial, game = self.trial, self.game
         try:
             if trial.began:
@@ -32,51 +32,51 @@ class Running(Phase):
             else:
                 trial.begin(game.describe_devices(trial))
         except OSError as error:
-            self._failed = error
+            self._open_error = error
         gc.collect()
-        gc.disable()  # a collection in the middle of an episode would be a late tick
+        gc.disable()  # a collection during an episode would make a tick late
         game.ticker.restart()
 
     def handle(self, press: Press) -> None:
-        """Pauses; everything else is far from the stick on purpose."""
+        """Pauses; other commands have no effect during an episode."""
         if press.command in (Command.PAUSE, Command.HELP):
             self._pause = self._pause or "player"
 
-    def device_lost(self, player: Player) -> None:
-        """Pauses: a device that is gone reads as zero force, which nobody meant."""
+    def device_lost(self, player: SeatedPlayer) -> None:
+        """Pauses, since a device that is gone would read as zero force."""
         self._events.append(("device_lost", player.player_id))
         self._pause = "device_lost"
 
     def focus_lost(self) -> None:
-        """Pauses: keys go to another window."""
+        """Pauses, since keys go to another window."""
         self._events.append(("focus_lost", ""))
         self._pause = self._pause or "focus_lost"
 
-    def tick(self, tick: Tick) -> To:
-        """One step."""
+    def tick(self, tick: Tick) -> NextPhase:
+        """Makes one step, or records a pause."""
         game, trial = self.game, self.trial
         try:
-            if self._failed is not None:
-                raise self._failed
+            if self._open_error is not None:
+                raise self._open_error
             if self._pause:
                 gc.enable()
                 for event in self._events:
                     trial.event(*event)
                 trial.pause(self._pause)
                 game.pause_reason = self._pause
-                return To.PAUSED
+                return NextPhase.PAUSED
             trial.step(tick)
         except OSError as error:
             gc.enable()
-            game.lose_trial(error)
-            return To.FAILURE
+            game.abandon_trial(error)
+            return NextPhase.FAILURE
         if not trial.outcome.done:
-            return To.STAY
+            return NextPhase.STAY
         gc.enable()
         timeout = trial.outcome.reason == TIMEOUT
         game.sounds.play("goal" if trial.outcome.success else TIMEOUT if timeout else "collision")
-        return To.RESULT
+        return NextPhase.RESULT
 
-    def draw(self, canvas: Canvas, share: float) -> None:
+    def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the world between the last two steps."""
-        self.draw_world(canvas, self.trial, share)
+        self.draw_world(canvas, self.trial, fraction)

@@ -1,4 +1,4 @@
-"""`copolicy-collect play`: opens the window, loads everything else, runs the session, closes everything in order."""
+"""`copolicy-collect play`: opens the window, loads the session, runs it and closes everything."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from .game import Game
 
 
-def play(settings: PlaySettings) -> dict:
-    """Runs a session until it is complete or somebody ends it.
+def play(settings: PlaySettings) -> dict[str, Any]:
+    """Runs a session until it is complete or ended by a player or a signal.
 
     Returns:
-        What was recorded, JSON-able.
+        Counts of the recorded episodes, JSON-able.
 
     Raises:
-        CopolicyError: settings, files or devices that cannot be used, a folder that another tool collects into, or a
-            disk that cannot be written to where nobody can be asked.
+        CopolicyError: settings, files or devices cannot be used, another tool collects into the folder, or, without a
+            window, the disk cannot be written to.
     """
     with prepared(settings) as application:
         with stopped_by_signals(application.game):
@@ -43,17 +43,18 @@ def play(settings: PlaySettings) -> dict:
 @contextmanager
 def prepared(
     settings: PlaySettings,
-    also: tuple[str, Callable[[], Any]] | None = None,
+    load: tuple[str, Callable[[], Any]] | None = None,
     clock: MonotonicClock | None = None,
 ) -> Iterator[Application]:
-    """Opens the window, then folder, devices and players; closes them however the block is left.
+    """Opens the window, then folder, devices and players; closes them when the block is left.
 
     Args:
-        also: a further job and what it loads, to be run while the window shows that.
-        clock: what the session follows; by default the machine's.
+        settings: of the session.
+        load: a further job to run while the window is open, with a name for the screen.
+        clock: of the session; by default the machine's.
 
     Raises:
-        CopolicyError: there is no display, or see `play`.
+        CopolicyError: there is no display, or as for `play`.
     """
     task = get_task(settings.task)
     with ExitStack() as stack:
@@ -63,12 +64,15 @@ def prepared(
         else:
             window = Window(settings.window, settings.fullscreen, task.words.invitation or task.spec.title)
             pygame.mouse.set_visible(False)
-        stack.callback(_close_pygame)
+        stack.callback(pygame.display.quit)
+        stack.callback(pygame.joystick.quit)
         loading = Loading(window)
-        # By name and not at the top: people look at the window while world, recorder and routes are imported.
-        assembly = loading.run(f"the {settings.task} and its recorder", lambda: import_module(".assembly", __package__))
-        if also is not None:
-            loading.run(*also)
+        # Imported after the window is open, since the modules of world, recorder and routes take seconds to load.
+        assembly = loading.run(
+            f"the task {settings.task} and the recorder", lambda: import_module(".assembly", __package__)
+        )
+        if load is not None:
+            loading.run(*load)
         application = assembly.assemble(settings, window, loading, stack, clock)
         if window is not None:
             window.loaded()
@@ -77,7 +81,7 @@ def prepared(
         gc.freeze()
         stack.callback(gc.unfreeze)
         stack.callback(gc.enable)
-        # A thread that plans must not hold the loop for Python's usual 5 ms.
+        # By default a thread that runs a policy may block the loop for 5 ms.
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(0.0005)
         yield application
@@ -86,7 +90,7 @@ def prepared(
 
 @contextmanager
 def stopped_by_signals(game: Game) -> Iterator[None]:
-    """SIGTERM and Ctrl-C end the session in order: the running episode is completed up to its last step."""
+    """Makes SIGTERM and Ctrl-C end the session; the recording of a running episode is completed."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -100,8 +104,3 @@ def stopped_by_signals(game: Game) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _close_pygame() -> None:
-    pygame.joystick.quit()
-    pygame.display.quit()

@@ -1,4 +1,4 @@
-"""What a session is, as the command line says it."""
+"""The settings of a session."""
 
 import functools
 import re
@@ -11,73 +11,75 @@ from copolicy.dataset.publication.licences import checked_licence
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import TABLE, get_task
 
-from ..agents.simulated import pair_name
-from ..angular_limit import angular_limit_of, limited
+from ..agents.simulated_players import pair_name
+from ..angular_limit import angular_limit_of, with_angular_limit
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-PILOT_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
+PLAYER_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
 
 
 @dataclass(frozen=True)
-class PilotSpec:
-    """Who plays: `joystick`, `keyboard`, `scripted[:PAIR]`, `replay:FILE` or `policy:CKPT`."""
+class PlayerSpec:
+    """How a player is controlled: `joystick`, `keyboard`, `scripted[:PAIR]`, `replay:FILE` or `policy:CKPT`."""
 
     kind: str
     detail: str = ""
 
     @classmethod
-    def parse(cls, text: str, task: str = TABLE) -> "PilotSpec":
+    def parse(cls, text: str, task: str = TABLE) -> "PlayerSpec":
         """
         Args:
-            task: name of the task that they play.
+            text: the kind, and its detail after a colon.
+            task: name of the task.
 
         Raises:
-            UnknownNameError: another kind, or another simulated pair.
-            InvalidValueError: a file or a checkpoint is missing, or there is something too much.
-            CopolicyError: a simulated player of a task that has none.
+            UnknownNameError: the kind or the scripted pair is unknown.
+            InvalidValueError: a file or a checkpoint is missing, or the kind takes no detail.
+            CopolicyError: the task has no scripted players.
         """
         kind, _, detail = text.partition(":")
-        if kind not in PILOT_KINDS:
-            raise UnknownNameError("pilot", kind, PILOT_KINDS)
+        if kind not in PLAYER_KINDS:
+            raise UnknownNameError("player", kind, PLAYER_KINDS)
         if kind == "scripted":
             detail = pair_name(get_task(task), detail)
         elif kind in ("replay", "policy") and not detail:
-            raise InvalidValueError("pilots", f"{kind}:{'FILE' if kind == 'replay' else 'CKPT'}", text)
+            raise InvalidValueError("player", f"{kind}:{'FILE' if kind == 'replay' else 'CKPT'}", text)
         elif kind in ("joystick", "keyboard") and detail:
-            raise InvalidValueError("pilots", kind, text)
+            raise InvalidValueError("player", kind, text)
         return cls(kind, detail)
 
     @property
     def is_person(self) -> bool:
-        """A person plays."""
+        """The player is a person."""
         return self.kind in ("joystick", "keyboard")
 
 
 @dataclass(frozen=True)
 class PlaySettings:
-    """What a session is.
+    """The settings of a session.
 
     Attributes:
-        task: its name.
         pair: pseudonym of the pair; its players are `PAIR-a` and `PAIR-b`.
         out: folder of all sessions.
-        pilots: of player a and b; None for what is plugged in.
-        maps: set of maps, a file of maps, or one of its splits as `FILE#split`.
-        orientations: each map with four start orientations.
-        episodes: to be kept.
-        practice: episodes to try things out before.
-        seed: of the schedule and of simulated players.
-        swap_seats: the players change seats in the middle.
-        consents: record id of each player's consent, or an empty text.
-        license: of the recordings, by the identifier of the Hub, or an empty text.
+        players: how player a and b are controlled; None for the connected devices.
+        maps: a named set of scenarios, a scenario file, or one of its splits as `FILE#split`.
+        orientations: use each scenario with four start orientations.
+        episodes: number of episodes to keep.
+        practice: number of practice episodes before them.
+        seed: of the schedule and of scripted players.
+        swap_seats: change seats in the middle; None: only if both players are people.
+        consents: id of each player's consent record; empty if there is none.
+        license: of the recordings, as an identifier of the Hub; empty if none.
         angular_limit: bound on the angular acceleration, rad/s^2; the task's own if None.
-        headless: no window; nobody is asked anything.
-        countdown_s: before each episode.
+        headless: without a window and without prompts.
+        config_folder: folder of calibrations and mappings; the user's own if None.
+        countdown_s: seconds before each episode.
+        task: its name.
     """
 
     pair: str
     out: Path
-    pilots: tuple[PilotSpec, PilotSpec] | None = None
+    players: tuple[PlayerSpec, PlayerSpec] | None = None
     maps: str = "training"
     orientations: bool = False
     episodes: int = 36
@@ -96,8 +98,9 @@ class PlaySettings:
     countdown_s: float = 3.0
     task: str = TABLE
 
-    def __post_init__(self):
-        for name, text in (("pair", self.pair), *((f"consent-{k}", one) for k, one in enumerate(self.consents) if one)):
+    def __post_init__(self) -> None:
+        ids = {"pair": self.pair, **{f"consent-{k}": text for k, text in enumerate(self.consents) if text}}
+        for name, text in ids.items():
             if not _NAME.fullmatch(text):
                 raise InvalidValueError(name, "letters, digits, '.', '_' or '-' (an id, no name of a person)", text)
         for name, value, least in (
@@ -107,40 +110,41 @@ class PlaySettings:
         ):
             if value < least:
                 raise InvalidValueError(name, f"at least {least}", value)
-        get_task(self.task).required_outline  # noqa: B018 (what is played is seen)
-        self.map_configs()
+        get_task(self.task).required_outline  # noqa: B018 (raises without one: it is drawn)
+        self.scenarios  # noqa: B018 (raises for an invalid set)
         if self.window is not None and not all(320 <= side <= 16384 for side in self.window):
             raise InvalidValueError("window", "WxH of at least 320x320", "{}x{}".format(*self.window))
         if not 0 <= self.countdown_s <= 60:
             raise InvalidValueError("countdown", "seconds from 0 to 60", self.countdown_s)
         checked_licence(self.license)
-        self.physics  # noqa: B018  (checks the limit)
+        self.world_settings  # noqa: B018 (raises for an invalid limit)
 
     @property
-    def physics(self) -> Any:
+    def world_settings(self) -> Any:
         """Settings of the world."""
         task = get_task(self.task)
-        usual = task.settings_type()
-        return usual if self.angular_limit is None else limited(task, usual, self.angular_limit)
+        defaults = task.settings_type()
+        return defaults if self.angular_limit is None else with_angular_limit(task, defaults, self.angular_limit)
 
     @functools.cached_property
-    def scenarios(self) -> ScenarioSet:
-        """The maps to choose from, as a set."""
+    def scenario_set(self) -> ScenarioSet:
+        """The set of scenarios to play."""
         task = get_task(self.task)
-        chosen = task.scenario_set(self.maps)
-        return task.turned(chosen) if self.orientations else chosen
+        scenarios = task.scenario_set(self.maps)
+        return task.turned(scenarios) if self.orientations else scenarios
 
-    def map_configs(self) -> tuple[Any, ...]:
-        """The maps to choose from."""
-        return self.scenarios.scenarios
+    @property
+    def scenarios(self) -> tuple[Any, ...]:
+        """The scenarios to play."""
+        return self.scenario_set.scenarios
 
-    def fixed(self) -> dict:
-        """What must not change within a session."""
-        bound = angular_limit_of(self.physics)
+    def session_settings(self) -> dict[str, Any]:
+        """Returns the settings that must not change within a session, JSON-able."""
+        bound = angular_limit_of(self.world_settings)
         return {
             **({} if self.task == TABLE else {"task": self.task}),
-            "maps": self.scenarios.label,
-            **({"maps_digest": self.scenarios.digest} if self.scenarios.from_file else {}),
+            "maps": self.scenario_set.label,
+            **({"maps_digest": self.scenario_set.digest} if self.scenario_set.from_file else {}),
             "orientations": self.orientations,
             "seed": self.seed,
             **({} if bound is None else {"angular_limit": bound}),

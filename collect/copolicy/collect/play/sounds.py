@@ -1,11 +1,13 @@
-"""Short tones: count-down, start, goal, collision, time-out. Made of sines, so that nothing needs to be shipped."""
+"""Short tones for count-down, start, goal, collision and time-out, synthesized from sines."""
 
 import numpy as np
+
+from copolicy.dataset.arrays import Array
 
 from ..sdl import pygame
 
 _RATE = 22050
-_TONES: dict[str, tuple[tuple[float, float], ...]] = {  # (Hz, s), one after the other
+_TONES: dict[str, tuple[tuple[float, float], ...]] = {  # sequences of (Hz, s)
     "count": ((520.0, 0.09),),
     "go": ((780.0, 0.22),),
     "goal": ((523.0, 0.11), (659.0, 0.11), (784.0, 0.11), (1047.0, 0.28)),
@@ -17,10 +19,10 @@ _TONES: dict[str, tuple[tuple[float, float], ...]] = {  # (Hz, s), one after the
 
 
 class Sounds:
-    """Plays tones where there is something to play them on; silent otherwise.
+    """Plays tones if there is an audio device; silent otherwise.
 
     Attributes:
-        mute: play none.
+        mute: play no tones.
     """
 
     def __init__(self, mute: bool):
@@ -32,7 +34,7 @@ class Sounds:
             pygame.mixer.init(_RATE, -16, 1, 512)
             _, _, channels = pygame.mixer.get_init()
         except pygame.error:
-            return  # no sound card: everything is shown, too
+            return  # no audio device; the screen shows everything that the tones signal
         for name, tones in _TONES.items():
             wave = np.concatenate([_tone(frequency, seconds) for frequency, seconds in tones])
             self._sounds[name] = pygame.mixer.Sound(buffer=np.repeat(wave, channels).tobytes())
@@ -43,13 +45,13 @@ class Sounds:
             self._sounds[name].play()
 
     def close(self) -> None:
-        """Lets go of the sound card."""
+        """Closes the audio device."""
         if pygame.mixer.get_init():
             pygame.mixer.quit()
 
 
-def _tone(frequency: float, seconds: float) -> np.ndarray:
+def _tone(frequency: float, seconds: float) -> Array:
     time = np.arange(int(_RATE * seconds)) / _RATE
     wave = np.sin(2 * np.pi * frequency * time) + 0.25 * np.sin(4 * np.pi * frequency * time)
-    swell = np.minimum(1.0, np.minimum(time, seconds - time) / 0.012)  # no click at either end
-    return (0.22 * 32767 * swell * wave).astype(np.int16)
+    envelope = np.minimum(1.0, np.minimum(time, seconds - time) / 0.012)  # avoids a click at both ends
+    return (0.22 * 32767 * envelope * wave).astype(np.int16)

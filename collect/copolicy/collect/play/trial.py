@@ -1,4 +1,4 @@
-"""One episode while it runs: the rollout, the recorder, and how well the loop keeps its time."""
+"""One episode of a session: its rollout, its recording and the timing of the loop."""
 
 import contextlib
 import time
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.outline import Pose
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming
@@ -26,52 +27,56 @@ from ..ticker import LoopStatistics, Tick
 
 @dataclass(eq=False)
 class Trial:
-    """One episode, from its first step to its verdict.
+    """One episode, from its first step to the verdict of the players.
 
-    The recording stays a `.part` until the verdict, which is known only after the end, is part of it. Everything
-    before is on the disk within a second, the end at once.
+    The recording is a `.part` file until it contains the verdict, which is known only after the end. Steps are on the
+    disk within a second, the end of the episode at once.
 
     Attributes:
-        agents: robot seat, human seat.
-        outcome: how it stands.
+        path: of the recording.
+        seating: 0 with player a in the robot seat, 1 with player b there.
+        agents: of the robot seat and the human seat.
+        settings: of the world.
+        practice: the episode does not count.
+        outcome: of the world after the last step.
         pose: of the body.
-        before: pose before the last step.
-        forces: the last action as arrows, robot xy, human xy.
-        interaction: of the last step, units of a player's full force; None where the task measures none.
+        previous_pose: pose before the last step.
+        forces: the last action as force vectors, robot xy, human xy.
+        interaction: measure of the last step, in the task's unit; None if the task has no measure.
         score: sum of rewards.
-        trail: poses, one in three.
-        loop: how well the loop kept its time.
+        trail: every third pose.
+        loop: timing statistics of the loop.
         notes: of the operator.
-        paused: how often it was paused.
+        pauses: number of pauses.
     """
 
     path: Path
     task: PairTask
-    map_config: Any
+    scenario: Any
     seating: int
     agents: tuple[Agent, Agent]
     meta: EpisodeMeta
     anchor: WallClockAnchor
-    physics: Any
+    settings: Any
     practice: bool
     clock: Callable[[], int] = time.monotonic_ns
 
-    def __post_init__(self):
-        task, physics = self.task, self.physics
-        self._rollout = Rollout(task, [self.map_config], self.agents, seeds=[self.meta.seed], settings=physics)
+    def __post_init__(self) -> None:
+        task = self.task
+        self._rollout = Rollout(task, [self.scenario], self.agents, seeds=[self.meta.seed], settings=self.settings)
         self.world: Any = self._rollout.worlds[0]
-        self.step_limit = physics.step_limit
+        self.step_limit = self.settings.step_limit
         self.outcome: Outcome = RUNNING
         self._outline = task.required_outline
-        self.pose: Pose = self._seen_pose()
-        self.before = self.pose
+        self.pose: Pose = self._world_pose()
+        self.previous_pose = self.pose
         self.forces = (0.0, 0.0, 0.0, 0.0)
         self.interaction: float | None = None
         self.score = 0.0
         self.trail: list[Pose] = [self.pose]
         self.loop = LoopStatistics(task.spec.record_hz)
         self.notes: list[str] = []
-        self.paused = 0
+        self.pauses = 0
         self.step_ns = self.clock()
         self._off_centre: set[int] = set()
         self._stack = ExitStack()
@@ -79,17 +84,17 @@ class Trial:
 
     @property
     def began(self) -> bool:
-        """There is a recording."""
+        """The recording has been opened."""
         return self._recorder is not None
 
     @property
     def steps(self) -> int:
-        """Steps so far."""
+        """Number of steps so far."""
         return self.world.step_count
 
     @property
     def seconds(self) -> float:
-        """Simulated time so far."""
+        """Simulated time so far, s."""
         return self.steps / self.task.spec.record_hz
 
     def begin(self, devices: Mapping[str, str]) -> None:
@@ -100,28 +105,28 @@ class Trial:
         """
         recorder = EpisodeRecorder(
             self.path,
-            self.map_config,
+            self.scenario,
             self.meta,
             self.anchor,
             task=self.task.spec.name,
             monotonic_ns=self.clock(),
             devices=devices,
-            settings=self.physics,
+            settings=self.settings,
         )
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:
-            self.event("practice")  # what a crash leaves behind must say so too
+            self.event("practice")  # a recording that a crash cuts short must be marked too
 
     def step(self, tick: Tick) -> None:
-        """One step: reads the state and both players, records, advances.
+        """Makes one step: reads the state and both players, records, advances the world.
 
         Raises:
             OSError: the recording cannot be written.
         """
         world = self.world
-        self.before, self.step_ns = self.pose, tick.start_ns
+        self.previous_pose, self.step_ns = self.pose, tick.start_ns
         self._rollout.step()
-        self._watch_sticks()
+        self._record_off_centre_sticks()
         (action,), (self.outcome,) = self._rollout.actions, self._rollout.outcomes
         reward = world.reward()
         self.loop.add(tick)
@@ -132,7 +137,7 @@ class Trial:
             work_ns=self.clock() - tick.start_ns,
             skipped_ticks=tick.skipped if self.loop.ticks > 1 else 0,
         )
-        self._open.step(
+        self._opened.step(
             action,
             world.recorded,
             reward,
@@ -140,62 +145,62 @@ class Trial:
             inputs=(self.agents[0].input, self.agents[1].input),
             timing=timing,
         )
-        self._show(action)
+        self._update_display(action)
         self.score += reward
         if self.steps % 3 == 0:
             self.trail.append(self.pose)
         if self.outcome.done:
             self.event("outcome", self.outcome.reason)
 
-    def _seen_pose(self) -> Pose:
+    def _world_pose(self) -> Pose:
         x, y, theta = self._outline.poses(self.world.observation[None])[0].tolist()
         return x, y, theta
 
-    def _show(self, action: np.ndarray) -> None:
-        self.pose = self._seen_pose()
+    def _update_display(self, action: Array) -> None:
+        self.pose = self._world_pose()
         x0, y0, x1, y1 = self._outline.forces(action[None])[0].tolist()
         self.forces = (x0, y0, x1, y1)
         measured = self.task.interaction(self.world.observation[None], action[None])
         self.interaction = None if measured is None else float(measured[0])
 
-    def _watch_sticks(self) -> None:
+    def _record_off_centre_sticks(self) -> None:
         for seat, agent in enumerate(self.agents):
             if isinstance(agent, PersonAgent) and agent.push_at_rest and seat not in self._off_centre:
                 self._off_centre.add(seat)
                 self.event(OFF_CENTRE, f"{PLAYERS[seat]}: pushes with {agent.push_at_rest:.2f} at rest")
 
     def event(self, kind: str, detail: str = "") -> None:
-        """Records an event, if the recording has begun."""
+        """Records an event if the recording is open."""
         if self._recorder is not None:
             self._recorder.event(kind, detail, self.clock())
 
     def pause(self, reason: str) -> None:
-        """The steps stop."""
-        self.paused += 1
+        """Records a pause; zero forces are shown."""
+        self.pauses += 1
         self.forces = (0.0, 0.0, 0.0, 0.0)
-        self.before = self.pose
+        self.previous_pose = self.pose
         self.event("pause", reason)
 
     def resume(self) -> None:
-        """The steps go on; what lay between is no part of the loop's time."""
+        """Records the end of a pause, whose duration the loop's timing excludes."""
         self.loop.pause()
         self.event("resume")
 
     def note(self, text: str) -> None:
-        """Adds a note of the operator."""
+        """Records a note of the operator."""
         self.notes.append(text)
         self.event("note", text)
 
     def finish(self, discarded: bool = False, reason: str = "") -> None:
-        """The verdict on an episode that has ended.
+        """Completes the recording of an episode that has ended.
 
         Raises:
-            OSError: the recording cannot be completed; what there is stays as `.part`.
+            OSError: the recording cannot be completed; it stays as `.part`.
         """
         self._end(self.outcome.success, self.outcome.reason, discarded, reason, ())
 
     def interrupt(self, termination: str, reason: str) -> None:
-        """Ends an episode before its end, discarded: nobody decided how it would have gone.
+        """Completes the recording of an episode that is stopped early, as discarded.
 
         Args:
             termination: one of `termination_reasons`.
@@ -204,15 +209,15 @@ class Trial:
         self._end(False, termination, True, reason, ("interrupted",))
 
     def abandon(self, error: BaseException) -> None:
-        """Ends the recording after an error: what can be written is completed and marked, the rest stays `.part`."""
-        # What could not be written to a full disk cannot be written now either.
+        """Closes the recording after an error: completed and marked if it can be written, else left as `.part`."""
+        # On a full disk this write fails too.
         with contextlib.suppress(OSError):
             self._stack.__exit__(type(error), error, error.__traceback__)
 
     def _end(self, success: bool, termination: str, discarded: bool, reason: str, flags: Sequence[str]) -> None:
         if self.practice:
             flags = (PRACTICE, *flags)
-        if self.paused:
+        if self.pauses:
             flags = (*flags, "paused")
         if self.loop.slow:
             flags = (*flags, "slow_loop")
@@ -220,11 +225,11 @@ class Trial:
             flags = (*flags, OFF_CENTRE)
         self.event("verdict", "discard" if discarded else "keep")
         self.event("loop", self.loop.summary())
-        plans = _latencies(self.agents)
-        if plans:
-            self.event("plans", plans)
+        latencies = _latency_summary(self.agents)
+        if latencies:
+            self.event("plans", latencies)
         notes = [f"discarded: {reason}"] if discarded and reason else []
-        self._open.finish(
+        self._opened.finish(
             success,
             termination,
             achieved_hz=self.loop.achieved_hz,
@@ -236,16 +241,16 @@ class Trial:
         self._stack.close()
 
     @property
-    def _open(self) -> EpisodeRecorder:
-        assert self._recorder is not None, "a step before the recording was opened"
+    def _opened(self) -> EpisodeRecorder:
+        assert self._recorder is not None, "the recording is not open"
         return self._recorder
 
 
-def _latencies(agents: Sequence[Agent]) -> str:
-    """How long policies planned, where any did."""
+def _latency_summary(agents: Sequence[Agent]) -> str:
+    """Returns the inference times of the policies at both seats; empty without a policy."""
     lines = []
     for seat, agent in enumerate(agents):
         if isinstance(agent, PolicyAgent) and agent.latencies:
-            p50, most = np.percentile(agent.latencies, (50, 100)) * 1e3
-            lines.append(f"seat {seat}: {len(agent.latencies)} plans, p50 {p50:.0f} ms, max {most:.0f} ms")
+            p50, maximum = np.percentile(agent.latencies, (50, 100)) * 1e3
+            lines.append(f"seat {seat}: {len(agent.latencies)} plans, p50 {p50:.0f} ms, max {maximum:.0f} ms")
     return "; ".join(lines)

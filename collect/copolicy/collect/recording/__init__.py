@@ -1,1 +1,1 @@
-"""Writes an episode while it happens, and completes what broke off."""
+"""Records episodes as MCAP files, and recovers incomplete recordings."""

@@ -1,4 +1,4 @@
-"""The file of a recording: written as `NAME.mcap.part`, given its name only when it is complete and on the disk."""
+"""The MCAP file of a recording, named `NAME.mcap.part` until it is complete and on the disk."""
 
 import os
 from collections.abc import Iterable
@@ -13,23 +13,23 @@ from copolicy.dataset.files.staging import sync_folder
 from copolicy.dataset.recording.topics import ENCODING, Topic, schema_data
 
 PART_SUFFIX = ".part"
-"""What a recording's name ends with while it runs, and after it broke off."""
+"""Suffix of an incomplete recording: one that still runs, or was interrupted."""
 
 _CHUNK_SIZE = 1 << 20
 
 
 class EpisodeFile:
-    """One MCAP file in the making.
+    """Writes one MCAP file.
 
-    Chunks of 1 MiB under zstd, with a check sum over every byte: without `enable_data_crcs` a flipped bit in a
-    metadata record would go unnoticed.
+    Chunks have 1 MiB and zstd compression. `enable_data_crcs` adds a check sum over every byte, without which a flipped
+    bit in a metadata record would not be detected.
     """
 
     def __init__(self, path: Path):
         """Opens `path` + `.part`.
 
         Raises:
-            OutputExistsError: the file, or the remains of a recording that broke off, would be overwritten.
+            OutputExistsError: the file or an incomplete recording of the same name exists.
         """
         self.path = path
         if path.exists():
@@ -38,7 +38,7 @@ class EpisodeFile:
             self._file = self.part.open("xb")
         except FileExistsError:
             raise OutputExistsError(self.part) from None
-        lock(self._file, wait=True)  # tells `recover` that this recording is running
+        lock(self._file, wait=True)  # by which `recover` detects a running recording
         self._writer = Writer(
             self._file, chunk_size=_CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
@@ -47,7 +47,7 @@ class EpisodeFile:
 
     @property
     def part(self) -> Path:
-        """The file's name until it is published."""
+        """Path of the file until it is published."""
         return self.path.with_name(self.path.name + PART_SUFFIX)
 
     def declare(self, topics: Iterable[Topic]) -> None:
@@ -74,21 +74,21 @@ class EpisodeFile:
         self._writer.add_message(self._channels[topic.name], time_ns, payload, time_ns, sequence)
 
     def flush(self) -> None:
-        """Hands everything so far to the system: what is lost with this process is what comes after."""
+        """Passes all data to the operating system, so that a killed process loses only later data."""
         self._writer.flush()
 
     def complete(self) -> None:
-        """Writes the summary and forces the file onto the disk, still as `.part`."""
+        """Writes the summary and syncs the file to the disk, still as `.part`."""
         self._writer.finish()
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
 
     def publish(self) -> None:
-        """Gives the complete file its name.
+        """Renames the complete file to its final name.
 
         Raises:
-            OutputExistsError: another file took the name meanwhile; the recording stays as `.part`.
+            OutputExistsError: another file has taken the name meanwhile; the recording stays a `.part`.
         """
         if self.path.exists():
             raise OutputExistsError(self.path)
@@ -96,5 +96,5 @@ class EpisodeFile:
         sync_folder(self.path.parent)
 
     def close(self) -> None:
-        """Lets go of the file as it is."""
+        """Closes the file without completing it."""
         self._file.close()

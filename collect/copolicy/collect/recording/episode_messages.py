@@ -1,4 +1,4 @@
-"""What a recording says: the metadata at its start and the messages of each step, serialised."""
+"""Encodes the metadata at the start of a recording and the messages of each step."""
 
 import platform
 from collections.abc import Mapping, Sequence
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.recording import episode_records
@@ -22,8 +23,8 @@ _PACKAGES = ("mcap", "numpy", "protobuf", "pygame", "pymunk")
 def start_records(
     meta: EpisodeMeta, anchor: WallClockAnchor, devices: Mapping[str, str], settings: Any, spec: TaskSpec
 ) -> dict[str, dict[str, str]]:
-    """The metadata records at the start of a recording, by name; no host, user or path is among them."""
-    more = {
+    """The metadata records at the start of a recording, by name; without host, user or paths."""
+    other_entries = {
         "session": {
             "started_at": anchor.iso(),
             "wall_ns": str(anchor.wall_ns),
@@ -39,15 +40,15 @@ def start_records(
         "dataset_info": episode_records.dataset_info(spec),
     }
     records = {
-        name: episode_records.encode(meta, columns) | more.get(name, {})
+        name: episode_records.encode(meta, columns) | other_entries.get(name, {})
         for name, columns in episode_records.COLUMNS_AT_START.items()
     }
     records["dataset_info"][episode_records.START_DIGEST] = episode_records.start_digest(records)
     return records
 
 
-def checked_action(action: np.ndarray | Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
-    """A joint action `(m,)` as numbers.
+def checked_action(action: Array | Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
+    """A joint action `(m,)` as a tuple of floats.
 
     Raises:
         ShapeError: another shape.
@@ -64,7 +65,7 @@ def checked_action(action: np.ndarray | Sequence[float], spec: TaskSpec) -> tupl
 
 
 def checked_state(recorded: Sequence[float], spec: TaskSpec) -> tuple[float, ...]:
-    """A recorded state `(k,)` as numbers.
+    """A recorded state `(k,)` as a tuple of floats.
 
     Raises:
         ShapeError: another length.
@@ -82,7 +83,7 @@ def checked_state(recorded: Sequence[float], spec: TaskSpec) -> tuple[float, ...
 def device_records(
     step: int, inputs: tuple[PlayerInput | None, PlayerInput | None], timing: LoopTiming | None
 ) -> list[Record]:
-    """What devices and loop said in a step, where there are any; fills in their `step`."""
+    """The records of device inputs and loop timing of a step, where present; sets their `step`."""
     records = []
     for topic, message in (*zip(INPUTS, inputs, strict=True), (LOOP_TIMING, timing)):
         if message is not None:
@@ -92,5 +93,5 @@ def device_records(
 
 
 def event_record(step: int, kind: str, detail: str) -> Record:
-    """Something that happened at a step."""
+    """The record of an event at a step."""
     return EVENT, EpisodeEvent(step=step, kind=kind, detail=detail).SerializeToString()

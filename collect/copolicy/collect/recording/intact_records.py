@@ -1,4 +1,4 @@
-"""What can be trusted of a recording that broke off or was damaged: its records up to the first doubt."""
+"""The intact beginning of an incomplete or damaged recording: its records up to the first error."""
 
 import struct
 import zlib
@@ -14,15 +14,16 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, ForeignRecordingError
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
-from copolicy.dataset.recording.log import recorded_task
 from copolicy.dataset.recording.mcap_chunks import LARGEST_CHUNK, MESSAGE_HEAD, chunk_records
 from copolicy.dataset.recording.mcap_records import RecordWalk
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, LoopTiming
-from copolicy.dataset.recording.soundness import CheckSums, channels_text
-from copolicy.dataset.recording.topics import EVENT, LOOP_TIMING, is_ours
+from copolicy.dataset.recording.reader import recorded_task
+from copolicy.dataset.recording.topics import EVENT, LOOP_TIMING, is_channel_of
+from copolicy.dataset.recording.verification import CheckSums, channels_text
 from copolicy.dataset.task import PairTask
 
 from ..ticker import LoopStatistics, Tick
@@ -37,27 +38,27 @@ _LARGEST: dict[int, int] = {
 }
 _HEAD = struct.Struct("<BQ")  # opcode, length of the body
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_OUR_METADATA = (*episode_records.COLUMNS_AT_START, episode_records.RESULT)
+_EPISODE_METADATA = (*episode_records.COLUMNS_AT_START, episode_records.RESULT)
 _ENDED = "expected an intact and complete MCAP file, found its end"
 
 
 @dataclass
 class IntactPart:
-    """The beginning of a recording that is proven to be what was written.
+    """The verified beginning of a recording.
 
     Attributes:
         path: of the file.
-        task: that was recorded.
-        metadata: its metadata records; those of the start are proven by their digest.
-        scenario: where the episode began and what it was about.
-        steps: complete steps: as many actions of both players, and one state more.
-        records: how many records of the file, counted as `intact_records` gives them, are part of it.
-        stopped_by: what ended it; empty where the file is whole.
-        between_records: the file simply ends there, as after a kill, rather than going on with damage.
+        task: of the recording.
+        metadata: its metadata records; those of the start are verified by their digest.
+        scenario: of the episode.
+        steps: complete steps, each with both actions and the state after it.
+        records: number of records in this part, counted as `intact_records` yields them.
+        stopped_by: what ended the part; empty where the file is intact.
+        between_records: the file ends there, as after a kill, without damage.
         total_reward: over the steps.
-        events: what happened, the events after the last complete step among them.
-        unverified: what of it carries no check sum, a sentence each.
-        loop: how well the loop kept its time over the steps; without ticks where time was simulated.
+        events: all events, also those after the last complete step.
+        unverified: descriptions of content without a check sum.
+        loop: timing of the loop over the steps; without ticks where time was simulated.
     """
 
     path: Path
@@ -74,25 +75,25 @@ class IntactPart:
     loop: LoopStatistics = field(init=False)
     recorded: array = field(default_factory=lambda: array("d"), repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.loop = LoopStatistics(self.task.spec.record_hz)
 
     @property
-    def states(self) -> np.ndarray:
+    def states(self) -> Array:
         """`(steps + 1, n)` by `TaskSpec.state`."""
         recorded = np.asarray(self.recorded).reshape(-1, len(self.task.spec.recorded))
         return self.task.states_of(recorded[: self.steps + 1])
 
 
 def intact_records(path: Path, task: PairTask, check_sums: CheckSums | None = None) -> Iterator[McapRecord]:
-    """Schemas, channels, messages, metadata and attachments from the beginning of a file, one chunk in memory.
+    """Yields schemas, channels, messages, metadata and attachments of a file, with one chunk in memory.
 
     Args:
-        task: that was recorded.
-        check_sums: learns what of the file carries one.
+        task: of the recording.
+        check_sums: is filled with which parts of the file have a check sum.
 
     Raises:
-        FileFormatError: at the first record that fails a check sum or a parser, and where the file breaks off.
+        FileFormatError: at the first record that fails a check sum or a parser, or at the end of an incomplete file.
     """
     check_sums = CheckSums() if check_sums is None else check_sums
     scenario_file = messages_of(task).scenario_file
@@ -104,33 +105,33 @@ def intact_records(path: Path, task: PairTask, check_sums: CheckSums | None = No
             except CopolicyError:
                 raise
             except Exception as error:
-                # Damaged bytes fail in as many ways as there are parsers (struct, zstd, UTF-8, ...).
+                # Damaged bytes raise different exceptions in each parser (struct, zstd, UTF-8, ...).
                 raise walk.damage(f"damage ({error or type(error).__name__}) in the record that ends") from None
         check_sums.data = walk.data_verified
 
 
 def read_intact_part(path: Path) -> IntactPart:
-    """Walks a file once and finds out how far it can be trusted.
+    """Reads a file once and determines its verified beginning.
 
     Raises:
-        FileFormatError: the metadata or the map at its start are not what was written, or it is no recording.
+        FileFormatError: the metadata or the map at its start are damaged, or it is not a recording.
         ForeignRecordingError: it is a recording of something else.
     """
     task = recorded_task(path)
     part = IntactPart(path, task)
-    count = _StepCount(part)
+    checker = _StepChecker(part)
     check_sums = CheckSums()
     try:
         for record in intact_records(path, task, check_sums):
             if isinstance(record, Metadata):
-                if record.name in part.metadata and record.name in _OUR_METADATA:
+                if record.name in part.metadata and record.name in _EPISODE_METADATA:
                     raise ValueError(f"a second metadata record {record.name!r}")
                 part.metadata[record.name] = record.metadata
             elif isinstance(record, Attachment):
                 if record.name == messages_of(task).scenario_file:
                     part.scenario = task.scenario_of_json(record.data)
             else:
-                count.take(record)
+                checker.add(record)
             part.records += 1
     except FileFormatError as error:
         part.stopped_by = str(error).removeprefix(f"{path}: ")
@@ -139,10 +140,10 @@ def read_intact_part(path: Path) -> IntactPart:
     except Exception as error:
         part.stopped_by = f"expected the next step, found {error or type(error).__name__}"
     part.between_records = not part.stopped_by or part.stopped_by.startswith(_ENDED)
-    part.steps = count.complete
-    _check_start(part, count.foreign)
+    part.steps = checker.complete
+    _check_start(part, checker.foreign)
     part.unverified = check_sums.content_notes()
-    count.sum_up()
+    checker.fill_part()
     return part
 
 
@@ -188,51 +189,52 @@ def _record(opcode: int, body: bytes) -> Iterator[McapRecord]:
         yield Channel.read(ReadDataStream(BytesIO(body)))
 
 
-class _StepCount:
-    """Follows the steps of a recording and refuses the first message out of order."""
+class _StepChecker:
+    """Counts the steps of a recording and raises ValueError at the first message out of order."""
 
     def __init__(self, part: IntactPart):
         self._part = part
         self._messages = messages_of(part.task)
         self._schemas: dict[int, str] = {}
         self._declared: set[int] = set()
-        self._topics: dict[int, str] = {}  # of channels that are ours; of others nothing follows
-        self._others: set[str] = set()
-        self._next = {topic.name: 0 for topic in (self._messages.state, *self._messages.actions)}
+        self._topics: dict[int, str] = {}  # of our channels; those of other channels are not checked
+        self._other_topics: set[str] = set()
+        self._next_step = {topic.name: 0 for topic in (self._messages.state, *self._messages.actions)}
         self._sequence = 0
         self._rewards = array("d")
         self._ticks = array("q")  # step, scheduled, start, skipped
 
     @property
     def complete(self) -> int:
-        """Steps with a state, both actions and a state after it; -1 without any state."""
-        states, *actions = self._next.values()
+        """Number of steps with a state, both actions and a next state; -1 without any state."""
+        states, *actions = self._next_step.values()
         return min(states - 1, *actions)
 
     @property
     def foreign(self) -> tuple[str, ...]:
-        """The topics of a file that has none of ours."""
-        return () if self._topics else tuple(sorted(self._others))
+        """All topics of a file without any of our topics; empty for a recording of the task."""
+        return () if self._topics else tuple(sorted(self._other_topics))
 
-    def take(self, record: McapRecord) -> None:
+    def add(self, record: McapRecord) -> None:
+
         if isinstance(record, Schema):
             self._schemas[record.id] = record.name
         elif isinstance(record, Channel):
             self._declared.add(record.id)
-            if is_ours(record, self._schemas.get(record.schema_id, ""), self._messages.topics):
+            if is_channel_of(record, self._schemas.get(record.schema_id, ""), self._messages.topics):
                 self._topics[record.id] = record.topic
             else:
-                self._others.add(record.topic)
+                self._other_topics.add(record.topic)
         elif isinstance(record, Message) and record.channel_id not in self._declared:
             raise ValueError(f"a message of a channel {record.channel_id} that was never declared")
         elif isinstance(record, Message) and record.channel_id in self._topics:
             if record.sequence < self._sequence:
                 raise ValueError(f"step {record.sequence} after step {self._sequence}")
             self._sequence = record.sequence
-            self._follow(self._topics[record.channel_id], record)
+            self._add_message(self._topics[record.channel_id], record)
 
-    def sum_up(self) -> None:
-        """Tells the part about its complete steps."""
+    def fill_part(self) -> None:
+        """Sets the reward and the loop timing of the part over its complete steps."""
         steps = max(0, self._part.steps)
         self._part.total_reward = sum(self._rewards[:steps])
         paused = {event.step for event in self._part.events if event.kind == "pause"}
@@ -242,12 +244,12 @@ class _StepCount:
             if step < steps:
                 self._part.loop.add(Tick(scheduled, start, skipped))
 
-    def _follow(self, topic: str, message: Message) -> None:
+    def _add_message(self, topic: str, message: Message) -> None:
         if topic == self._messages.state.name:
             step, recorded = self._messages.decode_state(message.data)
             self._advance(topic, step, message.sequence)
             self._part.recorded.extend(recorded)
-        elif topic in self._next:
+        elif topic in self._next_step:
             self._advance(topic, self._messages.decode_action(message.data)[0], message.sequence)
         elif topic == self._messages.measures.name:
             self._rewards.append(self._messages.decode_reward(message.data))
@@ -258,9 +260,9 @@ class _StepCount:
             self._part.events.append(EpisodeEvent.FromString(message.data))
 
     def _advance(self, topic: str, step: int, sequence: int) -> None:
-        if not step == sequence == self._next[topic]:
-            raise ValueError(f"step {step} in place {self._next[topic]} of {topic}")
-        self._next[topic] += 1
+        if not step == sequence == self._next_step[topic]:
+            raise ValueError(f"step {step} in place {self._next_step[topic]} of {topic}")
+        self._next_step[topic] += 1
 
 
 def _check_start(part: IntactPart, foreign: tuple[str, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Records an episode while it happens."""
+"""Records an episode step by step."""
 
 import contextlib
 import math
@@ -10,15 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta, termination_reasons
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
-from copolicy.dataset.files.staging import about
-from copolicy.dataset.interaction import identical, may_be_one_device
+from copolicy.dataset.files.staging import named_errors
 from copolicy.dataset.recording import episode_records
 from copolicy.dataset.recording.generic_messages import messages_of
-from copolicy.dataset.recording.log import read_episode
 from copolicy.dataset.recording.messages.copolicy_pb2 import LoopTiming, PlayerInput
+from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.recording.topics import Record
+from copolicy.dataset.shared_device import identical_actions, may_be_one_device
 from copolicy.dataset.task import get_task
 
 from . import episode_messages
@@ -26,20 +27,19 @@ from .episode_file import EpisodeFile
 from .episode_messages import checked_action, checked_state
 from .wall_clock import WallClockAnchor
 
-# A killed process loses what came after the last flush, and the action of the step before it, whose outcome was not
-# flushed yet: together less than a second, even where the loop runs a little early.
+# A killed process loses the data after the last flush, and the last step before it, whose outcome is not flushed yet:
+# together less than a second, even where the loop runs slightly fast.
 _FLUSH_NS = 9 * 10**8
 
-
 IDENTICAL_ACTIONS = "identical_actions"
-"""Quality flag of an episode in which two people at gamepads gave the same actions: one is listed twice."""
+"""Quality flag of an episode in which two people with gamepads had the same actions: one device is listed twice."""
 
 
 class EpisodeRecorder:
-    """Writes one episode to `NAME.mcap.part`, which becomes `NAME.mcap` once it is complete and on the disk.
+    """Writes one episode to `NAME.mcap.part`, which is renamed to `NAME.mcap` once it is complete and on the disk.
 
-    The recording begins with the state s_0. Each `step` takes the action u_k, chosen in the last state that was
-    given, and the state s_{k+1} that it led to; `finish` says how it ended:
+    The recording begins with the state s_0. Each `step` adds the action u_k, chosen in the last state, and the next
+    state s_{k+1}; `finish` adds the outcome:
 
         with EpisodeRecorder(path, scenario, meta, anchor) as recorder:
             while not outcome.done:
@@ -47,12 +47,11 @@ class EpisodeRecorder:
                 recorder.step(action, world.recorded, world.reward())
             recorder.finish(outcome.success, outcome.reason)
 
-    What is recorded of step k carries the time of step k. The file is flushed every 0.9 s of recording and at
-    every event, so that a killed process loses at most a second, and its `.part` stays. A block that is left
-    without `finish` completes its file all the same, up to the last state: as `operator_discard`, marked
-    discarded, where it was left in order or by Ctrl-C; as `crash_recovered` with the quality flag `aborted` where
-    it was left by another exception. Should that file not read back, it stays a `.part`. An episode of two
-    people at gamepads whose actions are the same gets the flag `identical_actions`.
+    All messages of step k have the time of step k. The file is flushed every 0.9 s of recording and at every event, so
+    that a killed process loses at most a second, and leaves a `.part`. A `with` block that ends without `finish` also
+    completes the file, up to the last state: as `operator_discard`, marked discarded, after a normal exit or Ctrl-C; as
+    `crash_recovered` with the quality flag `aborted` after another exception. If that file cannot be read, it stays a
+    `.part`. An episode of two people with gamepads whose actions are the same gets the flag `identical_actions`.
 
     Attributes:
         meta: the episode's columns, complete after `finish`.
@@ -72,18 +71,18 @@ class EpisodeRecorder:
         devices: Mapping[str, str] | None = None,
         settings: Any = None,
     ):
-        """Prepares a recording; the file appears when the `with` block is entered.
+        """Prepares a recording; the file is created when the `with` block is entered.
 
         Args:
             path: of the finished file, `NAME.mcap`.
-            scenario: of the task; the map.
-            meta: all that is known at the start; `finish` fills in the columns of the result.
+            scenario: of the task.
+            meta: columns that are known at the start; `finish` adds those of the result.
             anchor: of the session's clock, by default now.
             task: name of the task.
-            state: s_0 as `TaskSpec.recorded` has it, by default that of the scenario's start.
-            monotonic_ns: when s_0 was read, by default the anchor's moment.
-            devices: what is known of the devices; no serial numbers, since those identify people.
-            settings: of the world that the states come from.
+            state: s_0 by `TaskSpec.recorded`, by default that of the scenario's start.
+            monotonic_ns: when s_0 was read, by default the time of the anchor.
+            devices: facts about the devices; no serial numbers, since they identify people.
+            settings: of the world; the task's default if None.
 
         Raises:
             UnknownNameError: the task is not installed.
@@ -108,14 +107,14 @@ class EpisodeRecorder:
         self._ended = False
 
     def __enter__(self) -> "EpisodeRecorder":
-        """Opens the file and writes what is known at the start.
+        """Creates the file and writes the metadata and messages of the start.
 
         Raises:
-            OutputExistsError: the file, or the remains of a recording that broke off, would be overwritten.
+            OutputExistsError: the file or an incomplete recording of the same name exists.
         """
         self._file = EpisodeFile(self._path)
         try:
-            with about(self._path):
+            with named_errors(self._path):
                 self._write_start()
         except BaseException:
             self._file.close()
@@ -130,12 +129,12 @@ class EpisodeRecorder:
                 self._end(False, "operator_discard", discarded=True)
             else:
                 self._end(False, "crash_recovered", quality_flags="aborted")
-            # The exception may have struck between two records of one step.
+            # The exception may have been raised between two records of one step.
             with contextlib.suppress(CopolicyError):
                 read_episode(self._file.part)
                 self._file.publish()
         except OSError as failure:
-            # A full disk: what there is stays in the .part file, and the first error is the one to show.
+            # A full disk: the data so far stay in the .part file, and the first error is the one to raise.
             if kind is None:
                 failure.filename = failure.filename or str(self._path)
                 raise
@@ -147,7 +146,7 @@ class EpisodeRecorder:
 
     def step(
         self,
-        action: np.ndarray | Sequence[float],
+        action: Array | Sequence[float],
         state: Sequence[float],
         reward: float,
         *,
@@ -158,27 +157,27 @@ class EpisodeRecorder:
         """Records the action of a step and the state after it.
 
         Args:
-            action: `(m,)` of both players, robot first, as it acted in the last state.
-            state: after the step, as `TaskSpec.recorded` has it (`World.recorded`).
+            action: `(m,)` of both players in the last state, robot first.
+            state: after the step, by `TaskSpec.recorded` (`World.recorded`).
             reward: after the step.
-            monotonic_ns: when the step began (its state was read); by default a step after the one before.
-            inputs: what the players' devices said; their `step` is filled in.
-            timing: how well the loop kept its time; its `step` is filled in.
+            monotonic_ns: when the step began, that is, when its state was read; by default a step after the previous.
+            inputs: of the players' devices; their `step` is set.
+            timing: of the loop; its `step` is set.
 
         Raises:
             ShapeError: an action or a state of another shape.
-            InvalidValueError: numbers that are not finite or actions out of their bounds; nothing was recorded.
+            InvalidValueError: numbers that are not finite or actions out of bounds; nothing was recorded.
             RunError: the recording has ended.
         """
         if self._ended:
             raise RunError(f"{self._path}: expected no step after the end of the recording, found one")
         joint, after = checked_action(action, self._spec), checked_state(state, self._spec)
-        step, messages, one = self.steps, self._messages, len(self._spec.action)
+        step, messages, size = self.steps, self._messages, len(self._spec.action)
         if monotonic_ns is not None:
             self._time_ns = monotonic_ns
-        # Nothing of a step is written before all of it is known to be sound.
+        # A step is written only after all of it has been checked.
         records = self._state_records(joint)
-        for topic, values in zip(messages.actions, (joint[:one], joint[one:]), strict=True):
+        for topic, values in zip(messages.actions, (joint[:size], joint[size:]), strict=True):
             records.append((topic, messages.encode_action(step, values)))
         records += episode_messages.device_records(step, inputs, timing)
         records.append((messages.measures, messages.encode_measures(step, after, joint, float(reward))))
@@ -213,20 +212,20 @@ class EpisodeRecorder:
         discarded: bool = False,
         notes: str = "",
     ) -> None:
-        """Records the final state and the result, and gives the file its name once it is on the disk.
+        """Records the final state and the result, and renames the file once it is on the disk.
 
         Args:
-            success: the players reached the goal.
+            success: whether the players reached the goal.
             termination_reason: one of `termination_reasons`.
-            achieved_hz: rate that the loop kept; nan where time is simulated.
-            late_ticks: steps that began late.
+            achieved_hz: rate of the loop; nan where time is simulated.
+            late_ticks: number of steps that began late.
             quality_flags: comma separated.
-            discarded: the operator wants the episode left out of data sets.
-            notes: of the operator; no names.
+            discarded: exclude the episode from data sets.
+            notes: of the operator, without names of people.
 
         Raises:
-            InvalidValueError: another reason than those of the task.
-            OutputExistsError: another file took the name meanwhile; the recording stays as `.part`.
+            InvalidValueError: a reason that the task does not have.
+            OutputExistsError: another file has taken the name meanwhile; the recording stays a `.part`.
             RunError: the recording has ended already.
         """
         if self._ended:
@@ -261,7 +260,7 @@ class EpisodeRecorder:
         meta, joint = self.meta, self._spec.joint_action
         suspected = may_be_one_device(meta.source, meta.controller_0, meta.controller_1)
         actions = np.asarray(self._actions).reshape(-1, len(joint))
-        if suspected and identical(self._spec.full_forces(actions)):
+        if suspected and identical_actions(self._spec.full_forces(actions)):
             columns["quality_flags"] = ",".join(filter(None, (columns.get("quality_flags"), IDENTICAL_ACTIONS)))
         self.meta = replace(
             self.meta,

@@ -1,4 +1,4 @@
-"""Puts times of the monotonic clock on the calendar."""
+"""Conversion of monotonic clock times to UTC."""
 
 import time
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 @dataclass(frozen=True)
 class WallClockAnchor:
-    """One moment read on both clocks; a session takes it once, so that a corrected wall clock never bends a recording.
+    """One moment on both clocks, taken once a session, so that corrections of the wall clock do not affect recordings.
 
     Attributes:
         wall_ns: UTC, nanoseconds since 1970.
@@ -24,11 +24,11 @@ class WallClockAnchor:
 
     @classmethod
     def simulated(cls, wall_ns: int) -> "WallClockAnchor":
-        """A simulated clock that starts at zero at a moment of the calendar."""
+        """A simulated clock that is zero at a UTC time, nanoseconds since 1970."""
         return cls(wall_ns, 0)
 
     def at(self, monotonic_ns: int) -> int:
-        """Nanoseconds since 1970, UTC, of a moment on the monotonic clock."""
+        """UTC time, nanoseconds since 1970, of a time on the monotonic clock, ns."""
         return self.wall_ns + monotonic_ns - self.monotonic_ns
 
     def iso(self) -> str:

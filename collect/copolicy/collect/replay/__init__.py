@@ -1,1 +1,1 @@
-"""A recording again: in a window, as a film, a sheet of pictures, a check, or in Rerun."""
+"""Replay of a recording: in a window, as a video, GIF or contact sheet, in Rerun, or as a check by simulation."""

@@ -2,42 +2,43 @@
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask
 
 from ..screen.palette import MUTED, PANEL_EDGE, SKY, SURROUND, TEXT, VERMILION, Colour, mix
 from ..screen.text import draw_text
 from ..sdl import pygame
 
-_SMALLEST_RANGE = 0.5  # of a full force: a calm episode shall look calm
+_MIN_RANGE = 0.5  # so that small values look small
 
 
 class ForceGraph:
-    """Draws the curve once a size, and the cursor on it."""
+    """Draws the curve, once per size, and a cursor on it."""
 
-    def __init__(self, interaction: np.ndarray | None, steps: int, task: PairTask):
+    def __init__(self, interaction: Array | None, steps: int, task: PairTask):
         """
         Args:
-            interaction: `(steps,)`, units of a player's full force; None where it is not measured.
+            interaction: `(steps,)`, in the task's unit; None if it is not measured.
             steps: of the episode.
-            task: says what it means, or why it is not measured, which stands in the place of the curve.
+            task: gives the meaning of positive and negative values, or the text shown if there is no measure.
         """
         self._steps = steps
         self._missing = task.missing("interaction measure") if interaction is None else ""
         self._positive, self._negative, _ = task.words.interaction_senses
         self._forces = np.zeros(0) if interaction is None else interaction
-        self._range = max(_SMALLEST_RANGE, float(np.abs(self._forces).max(initial=0.0)) * 1.1)
+        self._range = max(_MIN_RANGE, float(np.abs(self._forces).max(initial=0.0)) * 1.1)
         self._curve: pygame.Surface | None = None
 
     def x_of(self, rect: pygame.Rect, position: float) -> float:
-        """Where a position (steps) lies in the rectangle, px."""
+        """Returns the x coordinate of a position (steps) in the rectangle, px."""
         return rect.left + rect.width * position / max(1, self._steps)
 
     def position_of(self, rect: pygame.Rect, x: float) -> float:
-        """The inverse of `x_of`."""
+        """Returns the position of an x coordinate: the inverse of `x_of`."""
         return (x - rect.left) / rect.width * self._steps
 
     def draw(self, surface: pygame.Surface, rect: pygame.Rect, position: float | None, font: float) -> None:
-        """Draws into a rectangle; without a position there is no cursor. `font` is the height of text, px."""
+        """Draws into a rectangle, with a cursor if there is a position; `font` is the height of text, px."""
         if self._missing:
             draw_text(surface, self._missing, rect.center, font, MUTED, "center", rect.width)
             return
@@ -69,15 +70,15 @@ class ForceGraph:
         )
 
     def _shade(self, surface: pygame.Surface, rect: pygame.Rect, position: float) -> None:
-        """Makes paler what is still to come."""
-        left = round(self.x_of(rect, position))
-        shade = pygame.Surface((max(0, rect.right - left), rect.height), depth=32)
+        """Fades the part of the curve after the cursor."""
+        x = round(self.x_of(rect, position))
+        shade = pygame.Surface((max(0, rect.right - x), rect.height), depth=32)
         shade.fill(SURROUND)
         shade.set_alpha(120)
-        surface.blit(shade, (left, rect.top))
+        surface.blit(shade, (x, rect.top))
 
     def _draw_curve(self, size: tuple[int, int]) -> pygame.Surface:
-        # Twice as large and shrunk, for soft edges.
+        # Drawn at twice the size and scaled down, for smooth edges.
         width, height = 2 * size[0], 2 * size[1]
         canvas = pygame.Surface((width, height), depth=32)
         canvas.fill(SURROUND)
@@ -90,8 +91,8 @@ class ForceGraph:
                     top = middle - extreme / self._range * middle
                     fill = mix(_colour(extreme), SURROUND, 0.55)
                     pygame.draw.line(canvas, fill, (x, middle), (x, round(top)))
-            places = (np.arange(len(self._forces)) + 0.5) * width / len(self._forces)
-            points = [(x, middle - f / self._range * middle) for x, f in zip(places, self._forces, strict=True)]
+            xs = (np.arange(len(self._forces)) + 0.5) * width / len(self._forces)
+            points = [(x, middle - f / self._range * middle) for x, f in zip(xs, self._forces, strict=True)]
             for (start, force), end in zip(zip(points, self._forces, strict=True), points[1:], strict=False):
                 pygame.draw.line(canvas, _colour(float(force)), start, end, 4)
         pygame.draw.line(canvas, PANEL_EDGE, (0, middle), (width, middle), 3)

@@ -1,23 +1,23 @@
-"""Where a replay stands: playing, paused, fast, slow, step by step, forward and back."""
+"""The playback of a replay: position, speed, and whether it is playing."""
 
 from dataclasses import dataclass
 
 from copolicy.dataset.task_spec import RECORD_HZ
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""What a replay can be shown at, times real time."""
+"""The speeds of a replay, times real time."""
 
 
 @dataclass
 class Playback:
-    """The position in an episode and how it moves.
+    """The position in an episode and how it changes.
 
     Attributes:
         steps: length of the episode.
-        position: between 0 and `steps`; fractions lie between two states.
+        position: in [0, `steps`]; fractions lie between two states.
         speed: one of `SPEEDS`.
-        playing: it moves by itself.
-        hz: steps a second.
+        playing: the position advances with time.
+        hz: steps per second.
     """
 
     steps: int
@@ -27,29 +27,29 @@ class Playback:
     hz: int = RECORD_HZ
 
     def advance(self, seconds: float) -> None:
-        """Lets real time pass; stops at the end."""
+        """Advances by an amount of real time; stops at the end."""
         if self.playing:
             self.seek(self.position + seconds * self.hz * self.speed)
             self.playing = self.position < self.steps
 
     def seek(self, position: float) -> None:
-        """Goes to a position, or as near as there is one."""
+        """Goes to a position, limited to the episode."""
         self.position = min(float(self.steps), max(0.0, position))
 
     def step(self, count: int) -> None:
-        """Stops, and goes some whole steps forward or back."""
+        """Pauses, and goes some whole steps forward or back."""
         self.playing = False
-        # From between two states, one step back is the state before, one forward the state after.
+        # Between two states, one step back is the earlier state and one step forward the later.
         base = int(self.position) if count > 0 else -int(-self.position // 1)
         self.seek(base + count)
 
     def toggle(self) -> None:
-        """Plays or pauses; plays from the beginning where it stands at the end."""
+        """Plays or pauses; at the end, plays from the beginning."""
         if not self.playing and self.position >= self.steps:
             self.position = 0.0
         self.playing = not self.playing
 
     def change_speed(self, by: int) -> None:
-        """To a neighbouring speed."""
+        """Changes to another speed of `SPEEDS`, by a number of entries."""
         index = SPEEDS.index(self.speed) + by
         self.speed = SPEEDS[min(len(SPEEDS) - 1, max(0, index))]

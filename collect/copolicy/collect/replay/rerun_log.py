@@ -1,4 +1,4 @@
-"""A replay in Rerun: body, forces, trails and interaction force on the timeline `sim_time`."""
+"""A replay in Rerun: body, forces, trails and interaction measure on the timeline `sim_time`."""
 
 import importlib
 import os
@@ -10,14 +10,14 @@ from typing import Any
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.files.staging import new_file, require_new
-from copolicy.dataset.outline import Point, Shape, placed
+from copolicy.dataset.outline import Point, Shape, to_scene
 from copolicy.dataset.task_spec import PLAYERS
 
 from ..screen.palette import GREEN, OBSTACLE, SEATS, WOOD, mix
 from .track import Track
 
 _TIMELINE = "sim_time"
-_WIDTH = 1200.0  # px of a scene in which lines have the radii that stand here
+_WIDTH = 1200.0  # width of a scene in which line radii are as given below
 _GRAY = (128, 128, 128)
 _COLOURS = {
     "window": _GRAY,
@@ -29,7 +29,7 @@ _COLOURS = {
 
 
 def require_rerun() -> tuple[Any, Any]:
-    """Rerun and its blueprints.
+    """Imports the modules `rerun` and `rerun.blueprint`.
 
     Raises:
         CopolicyError: rerun-sdk is not installed.
@@ -41,33 +41,33 @@ def require_rerun() -> tuple[Any, Any]:
 
 
 def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
-    """Opens a track in Rerun's viewer, or writes a file for it.
+    """Opens a track in Rerun's viewer, or writes it to a file.
 
     Args:
-        track: what to show.
+        track: to show.
         path: of the file, `.rrd`; None opens the viewer.
 
     Returns:
-        Where it went, JSON-able.
+        File or viewer, and number of steps, JSON-able.
 
     Raises:
         CopolicyError: rerun-sdk is not installed, or the task has no outline.
         OutputExistsError: the file exists.
-        InvalidValueError: another ending than `.rrd`.
-        RunError: there is no display for the viewer, or Rerun could not write the file; nothing is left of it.
+        InvalidValueError: the suffix is not `.rrd`.
+        RunError: the viewer has no display, or Rerun could not write the file, which is then removed.
     """
     if path is not None:
         if path.suffix.lower() != ".rrd":
             raise InvalidValueError(str(path), "a name that ends with .rrd", path.suffix)
         require_new(path)
     rr, blueprint = require_rerun()
-    track.task.required_outline  # noqa: B018 (before anything is opened)
+    track.task.required_outline  # noqa: B018 (raises without one, before anything is opened)
     if (
         path is None
         and sys.platform == "linux"
         and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
     ):
-        # The viewer is a program of its own, whose complaint nobody would see.
+        # The viewer is a separate process, whose error message would not be shown.
         raise RunError(
             "expected a display (or a file, --out OUT.rrd), found none: neither DISPLAY nor WAYLAND_DISPLAY is set"
         )
@@ -88,7 +88,7 @@ def log_to_rerun(track: Track, path: Path | None = None) -> dict[str, Any]:
         recording.save(str(partial), default_blueprint=layout)
         try:
             _log_track(rr, recording, track)
-        except RuntimeError as error:  # Rerun's, which does not say what the system said, such as that the disk is full
+        except RuntimeError as error:  # Rerun's; it omits the system's error, such as a full disk
             raise RunError(f"{path}: expected Rerun to write the file, found {' '.join(str(error).split())}") from None
         recording.disconnect()
     return {"out": str(path), "bytes": path.stat().st_size, "steps": track.steps}
@@ -104,7 +104,7 @@ def _log_track(rr: Any, recording: Any, track: Track) -> None:
 
 
 def _log_scene(rr: Any, recording: Any, track: Track) -> None:
-    """What stands still."""
+    """Logs the fixed shapes, the trails and a description of the episode."""
     outline, meta = track.task.required_outline, track.episode.meta
     width, height = outline.size
     window = Shape("window", ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)))
@@ -116,7 +116,7 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
             lines = rr.LineStrips2D(strips, colors=[_COLOURS[role]] * len(strips), **labels)
             recording.log(f"world/{entity}", lines, static=True)
     for player, hand, colour in zip(PLAYERS, outline.hands, SEATS, strict=True):
-        points = [placed(pose, hand) for pose in track.poses]
+        points = [to_scene(pose, hand) for pose in track.poses]
         trail = rr.LineStrips2D([points], colors=[mix(colour, _GRAY, 0.5)], radii=[width / _WIDTH])
         recording.log(f"world/trail/{player}", trail, static=True)
     if track.interaction is not None:
@@ -130,19 +130,19 @@ def _log_scene(rr: Any, recording: Any, track: Track) -> None:
 def _log_step(rr: Any, recording: Any, track: Track, step: int) -> None:
     outline, pose, forces = track.task.required_outline, track.poses[step], track.forces_at(step)
     radius = outline.size[0] / _WIDTH
-    strips = [_closed([placed(pose, corner) for corner in shape.corners]) for shape in outline.body]
+    strips = [_closed([to_scene(pose, corner) for corner in shape.corners]) for shape in outline.body]
     colours = [_COLOURS.get(shape.role, WOOD) for shape in outline.body]
     recording.log(f"world/{track.task.spec.name}", rr.LineStrips2D(strips, colors=colours, radii=[2.0 * radius]))
-    origins = [placed(pose, hand) for hand in outline.hands]
+    origins = [to_scene(pose, hand) for hand in outline.hands]
     vectors = [(outline.arrow * x, outline.arrow * y) for x, y in (forces[:2], forces[2:])]
     recording.log(
         "world/forces", rr.Arrows2D(origins=origins, vectors=vectors, colors=list(SEATS), radii=[2.5 * radius])
     )
     if step < track.steps and track.interaction is not None:
         recording.log("interaction_force", rr.Scalars([float(track.interaction[step])]))
-    for moment in track.moments:
-        if min(moment.step, track.steps) == step:
-            recording.log("events", rr.TextLog(f"{moment.kind} {moment.detail}".strip()))
+    for event in track.events:
+        if min(event.step, track.steps) == step:
+            recording.log("events", rr.TextLog(f"{event.kind} {event.detail}".strip()))
 
 
 def _closed(corners: Sequence[Point]) -> list[Point]:

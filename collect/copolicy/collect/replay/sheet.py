@@ -1,4 +1,4 @@
-"""A contact sheet: an episode on one page."""
+"""A contact sheet of an episode: frames and the interaction measure on one image."""
 
 import math
 from pathlib import Path
@@ -11,7 +11,7 @@ from ..screen.canvas import Canvas, new_surface
 from ..screen.dialogs import outcome_colour, outcome_text
 from ..screen.palette import INK, MUTED, TEXT
 from ..sdl import pygame
-from .pictures import write_png
+from .frames import write_png
 from .track import Track
 from .view import ReplayView
 
@@ -20,24 +20,24 @@ FRAMES = 12
 _GAP = 12
 _HEAD = 64
 _GRAPH = 120
-_LINE = 28  # which says why there is no graph
+_LINE = 28  # height of the text in place of a missing graph
 
 
 def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 1800) -> dict[str, Any]:
-    """Writes pictures from start to end, evenly spaced, and the interaction force below them, as PNG.
+    """Writes evenly spaced frames of the episode, and the interaction measure below them, as PNG.
 
     Args:
-        track: what to show.
+        track: to show.
         path: of the file, `.png`.
-        frames: pictures on the sheet.
+        frames: number of frames on the sheet.
         width: of the sheet, px.
 
     Returns:
-        Size and the steps of the pictures, JSON-able.
+        Size of the sheet and steps of the frames, JSON-able.
 
     Raises:
         OutputExistsError: the file exists.
-        InvalidValueError: another ending, or a number of pictures or a width that makes no sheet.
+        InvalidValueError: the suffix, number of frames or width is invalid.
     """
     if path.suffix.lower() != ".png":
         raise InvalidValueError(str(path), "a name that ends with .png", path.suffix)
@@ -53,7 +53,7 @@ def write_sheet(track: Track, path: Path, frames: int = FRAMES, width: int = 180
 
 
 def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, list[int]]:
-    """The sheet, and the step of each picture."""
+    """Returns the sheet and the step of each frame."""
     columns = math.ceil(math.sqrt(frames * 0.75))
     rows = math.ceil(frames / columns)
     cell = (1200 - (columns + 1) * _GAP) / columns
@@ -79,15 +79,16 @@ def draw_sheet(track: Track, frames: int, width: int) -> tuple[pygame.Surface, l
 
 def _draw_head(canvas: Canvas, track: Track) -> None:
     meta = track.episode.meta
-    about = [
+    players = zip((meta.player_0_id, meta.player_1_id), PLAYERS, strict=True)
+    details = [
         meta.map_id,
         meta.pair_id and f"pair {meta.pair_id}",
-        " and ".join(one or name for one, name in zip((meta.player_0_id, meta.player_1_id), PLAYERS, strict=True)),
+        " and ".join(player_id or seat for player_id, seat in players),
         f"{track.seconds:.1f} s",
         meta.quality_flags.replace(",", ", "),
     ]
     canvas.text(track.path.name, (_GAP + 4, 10), 32, TEXT, max_width=700)
-    canvas.text("  ·  ".join(text for text in about if text), (_GAP + 4, 38), 22, MUTED, max_width=800)
+    canvas.text("  ·  ".join(text for text in details if text), (_GAP + 4, 38), 22, MUTED, max_width=800)
     reason = meta.termination_reason
     canvas.text(
         outcome_text(reason), (1200 - _GAP - 4, 32), 38, outcome_colour(track.task.spec, reason), "midright", 320

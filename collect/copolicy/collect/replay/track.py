@@ -1,4 +1,4 @@
-"""A recording as what can be shown of it at any moment."""
+"""The track of a recorded episode: its poses, forces, interaction and events, by step."""
 
 import itertools
 from dataclasses import dataclass
@@ -6,16 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError
-from copolicy.dataset.outline import Pose, between
-from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.outline import Pose, interpolate_pose
+from copolicy.dataset.recording.reader import read_recording
 from copolicy.dataset.task import PairTask, get_task
 
 
 @dataclass(frozen=True)
-class Moment:
-    """Something that happened at a step."""
+class TrackEvent:
+    """An event of the recording, and its step."""
 
     step: int
     kind: str
@@ -24,50 +25,49 @@ class Moment:
 
 @dataclass(frozen=True, repr=False)
 class Track:
-    """An episode of T steps.
+    """The track of an episode of T steps.
 
     Attributes:
         path: of the recording.
         task: of the episode.
         episode: states, actions, metadata, scenario.
-        poses: `T + 1`, see `Outline.poses`; none where the task has no outline.
+        poses: `T + 1`, see `Outline.poses`; empty if the task has no outline.
         forces: `(T + 1, 4)` robot xy, human xy; zero at the end.
-        interaction: `(T,)` interaction force of each step, units of a player's full force; positive pulls apart; None
-            where the task measures none.
-        moments: what happened, in order, without start and end.
+        interaction: `(T,)` interaction measure of each step, in the task's unit; None if the task has none.
+        events: of the recording, in order, without start and end.
     """
 
     path: Path
     task: PairTask
     episode: Episode
     poses: tuple[Pose, ...]
-    forces: np.ndarray
-    interaction: np.ndarray | None
-    moments: tuple[Moment, ...] = ()
+    forces: Array
+    interaction: Array | None
+    events: tuple[TrackEvent, ...] = ()
 
     @property
     def steps(self) -> int:
-        """T, and the position of the last state."""
+        """Number of steps T, which is also the position of the last state."""
         return len(self.episode.actions)
 
     @property
     def hz(self) -> int:
-        """Steps a second."""
+        """Steps per second."""
         return self.task.spec.record_hz
 
     @property
     def seconds(self) -> float:
-        """Length in simulated time."""
+        """Length in simulated time, s."""
         return self.steps / self.hz
 
     def pose_at(self, position: float) -> Pose:
-        """The pose at a position between 0 and T, steps; between two states a way between them."""
+        """Returns the pose at a position in [0, T], in steps; interpolated between two states."""
         before = min(int(position), self.steps)
         after = min(before + 1, self.steps)
-        return between(self.poses[before], self.poses[after], position - before)
+        return interpolate_pose(self.poses[before], self.poses[after], position - before)
 
     def forces_at(self, position: float) -> tuple[float, float, float, float]:
-        """The forces that act at a position."""
+        """Returns the forces that act at a position: robot xy, human xy."""
         a, b, c, d = self.forces[min(int(position), self.steps)].tolist()
         return a, b, c, d
 
@@ -76,17 +76,19 @@ def read_track(path: Path | str) -> Track:
     """Reads and verifies a recording.
 
     Raises:
-        FileFormatError: it cannot be read, is damaged, broke off, or is no recording of a task that is installed.
+        FileFormatError: the file is unreadable, damaged, unfinished, or not a recording of an installed task.
     """
     path = Path(path)
     if path.name.endswith(".part"):
-        raise FileFormatError(path, "a finished recording", "one that broke off (copolicy-collect recover helps)")
+        raise FileFormatError(path, "a finished recording", "an unfinished one (see copolicy-collect recover)")
     recording = read_recording(path)
-    return track_of(path, recording.episode, _moments(recording))
+    events = (event for event in recording.events if event.kind not in ("start", "end"))
+    track_events = tuple(TrackEvent(event.step, event.kind, event.detail) for event in events)
+    return track_from_episode(path, recording.episode, track_events)
 
 
-def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> Track:
-    """The track of an episode in memory."""
+def track_from_episode(path: Path, episode: Episode, events: tuple[TrackEvent, ...] = ()) -> Track:
+    """Returns the track of an episode in memory."""
     task = get_task(episode.task)
     states = np.vstack((episode.states, episode.final_state))
     poses: tuple[Pose, ...] = ()
@@ -94,16 +96,11 @@ def track_of(path: Path, episode: Episode, moments: tuple[Moment, ...] = ()) -> 
     if task.outline is not None:
         poses = tuple((x, y, theta) for x, y, theta in task.outline.poses(states).tolist())
         forces[:-1] = task.outline.forces(episode.actions)
-    return Track(path, task, episode, poses, forces, task.interaction(states[1:], episode.actions), moments)
+    return Track(path, task, episode, poses, forces, task.interaction(states[1:], episode.actions), events)
 
 
-def _moments(recording: Recording) -> tuple[Moment, ...]:
-    events = (event for event in recording.events if event.kind not in ("start", "end"))
-    return tuple(Moment(event.step, event.kind, event.detail) for event in events)
-
-
-def sampled(track: Track, frames_per_second: float, speed: float) -> list[float]:
-    """Positions of the frames of a film of the whole track, steps; the last one is its end."""
+def frame_positions(track: Track, frames_per_second: float, speed: float) -> list[float]:
+    """Returns the positions of the frames of a video of the whole track, in steps; the last is the end."""
     stride = track.hz * speed / frames_per_second
     positions = itertools.takewhile(lambda position: position < track.steps, itertools.count(0.0, stride))
     return [*positions, float(track.steps)]

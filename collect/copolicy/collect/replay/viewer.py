@@ -1,4 +1,4 @@
-"""The window of a replay."""
+"""The interactive window of a replay."""
 
 import time
 from collections.abc import Callable
@@ -6,21 +6,21 @@ from pathlib import Path
 
 from ..screen.window import Window
 from ..sdl import pygame
-from .pictures import write_png
+from .frames import write_png
 from .playback import Playback
 from .track import Track
-from .view import SIZE, ReplayView, Shown
+from .view import SIZE, ReplayView, ViewOptions
 
-_PICTURES_HZ = 60
+_FRAMES_HZ = 60
 _MESSAGE_S = 2.5
 
 
 class Viewer:
-    """Shows a track until its user has seen enough.
+    """Shows a track in a window until the user quits.
 
     Attributes:
-        playback: where it stands.
-        shown: what is drawn beside the table.
+        playback: position and speed.
+        options: what is drawn.
         open: the user has not quit.
     """
 
@@ -31,7 +31,7 @@ class Viewer:
             RunError: there is no display.
         """
         self.playback = Playback(track.steps, hz=track.hz)
-        self.shown = Shown()
+        self.options = ViewOptions()
         self.open = True
         self._track = track
         self._view = ReplayView(track)
@@ -44,9 +44,9 @@ class Viewer:
         pygame.key.set_repeat(350, 40)
 
     def run(self) -> None:
-        """Until the window is closed."""
+        """Runs until the window is closed."""
         before = self._clock()
-        pace = pygame.time.Clock()
+        frame_clock = pygame.time.Clock()
         while self.open:
             for event in pygame.event.get():
                 self.handle(event)
@@ -54,23 +54,23 @@ class Viewer:
             self.advance(now - before)
             before = now
             self.draw()
-            pace.tick(_PICTURES_HZ)
+            frame_clock.tick(_FRAMES_HZ)
         pygame.display.quit()
 
     def advance(self, seconds: float) -> None:
-        """Lets time pass."""
+        """Advances the playback by real time, and clears an expired message."""
         if not self._dragging:
             self.playback.advance(seconds)
-        if self.shown.message and self._clock() > self._message_until:
-            self.shown.message = ""
+        if self.options.message and self._clock() > self._message_until:
+            self.options.message = ""
 
     def draw(self) -> None:
-        """Draws and shows the picture."""
-        self._view.draw(self._window.surface, self.playback, self.shown)
+        """Draws and shows a frame."""
+        self._view.draw(self._window.surface, self.playback, self.options)
         self._window.show()
 
     def handle(self, event: pygame.event.Event) -> None:
-        """Does what a key, the mouse or the window's frame asks for."""
+        """Handles an event of the keyboard, the mouse or the window."""
         if event.type == pygame.QUIT:
             self.open = False
         elif event.type == pygame.KEYDOWN:
@@ -86,11 +86,11 @@ class Viewer:
             self.playback.playing = self._was_playing and self.playback.position < self.playback.steps
 
     def _key(self, key: int, shift: bool) -> None:
-        playback, shown = self.playback, self.shown
+        playback, options = self.playback, self.options
         stride = playback.hz if shift else 1
         if key in (pygame.K_q, pygame.K_ESCAPE):
-            if shown.help and key == pygame.K_ESCAPE:
-                shown.help = False
+            if options.help and key == pygame.K_ESCAPE:
+                options.help = False
             else:
                 self.open = False
         elif key == pygame.K_SPACE:
@@ -102,11 +102,11 @@ class Viewer:
         elif key in (pygame.K_HOME, pygame.K_END):
             playback.seek(0 if key == pygame.K_HOME else playback.steps)
         elif key == pygame.K_t:
-            shown.trails = not shown.trails
+            options.trails = not options.trails
         elif key == pygame.K_f:
-            shown.forces = not shown.forces
+            options.forces = not options.forces
         elif key in (pygame.K_h, pygame.K_F1):
-            shown.help = not shown.help
+            options.help = not options.help
         elif key == pygame.K_s:
             self._save()
         elif key == pygame.K_F11:
@@ -121,28 +121,29 @@ class Viewer:
         self.playback.seek(position)
 
     def _drag(self, point: tuple[int, int]) -> None:
-        position = self._view.position_at(self._window.surface, point, held=True)
+        position = self._view.position_at(self._window.surface, point, dragging=True)
         if position is not None:
             self.playback.seek(position)
 
     def _save(self) -> None:
         surface = self._window.surface.copy()
-        self._view.draw(surface, self.playback, Shown(self.shown.trails, self.shown.forces, hint=False))
-        path = _free(self._track.path.with_name(f"{self._track.path.stem}_step_{int(self.playback.position):04d}.png"))
+        self._view.draw(surface, self.playback, ViewOptions(self.options.trails, self.options.forces, hint=False))
+        name = f"{self._track.path.stem}_step_{int(self.playback.position):04d}.png"
+        path = _unused_path(self._track.path.with_name(name))
         try:
             write_png(surface, path)
-            self._say(f"saved {path.name}")
+            self._show_message(f"saved {path.name}")
         except OSError as error:
-            self._say(f"not saved: {error}")
+            self._show_message(f"not saved: {error}")
 
-    def _say(self, message: str) -> None:
-        self.shown.message = message
+    def _show_message(self, message: str) -> None:
+        self.options.message = message
         self._message_until = self._clock() + _MESSAGE_S
 
 
-def _free(path: Path) -> Path:
-    """A path that does not exist yet."""
-    number, free = 2, path
-    while free.exists():
-        free, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
-    return free
+def _unused_path(path: Path) -> Path:
+    """Returns the path, or one with a number appended if it exists."""
+    number, unused = 2, path
+    while unused.exists():
+        unused, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
+    return unused

@@ -1,4 +1,4 @@
-"""What the players see: the world, the bars around it, dialogues, and the lobby."""
+"""Drawing of the screen: the world, the bars around it, dialogs and the lobby."""
 
 from .canvas import SIZE, WORLD, Canvas
 from .text import draw_text, text_size

@@ -1,11 +1,10 @@
-"""Dialogues above the world: menus, banners, the count-down, the help, a line of text to write."""
+"""Dialogs over the world: menus, the count-down, the help, text fields and short messages."""
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from copolicy.dataset.task import TABLE
 from copolicy.dataset.task_spec import TIMEOUT, TaskSpec
 
 from .canvas import WORLD, Canvas
@@ -26,19 +25,19 @@ STRIP_ROWS = 2
 
 
 def outcome_text(reason: str) -> str:
-    """How an episode ended, in words."""
+    """Returns the text for a termination reason."""
     return _OUTCOMES.get(reason, reason.replace("_", " "))
 
 
 def outcome_colour(spec: TaskSpec, reason: str) -> Colour:
-    """The colour of an end: a success, a time-out, another end of the world, or one that the world did not make."""
+    """Returns the colour for a termination reason: of success, time-out, another end of the world, or a stop."""
     if reason == TIMEOUT:
         return YELLOW
     return GREEN if reason in spec.successes else VERMILION if reason in spec.reasons else MUTED
 
 
 class _Labels(Protocol):
-    """What is printed on a gamepad, see `inputs.gamepads.Labels`."""
+    """The labels printed on a gamepad, see `inputs.mapping.Labels`."""
 
     def either(self, *controls: str) -> str: ...
 
@@ -54,16 +53,16 @@ HELP = (
     ("discard, with a reason", "{y}", "X"),
     ("add a note", "{leftshoulder}", "N"),
     ("undo the last keep", "{rightshoulder}", "U"),
-    ("swap seats (lobby, before a start)", "in the menu", "Tab"),
+    ("swap seats (before an episode)", "in the menu", "Tab"),
     ("this help", "", "F1 or H"),
     ("full screen, sound", "", "F11, M"),
 )
-"""What to do (`{}` stands for the task), how on a gamepad (`{a}` for what is printed there), how on the keyboard."""
+"""Action (`{}` is what moves), gamepad control (`{a}` is the label printed on it) and key."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a dialogue."""
+    """One line of a dialog."""
 
     text: str
     size: float = 28
@@ -81,7 +80,7 @@ def draw_dialog(
     hint: str = "",
     middle: float = 600,
 ) -> None:
-    """A box in the world, `middle` its place from left to right: a title, some lines, and a menu with a cursor."""
+    """Draws a box over the world, centred at x = `middle`: a title, lines of text, a menu with a cursor and a hint."""
     height = 100 + sum(line.size + 12 for line in lines) + _ROW * len(items) + (34 if hint else 0) + 12 * bool(items)
     x, y = middle - width / 2, _MIDDLE - height / 2
     canvas.box(x, y, width, height, edge=colour)
@@ -92,17 +91,17 @@ def draw_dialog(
         y += line.size + 12
     y += 8
     for index, item in enumerate(items):
-        chosen = index == cursor
-        if chosen:
+        selected = index == cursor
+        if selected:
             canvas.box(x + 40, y, width - 80, _ROW - 6, mix(PANEL, SKY, 0.30), SKY)
-        canvas.text(item, (middle, y + 20), 30, TEXT if chosen else MUTED, "center", width - 110)
+        canvas.text(item, (middle, y + 20), 30, TEXT if selected else MUTED, "center", width - 110)
         y += _ROW
     if hint:
         canvas.text(hint, (middle, y + 14), 22, MUTED, "center", width - 40)
 
 
 def draw_strip_menu(canvas: Canvas, items: Sequence[str], cursor: int, hint: str, colour: Colour = MUTED) -> None:
-    """A menu below the world, which hides nothing of it; its entries run down one column after the other."""
+    """Draws a menu below the world; its items fill one column after the other."""
     x, y, width, height = _STRIP
     canvas.box(x, y, width, height)
     canvas.text(hint, (x + width / 2, y + 15), 22, colour, "center", width - 24)
@@ -111,47 +110,47 @@ def draw_strip_menu(canvas: Canvas, items: Sequence[str], cursor: int, hint: str
     for index, item in enumerate(items):
         column, row = divmod(index, STRIP_ROWS)
         left, top = x + 8 + column * cell, y + 28 + 30 * row
-        chosen = index == cursor
-        if chosen:
+        selected = index == cursor
+        if selected:
             canvas.box(left + 2, top, cell - 4, 28, mix(PANEL, SKY, 0.30), SKY)
-        canvas.text(item, (left + cell / 2, top + 15), 23, TEXT if chosen else MUTED, "center", cell - 16)
+        canvas.text(item, (left + cell / 2, top + 15), 23, TEXT if selected else MUTED, "center", cell - 16)
 
 
-def draw_countdown(canvas: Canvas, number: str, share: float) -> None:
-    """A large number below the world; `share` in [0, 1] of its second is over."""
+def draw_countdown(canvas: Canvas, number: str, fraction: float) -> None:
+    """Draws a large number below the world; `fraction` of its second has passed, in [0, 1]."""
     y = _STRIP[1] + _STRIP[3] / 2
     with canvas.patch(600, y, 48) as patch:
         centre = canvas.point(600, y)
         patch.circle(SKY, centre, 44 * canvas.scale)
-        patch.circle(PANEL, centre, (40 - 7 * share) * canvas.scale)
+        patch.circle(PANEL, centre, (40 - 7 * fraction) * canvas.scale)
     canvas.text(number, (600, y + 2), 76 if len(number) == 1 else 54, TEXT, "center")
 
 
 def draw_entry(canvas: Canvas, title: str, text: str) -> None:
-    """A line that is being written."""
-    draw_dialog(canvas, title, [Line(" ", 44)], hint="Enter: done      Esc: leave it", width=820)
+    """Draws a text field."""
+    draw_dialog(canvas, title, [Line(" ", 44)], hint="Enter: save      Esc: cancel", width=820)
     canvas.box(220, _MIDDLE - 24, 760, 52, FLOOR)
     canvas.text(f"{text}|", (236, _MIDDLE + 2), 32, INK, "midleft", 730)
 
 
-def draw_help(canvas: Canvas, pads: Sequence[_Labels] = (), task: str = TABLE) -> None:
-    """All commands of a session of a task, by what is printed on the gamepads in hand, and by keys."""
+def draw_help(canvas: Canvas, gamepads: Sequence[_Labels] = (), noun: str = "body") -> None:
+    """Draws all commands of a session, by the labels of the gamepads in use and by keys; `noun` is what moves."""
     canvas.dim()
     canvas.box(110, 80, 980, 600)
     canvas.text("Help", (600, 118), 46, TEXT, "center")
     y = 158
-    for what, pad, keys in HELP:
-        head = not what
-        canvas.text(what.format(task), (150, y), 28, TEXT, max_width=430)
-        controls = _CONTROL.findall(pad)
-        if controls:
-            pad = " / ".join(filter(None, (labels.either(*controls) for labels in pads))) or "-"
-        canvas.text(pad, (610, y), 28, SKY if head else TEXT, max_width=190)
-        canvas.text(keys, (820, y), 28, SKY if head else TEXT, max_width=250)
+    for action, control, keys in HELP:
+        colour = TEXT if action else SKY
+        canvas.text(action.format(noun), (150, y), 28, TEXT, max_width=430)
+        names = _CONTROL.findall(control)
+        if names:
+            control = " / ".join(filter(None, (labels.either(*names) for labels in gamepads))) or "-"
+        canvas.text(control, (610, y), 28, colour, max_width=190)
+        canvas.text(keys, (820, y), 28, colour, max_width=250)
         y += 39
 
 
 def draw_toast(canvas: Canvas, text: str) -> None:
-    """A short message in the bar above the world."""
+    """Draws a short message in the bar above the world."""
     canvas.box(410, 5, 600, 48, edge=YELLOW)
     canvas.text(text, (710, 30), 27, TEXT, "center", 575)

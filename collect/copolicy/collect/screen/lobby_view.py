@@ -1,4 +1,4 @@
-"""The lobby: two players join, try their sticks, and see what the session will be."""
+"""Drawing of the lobby: a summary of the session, and a panel for each player."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,22 +10,22 @@ from .patch import Point
 
 @dataclass
 class LobbyPanel:
-    """One player's half of the lobby.
+    """The content of one player's panel.
 
     Attributes:
-        seat: where they will sit.
+        seat: of the player, 0 robot, 1 human.
         player: pseudonym.
-        prompt: what to do next.
-        device: what they hold; empty until they have joined.
-        stick: raw deflection in [-1, 1]; None where there is none.
-        steering: what is deflected.
-        force: what comes of it after dead zone and range.
-        dead_zone: share of the full deflection.
-        items: of their menu.
-        cursor: the chosen one.
-        ready: done here.
-        progress: of a set-up, share in [0, 1]; None where none runs.
-        notice: what is wrong with the device, or why one did not join.
+        prompt: instruction for the player.
+        device: name of the device; empty until the player has joined.
+        stick: raw deflection, x and y in [-1, 1]; None without a device.
+        steering: label of the control that steers.
+        force: after calibration and dead zone, x and y in [-1, 1].
+        dead_zone: proportion of full deflection.
+        items: of the player's menu.
+        cursor: index of the selected item.
+        ready: the player has confirmed.
+        progress: of a set-up, in [0, 1]; None if none is in progress.
+        notice: a fault of the device, or why one could not join.
     """
 
     seat: int
@@ -43,10 +43,10 @@ class LobbyPanel:
     notice: str = ""
 
 
-def draw_lobby(canvas: Canvas, title: str, plan: Sequence[str], panels: Sequence[LobbyPanel]) -> None:
-    """Draws the whole screen."""
+def draw_lobby(canvas: Canvas, title: str, summary: Sequence[str], panels: Sequence[LobbyPanel]) -> None:
+    """Draws the lobby: a title, lines that summarise the session, and the players' panels."""
     canvas.text(title, (600, 44), 54, TEXT, "center", 1140)
-    for row, line in enumerate(plan):
+    for row, line in enumerate(summary):
         canvas.text(line, (600, 90 + 32 * row), 27, MUTED, "center", 1140)
     for panel in panels:
         _draw_panel(canvas, panel, 20 + 590 * panel.seat)
@@ -57,12 +57,12 @@ def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:
     colour = GREEN if panel.ready else SEATS[panel.seat] if panel.device else PANEL_EDGE
     canvas.box(x, 186, 570, 530, edge=colour)
     canvas.seat_mark(panel.seat, x + 52, 238, 34)
-    seat = ("triangle, robot's seat", "circle, human's seat")[panel.seat]
+    seat = ("triangle: robot seat", "circle: human seat")[panel.seat]
     canvas.text(panel.player, (x + 104, 208), 40, max_width=440)
     canvas.text(seat, (x + 104, 246), 25, MUTED, max_width=440)
     if not panel.device:
         canvas.text(panel.prompt, (x + 285, 450), 38, YELLOW, "center", 530)
-        for row, line in enumerate(_two_lines(panel.notice)):
+        for row, line in enumerate(panel.notice.split(": ", 1)):
             canvas.text(line, (x + 285, 510 + 30 * row), 25, VERMILION, "center", 540)
         return
     canvas.text(panel.device, (x + 285, 286), 28, SKY, "center", 530)
@@ -75,20 +75,15 @@ def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:
         canvas.text(panel.prompt, (x + 285, 640), 32, YELLOW, "center", 530)
         canvas.bar(x + 60, 672, 450, 16, panel.progress, SKY)
         return
-    left, width = (x + 284, 262) if panel.stick is not None else (x + 115, 340)
+    menu_x, width = (x + 284, 262) if panel.stick is not None else (x + 115, 340)
     for row, item in enumerate(panel.items):
         y = 322 + 36 * row
-        chosen = row == panel.cursor
-        if chosen:
-            canvas.box(left, y, width, 35, mix(PANEL, SKY, 0.30), SKY)
-        canvas.text(item, (left + 14, y + 18), 25, TEXT if chosen else MUTED, "midleft", width - 24)
+        selected = row == panel.cursor
+        if selected:
+            canvas.box(menu_x, y, width, 35, mix(PANEL, SKY, 0.30), SKY)
+        canvas.text(item, (menu_x + 14, y + 18), 25, TEXT if selected else MUTED, "midleft", width - 24)
     if panel.ready:
         canvas.box(x + 60, 654, 450, 50, mix(PANEL, GREEN, 0.45), GREEN)
         canvas.text("ready", (x + 285, 679), 36, TEXT, "center")
     else:
         canvas.text(panel.prompt, (x + 285, 686), 27, YELLOW, "center", 530)
-
-
-def _two_lines(text: str) -> list[str]:
-    """A sentence in two, where it has a colon."""
-    return [part.strip() for part in text.split(": ", 1)] if text else []

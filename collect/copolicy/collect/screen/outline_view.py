@@ -1,10 +1,10 @@
-"""One frame of a task's world, from its outline: floor, what stands still, trails, body and forces, at any size."""
+"""Drawing of a task's world from its outline: floor, fixed shapes, trails, body and forces, at any size."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from copolicy.dataset.outline import Outline, Pose, placed
+from copolicy.dataset.outline import Outline, Pose, to_scene
 from copolicy.dataset.task import PairTask, SceneView
 
 from ..sdl import pygame
@@ -12,14 +12,14 @@ from .canvas import new_surface
 from .palette import FLOOR, FLOOR_DOT, GREEN, INK, OBSTACLE, SEATS, SHADOW, WOOD, WOOD_EDGE, Colour, mix
 from .patch import Point, SmoothPatch
 
-_FULL = (1200, 600)  # px of a world in which lines have the widths that stand here
+_FULL = (1200, 600)  # px; size of a world in which line widths are as given below
 _DOTS = 50  # px between the dots on the floor
-_LIT = (255, 255, 255)
+_WHITE = (255, 255, 255)
 _FILLS: dict[str, Colour] = {"body": WOOD, "robot": SEATS[0], "human": SEATS[1]}
 
 
 def scene_view(task: PairTask, scenario: Any) -> SceneView:
-    """What draws a scenario: the task's own view, or else its outline.
+    """Returns a view that draws a scenario: the task's own, or else one of its outline.
 
     Raises:
         CopolicyError: the task has no outline.
@@ -28,7 +28,7 @@ def scene_view(task: PairTask, scenario: Any) -> SceneView:
 
 
 def letterbox(area: pygame.Rect, size: tuple[float, float]) -> pygame.Rect:
-    """The largest rectangle with the shape of `size` in the middle of an area."""
+    """Returns the largest rectangle with the aspect ratio of `size`, centred in an area."""
     scale = min(area.width / size[0], area.height / size[1])
     rect = pygame.Rect(0, 0, max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
     rect.center = area.center
@@ -36,10 +36,10 @@ def letterbox(area: pygame.Rect, size: tuple[float, float]) -> pygame.Rect:
 
 
 class OutlineView:
-    """Draws one scenario and what moves in it into a rectangle of a surface; see `SceneView`.
+    """Draws one scenario and its moving body into a rectangle of a surface; see `SceneView`.
 
-    The rectangle's size sets the scale; what stands still is drawn once a size. A task that looks like more than its
-    outline overrides how its floor, its fixed shapes and its body are drawn.
+    The rectangle's size sets the scale; fixed shapes are drawn once per size. A task with a more detailed look
+    overrides how its floor, its fixed shapes and its body are drawn.
     """
 
     def __init__(self, outline: Outline, scenario: Any):
@@ -47,8 +47,8 @@ class OutlineView:
         self._fixed = outline.fixed(scenario)
         self._background: pygame.Surface | None = None
         self._rect = pygame.Rect(0, 0, 1, 1)
-        self._scale = 1.0  # px of the surface for a unit of the outline
-        self._px = 1.0  # px of the surface for a px of lines and marks
+        self._scale = 1.0  # px of the surface per unit of the outline
+        self._px = 1.0  # px of the surface per px of line widths and marks
 
     def draw(
         self,
@@ -58,7 +58,7 @@ class OutlineView:
         forces: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
         trail: Sequence[Pose] = (),
     ) -> pygame.Rect:
-        """Draws the world into the middle of `area`; the trail is drawn as the ways of both hands."""
+        """Draws the world, centred in `area`; the trail is drawn as the paths of both hands."""
         rect = letterbox(area, self._outline.size)
         if self._background is None or rect.size != self._rect.size:
             width, height = self._outline.size
@@ -78,11 +78,11 @@ class OutlineView:
         return rect
 
     def to_screen(self, point: Point) -> Point:
-        """Where a point of the world was drawn last, px of the surface."""
+        """Returns a point of the world in px of the surface, by the last call of `draw`."""
         return self._rect.left + point[0] * self._scale, self._rect.top + point[1] * self._scale
 
-    def _of_body(self, pose: Pose, points: Sequence[Point]) -> list[Point]:
-        return [self.to_screen(placed(pose, point)) for point in points]
+    def _body_points(self, pose: Pose, points: Sequence[Point]) -> list[Point]:
+        return [self.to_screen(to_scene(pose, point)) for point in points]
 
     def _draw_background(self, size: tuple[int, int]) -> pygame.Surface:
         floor = new_surface(size)
@@ -115,14 +115,14 @@ class OutlineView:
             return
         width = max(2, round(3 * self._px))
         for hand, colour in zip(self._outline.hands, SEATS, strict=True):
-            points = [self.to_screen(placed(pose, hand)) for pose in trail]
+            points = [self.to_screen(to_scene(pose, hand)) for pose in trail]
             pale = mix(colour, FLOOR, 0.55)
             pygame.draw.lines(surface, pale, False, points, width)
             pygame.draw.aalines(surface, pale, False, points)
 
     def _draw_body(self, surface: pygame.Surface, pose: Pose) -> None:
         edge, drop = 2.5 * self._px, 5 * self._px
-        shapes = [(role, self._of_body(pose, corners)) for role, corners in self._outline.body]
+        shapes = [(role, self._body_points(pose, corners)) for role, corners in self._outline.body]
         with SmoothPatch(surface, [point for _, corners in shapes for point in corners], drop + 2 * edge) as patch:
             for _, corners in shapes:
                 patch.polygon(SHADOW, [(x + drop, y + drop) for x, y in corners])
@@ -130,9 +130,9 @@ class OutlineView:
                 colour = _FILLS.get(role, WOOD)
                 patch.polygon(colour, corners)
                 patch.outline(WOOD_EDGE if colour == WOOD else mix(colour, INK, 0.4), shrunk(corners, edge / 2), edge)
-            if not {"robot", "human"} <= {role for role, _ in shapes}:  # the body itself does not say who holds where
+            if not {"robot", "human"} <= {role for role, _ in shapes}:  # the body has no shapes for the seats
                 for hand, colour in zip(self._outline.hands, SEATS, strict=True):
-                    (centre,) = self._of_body(pose, [hand])
+                    (centre,) = self._body_points(pose, [hand])
                     patch.circle(mix(colour, INK, 0.4), centre, 7 * self._px)
                     patch.circle(colour, centre, 5 * self._px)
 
@@ -141,7 +141,7 @@ class OutlineView:
         if strength < 0.03:
             return
         px, colour = self._px, SEATS[seat]
-        (tail,) = self._of_body(pose, [self._outline.hands[seat]])
+        (tail,) = self._body_points(pose, [self._outline.hands[seat]])
         u, v = force[0] / strength, force[1] / strength
         length = self._outline.arrow * strength * self._scale
         head = min(20 * px, 0.6 * length)
@@ -158,20 +158,20 @@ class OutlineView:
             ]
 
         with SmoothPatch(surface, [tail, tip], head + 8 * px) as patch:
-            # A white rim keeps the arrow apart from whatever lies below.
-            for grown, paint in ((2.2 * px, _LIT), (0.0, mix(colour, INK, 0.12))):
-                patch.line(paint, tail, neck, 7 * px + 2 * grown)
-                patch.polygon(paint, barbs(grown))
+            # A white rim separates the arrow from the background.
+            for rim, paint in ((2.2 * px, _WHITE), (0.0, mix(colour, INK, 0.12))):
+                patch.line(paint, tail, neck, 7 * px + 2 * rim)
+                patch.polygon(paint, barbs(rim))
             patch.circle(mix(colour, INK, 0.4), tail, 5 * px)
 
 
 def shrunk(outline: Sequence[Point], by: float) -> list[Point]:
-    """An outline moved towards its middle, so that a border drawn along it stays inside."""
+    """Returns a polygon moved towards its centre by a distance, so that a border drawn along it stays inside."""
     x0 = sum(x for x, _ in outline) / len(outline)
     y0 = sum(y for _, y in outline) / len(outline)
     moved = []
     for x, y in outline:
         distance = math.hypot(x - x0, y - y0) or 1.0
-        share = 1 - by / distance
-        moved.append((x0 + share * (x - x0), y0 + share * (y - y0)))
+        factor = 1 - by / distance
+        moved.append((x0 + factor * (x - x0), y0 + factor * (y - y0)))
     return moved

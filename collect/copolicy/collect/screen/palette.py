@@ -1,6 +1,6 @@
-"""The colours of the screen: Okabe and Ito's palette, told apart by people with any common colour blindness.
+"""The colours of the screen: the palette of Okabe and Ito, safe for the common forms of colour blindness.
 
-Colour never says anything alone: the seats differ in shape (triangle, circle), goal and obstacles in pattern.
+Nothing is shown by colour alone: the seats also differ in shape (triangle, circle), goal and obstacles in pattern.
 """
 
 Colour = tuple[int, int, int]
@@ -30,7 +30,7 @@ TEXT: Colour = (240, 242, 246)
 MUTED: Colour = (160, 170, 187)
 
 
-def mix(colour: Colour, other: Colour, share: float) -> Colour:
-    """`colour` with a share in [0, 1] of another one."""
-    red, green, blue = (round(a + share * (b - a)) for a, b in zip(colour, other, strict=True))
+def mix(first: Colour, second: Colour, proportion: float) -> Colour:
+    """Returns a mixture of two colours, with a proportion in [0, 1] of the second."""
+    red, green, blue = (round(a + proportion * (b - a)) for a, b in zip(first, second, strict=True))
     return red, green, blue

@@ -1,7 +1,7 @@
-"""Smooth shapes: a small part of the screen, drawn larger and shrunk.
+"""Antialiased shapes: drawn at a multiple of their size on a small part of a surface, then scaled down.
 
-pygame rounds corners to whole pixels, so that a table at 20 px/s would visibly hop. Drawn at three times its size
-and shrunk, it moves by thirds of a pixel and has soft edges, and only the pixels around it cost time.
+pygame rounds corners to whole pixels, so that a body at 20 px/s would visibly jump. Drawn at three times its size it
+moves by thirds of a pixel and has smooth edges.
 """
 
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ Point = tuple[float, float]
 
 
 class SmoothPatch:
-    """A rectangle of a surface in which shapes are drawn with soft edges; `close` brings them onto the surface.
+    """A rectangle of a surface in which shapes are drawn with smooth edges; `close` copies them to the surface.
 
-    Coordinates are those of the surface, px, with fractions.
+    Coordinates are those of the surface, in fractional px.
     """
 
     def __init__(self, surface: pygame.Surface, corners: Sequence[Point], margin: float):
         """
         Args:
-            surface: what to draw on.
-            corners: points that the shapes lie between.
-            margin: how far shapes may reach beyond those points, px.
+            surface: to draw on.
+            corners: points whose bounding box contains the shapes.
+            margin: how far shapes may extend beyond that box, px.
         """
         left = int(min(x for x, _ in corners) - margin)
         top = int(min(y for _, y in corners) - margin)
@@ -31,7 +31,7 @@ class SmoothPatch:
         bottom = int(max(y for _, y in corners) + margin) + 1
         self._surface = surface
         self._rect = pygame.Rect(left, top, right - left, bottom - top).clip(surface.get_rect())
-        # A large patch has small steps for the eye already.
+        # Twice the size is enough for a large patch.
         self._factor = 3 if max(self._rect.size) < 320 else 2
         self._size = (self._rect.width * self._factor, self._rect.height * self._factor)
         self._canvas = pygame.Surface(self._size, pygame.SRCALPHA)
@@ -39,33 +39,33 @@ class SmoothPatch:
     def __enter__(self) -> "SmoothPatch":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+        if error_type is None:
             self.close()
 
     def polygon(self, colour: Colour, points: Sequence[Point]) -> None:
-        """A filled polygon."""
-        pygame.draw.polygon(self._canvas, colour, [self._place(point) for point in points])
+        """Draws a filled polygon."""
+        pygame.draw.polygon(self._canvas, colour, [self._to_patch(point) for point in points])
 
     def circle(self, colour: Colour, centre: Point, radius: float, width: float = 0.0) -> None:
-        """A disc, or a ring of a width."""
+        """Draws a disc, or a ring if there is a width."""
         thickness = max(1, round(width * self._factor)) if width else 0
-        pygame.draw.circle(self._canvas, colour, self._place(centre), radius * self._factor, thickness)
+        pygame.draw.circle(self._canvas, colour, self._to_patch(centre), radius * self._factor, thickness)
 
     def line(self, colour: Colour, start: Point, end: Point, width: float) -> None:
-        """A straight line with round ends."""
+        """Draws a straight line with round ends."""
         self._stroke(colour, start, end, width / 2)
 
     def outline(self, colour: Colour, points: Sequence[Point], width: float) -> None:
-        """The closed border of a polygon, with round corners."""
+        """Draws the closed border of a polygon with round corners."""
         for start, end in zip(points, [*points[1:], points[0]], strict=True):
             self._stroke(colour, start, end, width / 2)
 
     def close(self) -> None:
-        """Brings the shapes onto the surface."""
+        """Copies the shapes to the surface."""
         if self._rect.width and self._rect.height:
             shrunk = pygame.transform.smoothscale(self._canvas, self._rect.size)
-            # Opaque shapes on transparent black, averaged, are premultiplied by their alpha already.
+            # Averaging opaque shapes on transparent black gives colours that are premultiplied by alpha.
             self._surface.blit(shrunk, self._rect, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _stroke(self, colour: Colour, start: Point, end: Point, half: float) -> None:
@@ -79,5 +79,5 @@ class SmoothPatch:
         for point in (start, end):
             self.circle(colour, point, half)
 
-    def _place(self, point: Point) -> Point:
+    def _to_patch(self, point: Point) -> Point:
         return (point[0] - self._rect.left) * self._factor, (point[1] - self._rect.top) * self._factor

@@ -1,4 +1,4 @@
-"""Text on the screen, in the font that pygame brings along."""
+"""Text on the screen, in pygame's default font."""
 
 import functools
 from typing import Literal
@@ -14,27 +14,27 @@ Anchor = Literal[
 def draw_text(
     surface: pygame.Surface,
     text: str,
-    at: tuple[float, float],
+    position: tuple[float, float],
     size: float,
     colour: Colour = TEXT,
     anchor: Anchor = "topleft",
     max_width: float | None = None,
 ) -> pygame.Rect:
-    """Writes one line; `at` is the place of its `anchor`, `size` the height of the font, px.
+    """Draws one line of text; `position` is that of its `anchor`, `size` the height of the font, px.
 
-    A line that is wider than `max_width` is written smaller, down to half the size, and cut after that.
+    A line wider than `max_width` is drawn smaller, down to half the size, and then truncated.
 
     Returns:
-        Where it stands.
+        The rectangle of the text.
     """
     rendered = _fitted(text, max(8, round(size)), colour, None if max_width is None else max(1, round(max_width)))
-    rect = rendered.get_rect(**{anchor: (round(at[0]), round(at[1]))})
+    rect = rendered.get_rect(**{anchor: (round(position[0]), round(position[1]))})
     surface.blit(rendered, rect)
     return rect
 
 
 def text_size(text: str, size: float) -> tuple[int, int]:
-    """Width and height of a line, px."""
+    """Returns width and height of a line, px."""
     return _font(max(8, round(size))).size(text)
 
 

@@ -1,7 +1,9 @@
-"""A pair's session: what comes next, what was played, and the folder that remembers it."""
+"""A pair's session: the schedule of its episodes, its folder, and the recordings that count."""
 
-from .balance import Balance, Counts
 from .folder import CollectionLock, SessionFolder
-from .recorded import OFF_CENTRE, PRACTICE, Recorded, recordings
+from .recording_summaries import OFF_CENTRE, PRACTICE, iter_recordings
+from .schedule import BalancedSchedule, EpisodeCounts
 
-__all__ = ["OFF_CENTRE", "PRACTICE", "Balance", "CollectionLock", "Counts", "Recorded", "SessionFolder", "recordings"]
+__all__ = [
+    "OFF_CENTRE", "PRACTICE", "BalancedSchedule", "CollectionLock", "EpisodeCounts", "SessionFolder", "iter_recordings",
+]  # fmt: skip

@@ -1,11 +1,10 @@
-"""The folder of a session: one tool at a time, one session after the other, nothing ever overwritten."""
+"""The folder of a session: it is locked while in use, and no file in it is ever overwritten."""
 
 import json
 import logging
 import os
 import re
 import uuid
-from collections import Counter
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,8 +15,8 @@ from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import replace_json, sync_folder
 from copolicy.dataset.task import TABLE
 
-from .balance import Counts
-from .recorded import Recorded, recordings
+from .recording_summaries import RecordingSummary, iter_recordings
+from .schedule import EpisodeCounts
 
 _LOCK = ".copolicy.lock"
 _HEADER = "session.json"
@@ -27,7 +26,7 @@ _EPISODE = re.compile(r"episode_(\d+)\.")
 
 
 class CollectionLock(FolderLock):
-    """Held while a tool collects into a folder."""
+    """The lock of a folder that a tool collects into."""
 
     def __init__(self, folder: Path):
         super().__init__(
@@ -38,14 +37,14 @@ class CollectionLock(FolderLock):
 class SessionFolder:
     """One session of one pair in `out/PAIR-NN/`.
 
-    `session.json` says what the session is, `journal.jsonl` what happened, line by line; the recordings beside them
-    are what counts. An undone keep has `.undone` behind its name, so that no tool takes it for a recording.
+    `session.json` holds the session's id and settings, `journal.jsonl` a log of events. The episode counts come from
+    the recordings alone. Undoing a keep appends `.undone` to the file's name, so that no tool reads it as a recording.
 
     Attributes:
         path: of the folder.
         session_id: of its recordings.
-        counts: what was played so far.
-        continued: it was begun at an earlier time.
+        counts: episodes played so far.
+        continued: the session was begun by an earlier run.
     """
 
     def __init__(
@@ -54,33 +53,33 @@ class SessionFolder:
         pair: str,
         settings: Mapping[str, Any],
         episodes: int,
-        fresh: bool = False,
+        new_session: bool = False,
         task: str = TABLE,
     ):
-        """Continues the pair's last session where it is not finished, else begins another.
+        """Continues the pair's last session if it is unfinished, else begins a new one.
 
         Args:
             out: folder of all sessions.
             pair: its name.
-            settings: what must not change within a session; JSON-able.
-            episodes: that the session is to keep.
-            fresh: begin another in any case.
-            task: whose recordings count.
+            settings: that must not change within a session; JSON-able.
+            episodes: number of episodes to keep in the session.
+            new_session: begin a new session in any case.
+            task: name of the task whose recordings count.
 
         Raises:
             InvalidValueError: the unfinished session has other settings.
             FileFormatError: its `session.json` is damaged.
             OSError: the folder cannot be written to.
         """
-        everything = [one for one in recordings(out) if one.task == task]
+        summaries = [summary for summary in iter_recordings(out) if summary.task == task]
         self.continued = False
         number = self._last_number(out, pair)
-        if number and not fresh:
+        if number and not new_session:
             self.path = out / f"{pair}-{number:02d}"
             header = self._read_header()
             self.session_id: str = header["session_id"]
-            self._count(everything)
-            if self.counts.kept_here.total() < episodes:
+            self._count(summaries)
+            if self.counts.kept_in_session.total() < episodes:
                 if header["settings"] != dict(settings):
                     raise InvalidValueError(
                         str(self.path), f"the settings that it began with, {header['settings']}, or --new-session",
@@ -89,34 +88,35 @@ class SessionFolder:
                 self.continued = True
         if not self.continued:
             self._begin(out, pair, number + 1, settings)
-            self._count(everything)
+            self._count(summaries)
         self.journal("continue" if self.continued else "begin", episodes=episodes)
 
     @property
-    def kept(self) -> list[Recorded]:
+    def kept_recordings(self) -> list[RecordingSummary]:
         """The recordings of this session that count, oldest first."""
-        return [one for one in recordings(self.path) if one.counts and one.session_id == self.session_id]
+        summaries = iter_recordings(self.path)
+        return [summary for summary in summaries if summary.counts and summary.session_id == self.session_id]
 
     def next_path(self) -> Path:
-        """The name of the next recording: after all that were ever begun here."""
+        """The path of the next recording; its number follows all that were ever begun in this folder."""
         numbers = [int(match[1]) for entry in self.path.iterdir() if (match := _EPISODE.match(entry.name))]
         return self.path / f"episode_{max(numbers, default=-1) + 1:03d}.mcap"
 
     def count(self, map_id: str, seating: int, counts: bool, by: int = 1) -> None:
-        """Takes an episode into the counts (or out of them)."""
+        """Adds an episode to the counts, or removes it with `by=-1`."""
         if by > 0:
-            self.counts.tried[map_id, seating] += by
+            self.counts.attempted[map_id, seating] += by
         if counts:
             self.counts.kept[map_id, seating] += by
-            self.counts.kept_here[map_id, seating] += by
+            self.counts.kept_in_session[map_id, seating] += by
 
-    def undo_last_keep(self) -> Recorded | None:
-        """Takes the last keep back: its recording stays, but under a name that nothing reads as one.
+    def undo_last_keep(self) -> RecordingSummary | None:
+        """Undoes the last keep: its recording is renamed, so that it no longer counts.
 
         Returns:
-            What it was; None where there is nothing to undo.
+            The recording as it was; None if no episode was kept.
         """
-        kept = self.kept
+        kept = self.kept_recordings
         if not kept:
             return None
         last = kept[-1]
@@ -127,7 +127,7 @@ class SessionFolder:
         return last
 
     def journal(self, event: str, **entries: Any) -> None:
-        """Adds a line to the journal; one that cannot be written stops nothing, since recordings are what counts."""
+        """Appends a line to the journal; a failure is only logged, since the counts come from the recordings."""
         line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": event, **entries}
         try:
             with (self.path / _JOURNAL).open("a", encoding="utf-8") as file:
@@ -159,11 +159,11 @@ class SessionFolder:
             raise FileFormatError(path, "a session's header (or --new-session)", f"{error}") from None
         return header
 
-    def _count(self, everything: list[Recorded]) -> None:
-        self.counts = Counts(Counter(), Counter(), Counter())
-        for one in everything:
-            key = (one.map_id, one.seating)
-            here = one.session_id == self.session_id
-            self.counts.kept[key] += one.counts
-            self.counts.tried[key] += here and not one.practice
-            self.counts.kept_here[key] += here and one.counts
+    def _count(self, summaries: list[RecordingSummary]) -> None:
+        self.counts = EpisodeCounts()
+        for summary in summaries:
+            key = (summary.map_id, summary.seating)
+            in_session = summary.session_id == self.session_id
+            self.counts.kept[key] += summary.counts
+            self.counts.attempted[key] += in_session and not summary.practice
+            self.counts.kept_in_session[key] += in_session and summary.counts

@@ -1,1 +1,1 @@
-"""Episodes of scripted pairs, as fast as the machine goes."""
+"""Episodes of scripted pairs in simulated time."""

@@ -1,4 +1,4 @@
-"""Records episodes of scripted pairs, as fast as the machine goes."""
+"""Records episodes of scripted pairs in parallel, in simulated time."""
 
 import contextlib
 import ctypes
@@ -24,7 +24,7 @@ from copolicy.dataset.scenarios import DISPLACED
 from copolicy.dataset.task import TABLE, PairTask, get_task
 from copolicy.dataset.worker_pool import WorkerPool
 
-from ..agents.simulated import pair_name, simulated_players
+from ..agents.simulated_players import pair_name, simulated_players
 from ..recording.episode_file import PART_SUFFIX
 from ..recording.wall_clock import WallClockAnchor
 from .episode_job import EpisodeJob, EpisodeResult
@@ -39,74 +39,74 @@ def simulate(
     workers: int | None = None,
     orientations: bool = False,
     pairs: Sequence[str] | None = None,
-    physics: Any = None,
+    settings: Any = None,
     started_ns: int | None = None,
     start_noise: float = 0.0,
     clearance: float | None = None,
     task: str = TABLE,
-) -> dict:
+) -> dict[str, Any]:
     """Records `episode_000000.mcap`, ... of scripted pairs over a set of maps into a folder.
 
-    States and actions depend on the seed, the set and the pairs alone, not on the workers or the machine's load:
-    each episode draws from `SeedSequence((seed, index))`. Failures and time-outs are kept, marked as what they are.
+    States and actions depend only on the seed, the set and the pairs, not on the number of workers or the load: each
+    episode draws from `SeedSequence((seed, index))`. Failures and time-outs are recorded too, with their outcome.
 
     Args:
         out: the folder; made if missing.
-        episodes: how many.
-        seed: of the schedule and of the pilots.
-        map_set: name of a set of maps, a file of maps, or one of its splits as `FILE#split`; by default the task's
-            first set.
+        episodes: number of episodes.
+        seed: of the schedule and of the players.
+        map_set: name of a set of maps, a map file, or one of its splits as `FILE#split`; by default the task's first
+            set.
         workers: processes; by default one for each processor.
-        orientations: each map with four start orientations.
+        orientations: use each map with four start orientations.
         pairs: names of simulated pairs; by default all.
-        physics: settings of the world.
-        started_ns: the moment that the recordings carry, UTC, nanoseconds since 1970; by default now. With a given
-            one, equal calls write equal bytes.
-        start_noise: how far from the map's start episodes begin, see `PairTask.displaced`; 0 begins at the start.
-        clearance: how wide both players keep from obstacles, instead of their habits' own.
-        task: its name.
+        settings: of the world; the task's default if None.
+        started_ns: start time in the recordings, UTC, nanoseconds since 1970; by default now. With a fixed time,
+            equal calls write equal bytes.
+        start_noise: scale of the random displacement of the start, see `PairTask.displaced`; 0 for none.
+        clearance: factor on the distance that both players keep from obstacles, instead of that of their profiles.
+        task: name of the task.
 
     Returns:
         Counts and rates, JSON-able.
 
     Raises:
-        OutputExistsError: the folder holds recordings already, or is none; nothing was written.
+        OutputExistsError: the folder has recordings already, or is a file; nothing was written.
         UnknownNameError: no such task, map set or pair.
-        FileFormatError: a file of maps that cannot be used.
+        FileFormatError: a map file that cannot be used.
         InvalidValueError: less than one episode or worker, a negative seed, or an option that the task lacks.
         CopolicyError: the task has no simulated players.
-        OSError: the disk refuses; no recording of this call is left.
+        OSError: a write failed; all recordings of this call were removed.
     """
     out = Path(out)
     workers = _processors() if workers is None else workers
-    least = {"episodes": (episodes, 1), "workers": (workers, 1), "seed": (seed, 0), "start_noise": (start_noise, 0)}
-    for name, (value, bound) in least.items():
-        if value < bound:
-            raise InvalidValueError(name, f"at least {bound}", value)
-    of = get_task(task)
-    players = simulated_players(of)
+    minima = {"episodes": (episodes, 1), "workers": (workers, 1), "seed": (seed, 0), "start_noise": (start_noise, 0)}
+    for name, (value, minimum) in minima.items():
+        if value < minimum:
+            raise InvalidValueError(name, f"at least {minimum}", value)
+    pair_task = get_task(task)
+    players = simulated_players(pair_task)
     if clearance is not None and "clearance" not in players.options:
-        raise InvalidValueError("--clearance", "no such flag", of.missing("clearance of simulated players"))
-    chosen = of.scenario_set(map_set or next(iter(of.scenario_sets)))
-    maps = (of.turned(chosen) if orientations else chosen).scheduled
-    pairs = tuple(players.pairs) if pairs is None else tuple(pair_name(of, pair, "pair") for pair in pairs)
+        raise InvalidValueError("--clearance", "no such flag", pair_task.missing("clearance of simulated players"))
+    scenario_set = pair_task.scenario_set(map_set or next(iter(pair_task.scenario_sets)))
+    scenarios = (pair_task.turned(scenario_set) if orientations else scenario_set).scheduled
+    pairs = tuple(players.pairs) if pairs is None else tuple(pair_name(pair_task, pair, "pair") for pair in pairs)
     _refuse_recordings(out)
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)
-    # Other maps, other episodes: a file may have the name of another one.
-    variant = f"{chosen.label.replace('#', '.')}-{chosen.digest}" if chosen.from_file else chosen.name
+    # The digest distinguishes the sets of map files with equal names.
+    variant = scenario_set.label.replace("#", ".") + f"-{scenario_set.digest}" * scenario_set.from_file
     variant = variant if task == TABLE else f"{task}-{variant}"
     variant += f"{'-orientations' if orientations else ''}"
     variant += f"-start_noise_{start_noise:g}" * (start_noise != 0)
     variant += "" if clearance is None else f"-clearance_{clearance:g}"
-    settings = physics or of.settings_type()
+    settings = settings or pair_task.settings_type()
     options = {} if clearance is None else {"clearance": clearance}
     jobs = []
-    for index, (place, pair) in enumerate(balanced_schedule(len(maps), pairs, episodes, seed)):
-        scenario = maps[place]
-        meta = _meta(of, scenario, pair, variant, seed, index)
+    for index, (scenario_index, pair) in enumerate(balanced_schedule(len(scenarios), pairs, episodes, seed)):
+        scenario = scenarios[scenario_index]
+        meta = _meta(pair_task, scenario, pair, variant, seed, index)
         if start_noise:
-            scenario = of.displaced(scenario, start_noise, np.random.default_rng((seed, index)))
+            scenario = pair_task.displaced(scenario, start_noise, np.random.default_rng((seed, index)))
             meta = replace(meta, map_id=meta.map_id + DISPLACED)
         jobs.append(EpisodeJob(out / f"episode_{index:06d}.mcap", task, scenario, settings, meta, anchor, options))
     new = not out.exists()
@@ -138,15 +138,15 @@ def _meta(task: PairTask, scenario: Any, pair: str, variant: str, seed: int, ind
 
 
 def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]:
-    groups = _groups_by_plan(jobs, workers)
+    groups = _groups_by_layout(jobs, workers)
     if workers == 1 or len(groups) == 1:
         for group in groups:
             for job in group:
                 yield job.record()
         return
-    # Without a lock, which a worker that is killed would never give back.
+    # Without a lock, which a killed worker would never release.
     stop = multiprocessing.get_context("spawn").RawValue(ctypes.c_bool, False)
-    with WorkerPool(min(workers, len(groups)), _keep_stop, (stop,)) as pool:
+    with WorkerPool(min(workers, len(groups)), _set_stop, (stop,)) as pool:
         futures = [pool.submit(_record_group, group) for group in groups]
         try:
             for future in as_completed(futures):
@@ -156,19 +156,19 @@ def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]
             raise
 
 
-def _groups_by_plan(jobs: Iterable[EpisodeJob], workers: int) -> list[list[EpisodeJob]]:
-    """Episodes with the same goal and obstacles together: planning around them takes time, and a process keeps it."""
-    by_plan: dict[Hashable, list[EpisodeJob]] = defaultdict(list)
+def _groups_by_layout(jobs: Iterable[EpisodeJob], workers: int) -> list[list[EpisodeJob]]:
+    """Groups episodes with the same goal and obstacles, whose routes are slow to compute and cached in a process."""
+    by_layout: dict[Hashable, list[EpisodeJob]] = defaultdict(list)
     for job in jobs:
-        by_plan[get_task(job.task).layout(job.scenario, with_goal=True)].append(job)
-    parts = -(-workers // len(by_plan))
-    return [group[part::parts] for group in by_plan.values() for part in range(min(parts, len(group)))]
+        by_layout[get_task(job.task).layout(job.scenario, with_goal=True)].append(job)
+    parts = -(-workers // len(by_layout))
+    return [group[part::parts] for group in by_layout.values() for part in range(min(parts, len(group)))]
 
 
-_stop: ctypes.c_bool | None = None  # of a worker process, true once the command is stopped
+_stop: ctypes.c_bool | None = None  # in a worker process; true once the command is stopped
 
 
-def _keep_stop(stop: ctypes.c_bool) -> None:
+def _set_stop(stop: ctypes.c_bool) -> None:
     global _stop
     _stop = stop
 
@@ -178,7 +178,7 @@ def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
 
 
 def _remove(jobs: list[EpisodeJob], folder: Path | None) -> None:
-    """What was recorded before the disk refused: the same call makes it again, to the byte, where there is room."""
+    """Deletes the recordings of a call that failed, since the same call can make them again."""
     for job in jobs:
         for path in (job.path, job.path.with_name(job.path.name + PART_SUFFIX)):
             path.unlink(missing_ok=True)
@@ -195,7 +195,7 @@ def _refuse_recordings(out: Path) -> None:
             raise OutputExistsError(path)
 
 
-def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict:
+def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict[str, Any]:
     steps = sum(result.steps for result in results)
     size = sum(result.size for result in results)
     return {

@@ -1,12 +1,11 @@
-"""One episode of a scripted pair, recorded as fast as the machine goes."""
+"""Records one episode of two agents in simulated time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.task import TABLE, get_task
 
@@ -18,7 +17,7 @@ from ..rollout import Agent, Rollout
 
 @dataclass(frozen=True)
 class EpisodeJob:
-    """All that a worker needs for one episode."""
+    """One episode to record, as it is sent to a worker process."""
 
     path: Path
     task: str
@@ -29,16 +28,16 @@ class EpisodeJob:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def record(self) -> "EpisodeResult":
-        """Lets the pair of `meta.pair_id`, seeded by `meta.seed`, act until the episode ends."""
+        """Records the episode of the pair `meta.pair_id` with the seed `meta.seed`."""
         task = get_task(self.task)
-        robot, human = (ScriptedAgent.of_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
+        robot, human = (ScriptedAgent.from_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
         agents = (robot, human)
         return record_episode(self.path, self.scenario, agents, self.meta, self.anchor, self.settings, self.task)
 
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How one episode went."""
+    """Outcome of a recorded episode."""
 
     termination_reason: str
     success: bool
@@ -55,16 +54,16 @@ def record_episode(
     settings: Any = None,
     task: str = TABLE,
 ) -> EpisodeResult:
-    """Lets two agents act until the episode ends, and records it.
+    """Runs and records an episode of two agents.
 
     Args:
         path: of the finished file.
-        scenario: of the task; the map.
+        scenario: of the task.
         agents: robot, human; `meta.seed` is their seed.
-        meta: what is known at the start.
-        anchor: moment of the first step.
-        settings: of the world.
-        task: its name.
+        meta: columns that are known at the start.
+        anchor: time of the first step.
+        settings: of the world; the task's default if None.
+        task: name of the task.
     """
     rollout = Rollout(get_task(task), [scenario], agents, seeds=[meta.seed], settings=settings)
     with EpisodeRecorder(path, scenario, meta, anchor, settings=settings, task=task) as recorder:
@@ -79,6 +78,6 @@ def record_episode(
 class _Recording:
     recorder: EpisodeRecorder
 
-    def step(self, rollout: Rollout, actions: np.ndarray, worlds: np.ndarray) -> None:
+    def step(self, rollout: Rollout, actions: Array, worlds: Array) -> None:
         world = rollout.worlds[0]
         self.recorder.step(actions[0], world.recorded, world.reward())

@@ -1,11 +1,11 @@
-"""Named sets of simulated episodes, so that a data set can be made again from its name."""
+"""Named sets of simulated episodes, so that a data set can be reproduced from a name."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """All that decides which episodes `simulate` records; see there."""
+    """The arguments of `simulate` that determine its episodes."""
 
     episodes: int
     seed: int
@@ -16,13 +16,13 @@ class Recipe:
 
 
 RECIPES: dict[str, Recipe] = {
-    # The size of the paper's training set: five pairs on its 36 configurations, as near to obstacles as people.
+    # The size of the paper's training set: five pairs on its 36 configurations, with the clearance of people.
     "pairs-sim-376": Recipe(376, seed=0),
-    # The same from four start orientations.
+    # The same with four start orientations.
     "pairs-sim-376-orientations": Recipe(376, seed=0, orientations=True),
-    # The same from beside the starts, and wider around obstacles than people.
+    # The same with displaced starts and a wider clearance than people's.
     "pairs-sim-376-wide": Recipe(376, seed=0, start_noise=1.0, clearance=2.6),
-    # Eight times as many, half of them on random layouts, from beside the starts and in four orientations: what a
-    # policy learns most from, where it need not be compared with the paper's.
+    # Eight times as many, half of them on random layouts, with displaced starts and four orientations: the best data to
+    # train on, where no comparison with the paper's is needed.
     "pairs-sim-3000": Recipe(3000, seed=1, map_set="varied", orientations=True, start_noise=1.0),
 }

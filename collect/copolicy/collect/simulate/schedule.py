@@ -1,4 +1,4 @@
-"""Which pair carries the table on which map, episode by episode."""
+"""A balanced schedule of pairs and maps over episodes."""
 
 from collections.abc import Sequence
 
@@ -10,9 +10,8 @@ from copolicy.dataset.exceptions import InvalidValueError
 def balanced_schedule(maps: int, pairs: Sequence[str], episodes: int, seed: int) -> list[tuple[int, str]]:
     """Index of the map and name of the pair of each episode, shuffled by `seed`.
 
-    Every `maps` episodes visit each map once and share the pairs out evenly (to one more or less); every
-    `maps * len(pairs)` episodes bring each pair to each map exactly once. A shorter schedule is the beginning of a
-    longer one with the same seed.
+    Every `maps` episodes use each map once and each pair equally often (to one); every `maps * len(pairs)` episodes
+    use each pair on each map exactly once. A shorter schedule is the beginning of a longer one with the same seed.
 
     Raises:
         InvalidValueError: no map, no pair, or a negative number of episodes.
@@ -26,12 +25,12 @@ def balanced_schedule(maps: int, pairs: Sequence[str], episodes: int, seed: int)
     schedule: list[tuple[int, str]] = []
     for visit in range(-(-episodes // maps)):
         pair_of_map = (first_pair + visit) % len(pairs)
-        # Shuffled maps, dealt out so that consecutive episodes have different pairs.
+        # Shuffled maps, ordered so that consecutive episodes have different pairs.
         shuffled = rng.permutation(maps)
-        place_in_pair = np.zeros(maps, int)
+        rank_in_pair = np.zeros(maps, int)
         for pair in range(len(pairs)):
-            own = shuffled[pair_of_map[shuffled] == pair]
-            place_in_pair[own] = np.arange(len(own))
-        order = shuffled[np.argsort(place_in_pair[shuffled], kind="stable")]
+            maps_of_pair = shuffled[pair_of_map[shuffled] == pair]
+            rank_in_pair[maps_of_pair] = np.arange(len(maps_of_pair))
+        order = shuffled[np.argsort(rank_in_pair[shuffled], kind="stable")]
         schedule += [(int(index), pairs[int(pair_of_map[index])]) for index in order]
     return schedule[:episodes]

@@ -1,6 +1,6 @@
 """Two players carry a table past obstacles to a goal (Ng, Liu and Kennedy, RA-L 2023).
 
-Names are loaded when they are asked for: flags need the maps, but neither pymunk nor what finds routes.
+Modules are imported when a name is first used: command-line flags need the maps, but neither pymunk nor scipy.
 """
 
 from typing import TYPE_CHECKING

@@ -1,9 +1,10 @@
-"""The numbers of the table and its map in data sets: state and scenario vectors, there and back."""
+"""State and scenario vectors of the table, to and from poses and maps."""
 
 import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import bounds_of, features_of
 
@@ -15,40 +16,40 @@ FEATURES, BOUNDS = features_of(SPEC), bounds_of(SPEC)
 TASK = SPEC.sentence
 
 
-def state_vector(pose: tuple[float, float, float], velocity: tuple[float, float, float]) -> np.ndarray:
+def state_vector(pose: tuple[float, float, float], velocity: tuple[float, float, float]) -> Array:
     """`(7,)` observation of the table from its pose (px, px, rad) and velocity (px/s, px/s, rad/s)."""
     x, y, theta = pose
     return np.array((x, y, math.cos(theta), math.sin(theta), *velocity))
 
 
-def theta_of(states: np.ndarray) -> np.ndarray:
+def theta_of(states: Array) -> Array:
     """Orientation in [0, 2 pi) of states `(..., 7)`, rad."""
     return np.arctan2(states[..., 3], states[..., 2]) % (2 * math.pi)
 
 
-def states_7(states: np.ndarray) -> np.ndarray:
-    """`(..., 6)` with theta to `(..., 7)` with its cosine and sine, whose last bit may not be that of `math.cos`."""
+def states_7(states: Array) -> Array:
+    """States `(..., 6)` with theta as `(..., 7)` with cosine and sine; their last bit may differ from `math.cos`."""
     cosine, sine = np.cos(states[..., 2]), np.sin(states[..., 2])
     return np.concatenate((states[..., :2], cosine[..., None], sine[..., None], states[..., 3:]), axis=-1)
 
 
-def environment_state(config: MapConfig) -> np.ndarray:
-    """`(11,)` observation of a map: start pose, goal, and obstacles padded with zeros."""
+def environment_state(config: MapConfig) -> Array:
+    """`(11,)` observation of a map: start pose, goal, and the centres of the obstacles padded with zeros."""
     vector = np.zeros(len(ENVIRONMENT_NAMES))
     values = (*config.start, *config.goal, *(value for centre in config.obstacles for value in centre))
     vector[: len(values)] = values
     return vector
 
 
-def map_of(vector: np.ndarray, obstacle_size: int, obstacle_sizes: str = "") -> MapConfig:
-    """The map behind an `environment_state` vector `(11,)`; its zero padding tells the number of obstacles.
+def map_from_vector(vector: Array, obstacle_size: int, obstacle_sizes: str = "") -> MapConfig:
+    """The map of an `environment_state` vector `(11,)`; the zero padding gives the number of obstacles.
 
     Args:
-        obstacle_size: the episode column.
-        obstacle_sizes: the episode column, empty where all obstacles are of `obstacle_size`.
+        obstacle_size: the episode column, px.
+        obstacle_sizes: the episode column, empty where all obstacles have `obstacle_size`.
 
     Raises:
-        InvalidValueError: an obstacle stands behind an empty slot.
+        InvalidValueError: an obstacle after an empty slot.
     """
     values = [float(value) for value in vector]
     slots = [(values[i], values[i + 1]) for i in range(5, len(values), 2)]
@@ -56,16 +57,16 @@ def map_of(vector: np.ndarray, obstacle_size: int, obstacle_sizes: str = "") -> 
     if any(slot == (0.0, 0.0) for slot in slots[:count]):
         raise InvalidValueError("environment_state", "obstacles before the zero padding", slots)
     x, y, theta, goal_x, goal_y = values[:5]
-    return MapConfig((x, y, theta), (goal_x, goal_y), tuple(slots[:count]), obstacle_size, sizes_of(obstacle_sizes))
+    return MapConfig((x, y, theta), (goal_x, goal_y), tuple(slots[:count]), obstacle_size, parse_sizes(obstacle_sizes))
 
 
-def sizes_text(config: MapConfig) -> str:
+def format_sizes(config: MapConfig) -> str:
     """The episode column `obstacle_sizes` of a map."""
     return ",".join(map(str, config.obstacle_sizes))
 
 
-def sizes_of(text: str) -> tuple[int, ...]:
-    """The inverse of `sizes_text`.
+def parse_sizes(text: str) -> tuple[int, ...]:
+    """The inverse of `format_sizes`.
 
     Raises:
         InvalidValueError: no whole numbers.

@@ -1,9 +1,11 @@
-"""The interaction force between the two who carry the table."""
+"""The interaction force between the two players."""
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 
-def interaction_force(theta: np.ndarray | float, actions: np.ndarray, legacy_axis: bool = False) -> np.ndarray:
+
+def interaction_force(theta: Array | float, actions: Array, legacy_axis: bool = False) -> Array:
     """Half the difference of the two forces along the table, in units of a player's full force.
 
     f = (u_robot - u_human) . e / 2, with e = (cos theta, -sin theta) the axis from the human's end to the robot's
@@ -13,7 +15,7 @@ def interaction_force(theta: np.ndarray | float, actions: np.ndarray, legacy_axi
     Args:
         theta: orientation after the step, `(...)`, rad.
         actions: `(..., 4)` robot xy, human xy in [-1, 1].
-        legacy_axis: the mirrored axis, for comparison with the original program.
+        legacy_axis: use the mirrored axis, for comparison with the original program.
 
     Returns:
         `(...)`, in [-sqrt(2), sqrt(2)].

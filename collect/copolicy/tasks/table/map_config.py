@@ -1,4 +1,4 @@
-"""One map: where an episode starts, where it should end, and what stands between."""
+"""A map: start pose, goal and obstacles of an episode."""
 
 import hashlib
 import json
@@ -21,7 +21,7 @@ _CANONICAL = json.JSONEncoder(sort_keys=True)
 
 @dataclass(frozen=True)
 class MapConfig:
-    """Where an episode starts, where it should end, and what stands between.
+    """Start pose, goal and obstacles of an episode.
 
     Attributes:
         start: pose of the table's centre at rest, (x, y, theta) in px and rad.
@@ -29,8 +29,8 @@ class MapConfig:
         obstacles: centres of up to three solid squares, px, in the order of the observation.
         obstacle_size: side of the squares, px (50 in the training family, 45 in the paper's evaluation); of the largest
             where they differ.
-        obstacle_sizes: side of each square, px, where they differ; empty where they are equal. `sizes` has them always.
-        named: which map of which set it is, of a map from a file; no part of what a map is.
+        obstacle_sizes: side of each square, px, where they differ; empty where they are equal. `sizes` is always full.
+        named: name and set of a map from a map file; not compared and not in the JSON.
     """
 
     start: tuple[float, float, float]
@@ -38,9 +38,9 @@ class MapConfig:
     obstacles: tuple[tuple[float, float], ...] = ()
     obstacle_size: int = 50
     obstacle_sizes: tuple[int, ...] = ()
-    named: ScenarioName | None = field(default=None, compare=False, repr=False)
+    named: ScenarioName | None = field(default=None, compare=False, repr=False)  # the field's name is in plan digests
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "start", tuple(float(value) for value in self.start))
         object.__setattr__(self, "goal", tuple(float(value) for value in self.goal))
         object.__setattr__(self, "obstacles", tuple(tuple(float(v) for v in centre) for centre in self.obstacles))
@@ -72,11 +72,11 @@ class MapConfig:
 
     @property
     def layout(self) -> tuple[tuple[tuple[float, float], int], ...]:
-        """The obstacles, whatever their order."""
+        """The obstacles as in `squares`, sorted."""
         return tuple(sorted(self.squares))
 
     def to_json(self) -> str:
-        """The map as canonical JSON, the text that is attached to a recording."""
+        """The map as canonical JSON, the attachment of a recording."""
         return self._text(self.squares)
 
     @classmethod
@@ -84,7 +84,7 @@ class MapConfig:
         """The inverse of `to_json`.
 
         Raises:
-            InvalidValueError: the text is no map.
+            InvalidValueError: the text is not the JSON of a map.
         """
         try:
             fields = json.loads(text)
@@ -95,7 +95,7 @@ class MapConfig:
 
     @property
     def digest(self) -> str:
-        """Eight hexadecimal digits that are equal for equal maps, whatever the order of the obstacles."""
+        """Eight hexadecimal digits of the map's hash, which does not depend on the order of the obstacles."""
         return hashlib.sha256(self._text(self.layout).encode()).hexdigest()[:8]
 
     def _text(self, squares: Sequence[tuple[tuple[float, float], int]]) -> str:

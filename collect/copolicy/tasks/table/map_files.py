@@ -1,8 +1,9 @@
-"""Map files: a lab's own maps, in YAML or JSON that a person writes."""
+"""Map files: a lab's own maps in YAML or JSON."""
 
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +12,7 @@ from msgspec import Meta, Struct
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.publication.licences import checked_licence
-from copolicy.dataset.scenario_document import Document, Problem
+from copolicy.dataset.scenario_document import Document, ScenarioProblem
 from copolicy.dataset.scenarios import ScenarioFiles, ScenarioName, ScenarioSet
 
 from .map_config import MAX_OBSTACLES, MapConfig
@@ -30,13 +31,13 @@ _Angle = Annotated[
 
 
 class Start(Struct, forbid_unknown_fields=True):
-    """Where the table's centre is at rest, and how the table lies there."""
+    """Start pose of the table's centre, at rest."""
 
     x: _X
     y: _Y
     theta: _Angle | None = None
     orientations: Annotated[
-        list[_Angle] | None, Meta(description="instead of theta: the map is there once in each, as a map of its own")
+        list[_Angle] | None, Meta(description="instead of theta: start orientations, each of which makes a map")
     ] = None
 
 
@@ -65,7 +66,7 @@ class Map(Struct, forbid_unknown_fields=True):
         str, Meta(pattern=f"^(|{_MAP_NAME})$", description="for splits and recordings (default: its number, from 00)")
     ] = ""
     weight: Annotated[
-        int, Meta(ge=1, le=_MOST_WEIGHT, description="how often it comes up beside a map of weight 1")
+        int, Meta(ge=1, le=_MOST_WEIGHT, description="number of episodes relative to a map of weight 1")
     ] = 1
 
 
@@ -96,13 +97,13 @@ class MapFiles(ScenarioFiles):
 
     def read(self, path: Path) -> ScenarioSet:
         """See `ScenarioFiles.read`."""
-        chosen, problems = self._read(path)
-        if chosen is None or problems:
-            more = f" (and {len(problems) - 1} more: copolicy-collect maps check)" if len(problems) > 1 else ""
-            raise FileFormatError(path, "maps that can be used", f"{problems[0]}{more}")
-        return chosen
+        map_set, problems = self._read(path)
+        if map_set is None or problems:
+            others = f" (and {len(problems) - 1} more: copolicy-collect maps check)" if len(problems) > 1 else ""
+            raise FileFormatError(path, "maps that can be used", f"{problems[0]}{others}")
+        return map_set
 
-    def problems(self, path: Path) -> list[Problem]:
+    def problems(self, path: Path) -> list[ScenarioProblem]:
         """See `ScenarioFiles.problems`."""
         return self._read(path)[1]
 
@@ -112,19 +113,19 @@ class MapFiles(ScenarioFiles):
 
         if not re.fullmatch(_SET_NAME, name) or name in (*MAP_SETS, "custom"):
             raise InvalidValueError("--name", "lower-case letters, digits, - or _, and no set of the package", name)
-        for key, least, most in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
+        for key, minimum, maximum in (("obstacles", 0, MAX_OBSTACLES), ("obstacle_size", 1, 600)):
             low, high = bounds[key]
-            if not least <= math.ceil(low) <= math.floor(high) <= most:
-                expected = f"{key} with a whole number in it, from {least} to {most}"
+            if not minimum <= math.ceil(low) <= math.floor(high) <= maximum:
+                expected = f"{key} with a whole number in it, from {minimum} to {maximum}"
                 raise InvalidValueError("--bounds", expected, f"{key}={low:g}:{high:g}")
-        maps = [_plain(config) for config in random_maps(count, seed, bounds)]
+        maps = [_as_entry(config) for config in random_maps(count, seed, bounds)]
         text = ", ".join(f"{key}={low:g}:{high:g}" for key, (low, high) in bounds.items())
         return {
             "name": name, "version": "1", "task": "table", "description": f"{count} random maps, seed {seed}, {text}",
             "maps": maps,
         }  # fmt: skip
 
-    def _read(self, path: Path) -> tuple[ScenarioSet | None, list[Problem]]:
+    def _read(self, path: Path) -> tuple[ScenarioSet | None, list[ScenarioProblem]]:
         from .map_problems import map_problems  # scipy and pymunk
 
         document = Document(path)
@@ -136,17 +137,20 @@ class MapFiles(ScenarioFiles):
         for index, entry in enumerate(content.maps):
             maps.append(_configs(document, f"maps[{index}]", entry, f"{index:02d}", problems))
         splits = _splits(document, content, maps, problems)
-        problems += [document.problem(*one) for one in map_problems(maps)]
+        problems += [document.problem(*problem) for problem in map_problems(maps)]
         if problems:
             return None, problems
-        weights = tuple(entry.weight for entry, own in zip(content.maps, maps, strict=True) for _ in own)
-        configs = tuple(config for own in maps for config in own)
-        chosen = ScenarioSet("table", content.name, str(content.version), configs, weights, splits, from_file=True)
-        named = tuple(_named(config, chosen, weight) for config, weight in zip(configs, weights, strict=True))
-        return ScenarioSet("table", content.name, chosen.version, named, weights, splits, "", True, chosen.digest), []
+        weights = tuple(entry.weight for entry, turned in zip(content.maps, maps, strict=True) for _ in turned)
+        configs = tuple(config for turned in maps for config in turned)
+        map_set = ScenarioSet("table", content.name, str(content.version), configs, weights, splits, from_file=True)
+        # The digest of the set is part of the names, so it is computed from the maps without full names.
+        configs = tuple(_with_name(config, map_set, weight) for config, weight in zip(configs, weights, strict=True))
+        return ScenarioSet(
+            "table", map_set.name, map_set.version, configs, weights, splits, "", True, map_set.digest
+        ), []
 
 
-def _check_texts(document: Document, content: MapFile, problems: list[Problem]) -> None:
+def _check_texts(document: Document, content: MapFile, problems: list[ScenarioProblem]) -> None:
     if content.name in (*MAP_SETS, "custom"):
         problems.append(document.problem("name", f"{content.name} is the name of a set of the package"))
     if not 1 <= len(content.maps) <= _MOST_MAPS:
@@ -164,76 +168,74 @@ def _check_texts(document: Document, content: MapFile, problems: list[Problem]) 
             problems.append(document.problem(f"maps[{index}].name", message))
 
 
-def _configs(document: Document, place: str, entry: Map, number: str, problems: list[Problem]) -> list[MapConfig]:
-    """The map in each of its orientations, under the name that it has within its file."""
+def _configs(
+    document: Document, path: str, entry: Map, number: str, problems: list[ScenarioProblem]
+) -> list[MapConfig]:
+    """The map in each of its orientations, named as in its file; adds what is wrong at `path` to `problems`."""
     start = entry.start
     if (start.theta is None) == (start.orientations is None):
-        problems.append(document.problem(f"{place}.start", "expected either theta or orientations"))
+        problems.append(document.problem(f"{path}.start", "expected either theta or orientations"))
         return []
     if len(entry.obstacles) > MAX_OBSTACLES:
         message = f"expected at most {MAX_OBSTACLES} obstacles, found {len(entry.obstacles)}"
-        problems.append(document.problem(f"{place}.obstacles", message))
+        problems.append(document.problem(f"{path}.obstacles", message))
         return []
     angles: list[float] = []
     for angle in [start.theta] if start.orientations is None else start.orientations:
         if isinstance(angle, str) and not _DEGREES.fullmatch(angle):
             message = f"expected rad as a number, or degrees such as 90deg, found {angle!r}"
-            problems.append(document.problem(f"{place}.start", message))
+            problems.append(document.problem(f"{path}.start", message))
         else:
             if not isinstance(angle, str) and abs(angle or 0.0) > 2 * math.pi + 1e-6:
                 message = f"expected rad from -2 pi to 2 pi, found {angle:g}; degrees are written {angle:g}deg"
-                problems.append(document.problem(f"{place}.start", message))
+                problems.append(document.problem(f"{path}.start", message))
             radians = math.radians(float(angle[:-3])) if isinstance(angle, str) else float(angle or 0.0)
             angles.append(radians % (2 * math.pi))
-    whole = [round(math.degrees(angle)) % 360 for angle in angles]
-    if start.orientations is not None and (not angles or len(set(whole)) < len(whole)):
-        message = "expected orientations that differ by a degree at least"
-        problems.append(document.problem(f"{place}.start.orientations", message))
+    degrees = [round(math.degrees(angle)) % 360 for angle in angles]
+    if start.orientations is not None and (not angles or len(set(degrees)) < len(degrees)):
+        message = "expected orientations that differ by at least a degree"
+        problems.append(document.problem(f"{path}.start.orientations", message))
         return []
-    named = ScenarioName(entry.name or number, "")
-    obstacles = tuple((one.x, one.y) for one in entry.obstacles)
-    sizes = tuple(one.size for one in entry.obstacles)
+    name = ScenarioName(entry.name or number, "")
+    obstacles = tuple((obstacle.x, obstacle.y) for obstacle in entry.obstacles)
+    sizes = tuple(obstacle.size for obstacle in entry.obstacles)
     configs = [
-        MapConfig((start.x, start.y, angle), (entry.goal.x, entry.goal.y), obstacles, obstacle_sizes=sizes, named=named)
+        MapConfig((start.x, start.y, angle), (entry.goal.x, entry.goal.y), obstacles, obstacle_sizes=sizes, named=name)
         for angle in angles
     ]
     return configs if start.orientations is None else [start_at(config, config.start[2]) for config in configs]
 
 
 def _splits(
-    document: Document, content: MapFile, maps: list[list[MapConfig]], problems: list[Problem]
+    document: Document, content: MapFile, maps: list[list[MapConfig]], problems: list[ScenarioProblem]
 ) -> dict[str, tuple[int, ...]]:
-    """Places of the maps of each split, all orientations of a map together."""
-    first = [sum(len(own) for own in maps[:index]) for index in range(len(maps))]
+    """Indices into the set of the maps of each split; a split has all orientations of a map."""
+    first = [sum(len(turned) for turned in maps[:index]) for index in range(len(maps))]
     numbers: dict[str | int, int] = {entry.name: index for index, entry in enumerate(content.maps) if entry.name}
     splits: dict[str, tuple[int, ...]] = {}
     for name, members in content.splits.items():
-        place = f"splits.{name}"
+        path = f"splits.{name}"
         if not re.fullmatch(_MAP_NAME, name):
-            problems.append(document.problem(place, "expected lower-case letters, digits or _ as the name of a split"))
-        chosen = [numbers.get(one, one if isinstance(one, int) else -1) for one in members]
-        for one, index in zip(members, chosen, strict=True):
+            problems.append(document.problem(path, "expected lower-case letters, digits or _ as the name of a split"))
+        indices = [numbers.get(member, member if isinstance(member, int) else -1) for member in members]
+        for member, index in zip(members, indices, strict=True):
             if not 0 <= index < len(maps):
-                problems.append(document.problem(place, f"there is no map {one!r}"))
-        if not members or len(set(chosen)) < len(chosen):
-            problems.append(document.problem(place, "expected at least one map, and each once"))
-        inside = [index for index in chosen if 0 <= index < len(maps)]
-        splits[name] = tuple(first[index] + k for index in inside for k in range(len(maps[index])))
+                problems.append(document.problem(path, f"there is no map {member!r}"))
+        if not members or len(set(indices)) < len(indices):
+            problems.append(document.problem(path, "expected at least one map, and each once"))
+        valid = [index for index in indices if 0 <= index < len(maps)]
+        splits[name] = tuple(first[index] + k for index in valid for k in range(len(maps[index])))
     return splits
 
 
-def _named(config: MapConfig, chosen: ScenarioSet, weight: int) -> MapConfig:
+def _with_name(config: MapConfig, map_set: ScenarioSet, weight: int) -> MapConfig:
     assert config.named is not None
-    name = ScenarioName(
-        f"{chosen.name}-{config.named.scenario}", chosen.name, chosen.version, chosen.digest, weight
-    )  # fmt: skip
-    return MapConfig(
-        config.start, config.goal, config.obstacles, config.obstacle_size, config.obstacle_sizes, named=name
-    )
+    name = f"{map_set.name}-{config.named.scenario}"
+    return replace(config, named=ScenarioName(name, map_set.name, map_set.version, map_set.digest, weight))
 
 
-def _plain(config: MapConfig) -> dict[str, Any]:
-    """A map as a file has it."""
+def _as_entry(config: MapConfig) -> dict[str, Any]:
+    """A map as an entry of `MapFile.maps`."""
     x, y, theta = config.start
     return {
         "start": {"x": x, "y": y, "theta": theta},

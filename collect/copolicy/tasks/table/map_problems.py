@@ -1,4 +1,4 @@
-"""What is wrong with maps: something outside or inside something else, a goal out of reach, the same map twice."""
+"""Checks of maps: parts outside the window or inside each other, a goal out of reach, the same map twice."""
 
 import functools
 from collections.abc import Iterator, Sequence
@@ -8,56 +8,58 @@ from scipy.ndimage import label
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from copolicy.dataset.arrays import Array
+
 from .agents import grid
 from .agents.clearance import square_clearance, wall_clearance
 from .map_config import WINDOW, MapConfig
 from .physics import GOAL_SIZE
 from .world import TableWorld
 
-Found = tuple[str, str]
-"""A place in the file, and what is wrong there."""
+PathMessage = tuple[str, str]
+"""Path in the file, such as `maps[0].goal`, and what is wrong there."""
 
 _Squares = tuple[tuple[tuple[float, float], int], ...]
 
 
-def map_problems(maps: Sequence[Sequence[MapConfig]]) -> Iterator[Found]:
-    """What is wrong with the maps of a file.
+def map_problems(maps: Sequence[Sequence[MapConfig]]) -> Iterator[PathMessage]:
+    """Yields what is wrong with the maps of a file.
 
     Args:
         maps: each in all its orientations.
     """
-    seen: dict[str, int] = {}
-    for index, own in enumerate(maps):
-        place = f"maps[{index}]"
-        found = list(dict.fromkeys(one for config in own for one in _of_map(config)))
-        yield from ((f"{place}{part}", message) for part, message in found)
-        same = sorted({seen.setdefault(config.digest, index) for config in own} - {index})
-        if same:
-            yield place, f"the same as maps[{same[0]}]"
+    first_index: dict[str, int] = {}  # by digest
+    for index, turned in enumerate(maps):
+        path = f"maps[{index}]"
+        problems = dict.fromkeys(problem for config in turned for problem in _problems(config))
+        yield from ((f"{path}{part}", message) for part, message in problems)
+        repeated = sorted({first_index.setdefault(config.digest, index) for config in turned} - {index})
+        if repeated:
+            yield path, f"the same as maps[{repeated[0]}]"
 
 
-def _of_map(config: MapConfig) -> list[Found]:
-    """What is wrong with one map; whether the goal can be reached is asked where nothing else is wrong."""
-    found: list[Found] = []
+def _problems(config: MapConfig) -> list[PathMessage]:
+    """Problems of one map; whether the goal can be reached is checked only where there is no other problem."""
+    problems: list[PathMessage] = []
     for index, (centre, size) in enumerate(config.squares):
         if not _inside(centre, size):
-            found.append((f".obstacles[{index}]", f"{_square(centre, size)} lies outside the window of {_WINDOW}"))
+            problems.append((f".obstacles[{index}]", f"{_square(centre, size)} lies outside the window of {_WINDOW}"))
         if centre in config.obstacles[:index]:
-            found.append((f".obstacles[{index}]", f"the place of obstacles[{config.obstacles.index(centre)}] too"))
+            problems.append((f".obstacles[{index}]", f"same centre as obstacles[{config.obstacles.index(centre)}]"))
     if not _inside(config.goal, GOAL_SIZE):
-        found.append((".goal", f"{_square(config.goal, GOAL_SIZE)} lies outside the window of {_WINDOW}"))
+        problems.append((".goal", f"{_square(config.goal, GOAL_SIZE)} lies outside the window of {_WINDOW}"))
     contact = TableWorld(config).contact(config.start)
     x, y, theta = config.start
     start = f"the table at ({x:g}, {y:g}), {np.degrees(theta):.0f} degrees,"
-    for touched, what in (
+    for touched, message in (
         (contact.wall, f"reaches out of the window of {_WINDOW}"), (contact.obstacle, "starts inside an obstacle"),
         (contact.goal, "touches the goal at its start"),
     ):  # fmt: skip
         if touched:
-            found.append((".start", f"{start} {what}"))
-    if not found and not _reachable(config):
-        found.append((".goal", "out of reach: no way for a table of this length from the start past the obstacles"))
-    return found
+            problems.append((".start", f"{start} {message}"))
+    if not problems and not _reachable(config):
+        problems.append((".goal", "out of reach: the table cannot pass the obstacles on any path from the start"))
+    return problems
 
 
 _WINDOW = f"{WINDOW[0]} x {WINDOW[1]} px"
@@ -72,7 +74,7 @@ def _inside(centre: tuple[float, float], size: float) -> bool:
 
 
 def _reachable(config: MapConfig) -> bool:
-    """Whether a pose beside the start and one that touches the goal hang together on the planner's grid."""
+    """Whether a pose next to the start and one that touches the goal are connected on the grid of poses."""
     parts = _parts(config.layout)
     touching = square_clearance(*grid.poses(), config.goal, GOAL_SIZE).ravel() <= 0
     goals = set(parts[touching & (parts >= 0)].tolist())
@@ -86,13 +88,13 @@ def _reachable(config: MapConfig) -> bool:
 
 
 @functools.lru_cache(maxsize=64)
-def _parts(squares: _Squares) -> np.ndarray:
-    """`(COUNT,)` number of the connected part that each cell of the grid lies in, -1 where the table touches."""
+def _parts(squares: _Squares) -> Array:
+    """`(COUNT,)` number of the connected component of each cell of the grid, -1 where the table is in contact."""
     x, y, theta = grid.poses()
     free = np.broadcast_to(wall_clearance(x, y, theta) > 0, grid.SHAPE)
     for centre, size in squares:
         free = free & (square_clearance(x, y, theta, centre, size) > 0)
-    # The first angle once more behind the last one, since half a turn on the table lies as at the first.
+    # The first angle is repeated after the last one, since the grid is periodic in half a turn.
     labels = np.empty((grid.ANGLES + 1, grid.ROWS, grid.COLUMNS), np.int32)
     label(np.concatenate((free, free[:1])), np.ones((3, 3, 3)), output=labels)
     count = int(labels.max())

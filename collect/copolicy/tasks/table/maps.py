@@ -31,9 +31,9 @@ _UNSEEN = (
     ((0.5, 0.2), (0.5, 0.5)),
     ((0.6, 0.5), (0.4, 0.3), (0.4, 0.7)),
 )
-# Which obstacles of the family stand in each of the 84 holdout maps, seven draws for each start and goal.
-# The original draws them anew in each run from a generator that its environment shares, so its own draws
-# differ between methods; this list is one such draw (seed 88), frozen, repeats and all.
+# Obstacles of the family in each of the 84 holdout maps, seven draws for each start and goal.
+# The original draws them in each run from a generator that its environment shares, so that the draws differ between
+# methods; this list is one such draw (seed 88), fixed, repeats included.
 _HOLDOUT = (
     "01 2 2 012 0 2 2 1 12 1 0 10 0 02 0 2 102 120 012 02 1 20 0 201 10 10 21 120 12 210 01 01 02 01 210 012 1 021 "
     "10 102 120 2 21 1 021 0 102 210 2 012 12 12 210 102 1 2 12 21 0 02 0 210 102 01 021 102 201 02 1 210 01 10 20 "
@@ -58,42 +58,42 @@ def _family(indices) -> tuple[tuple[float, float], ...]:
 
 
 def _random_layouts(count: int, seed: int) -> tuple[MapConfig, ...]:
-    """Layouts with start, goal and one to three obstacles of 50 px anywhere between them, none over another."""
+    """Maps with random start, goal and one to three obstacles of 50 px between them that do not overlap."""
     draw = random.Random(seed)  # its sequence is the same in every version of Python
     layouts = []
     for _ in range(count):
         start, goal = draw.uniform(100, 500), draw.uniform(150, 450)
-        wanted, obstacles = 1 + int(3 * draw.random()), []
-        while len(obstacles) < wanted:
+        obstacle_count, obstacles = 1 + int(3 * draw.random()), []
+        while len(obstacles) < obstacle_count:
             x, y = draw.uniform(400, 800), draw.uniform(50, 550)
-            if all(max(abs(x - other[0]), abs(y - other[1])) > 50 for other in obstacles):
+            if all(max(abs(x - other_x), abs(y - other_y)) > 50 for other_x, other_y in obstacles):
                 obstacles.append((round(x, 1), round(y, 1)))
         layouts.append(MapConfig((240.0, round(start, 1), _START_THETA), (960.0, round(goal, 1)), tuple(obstacles), 50))
     return tuple(layouts)
 
 
-_PLACES = tuple((start, goal) for start in range(4) for goal in range(3))
+_START_GOALS = tuple((start, goal) for start in range(4) for goal in range(3))
 
 MAP_SETS: dict[str, tuple[MapConfig, ...]] = {
-    # Every map that the recording program can draw: 4 starts x 3 goals x 7 sets of obstacles.
-    "training": tuple(_map(s, g, _family(subset), 50) for s, g in _PLACES for subset in _SUBSETS),
-    # "36 configurations": 4 starts, 3 goals, and 1, 2 or 3 obstacles. Of the three sets of 1 and of 2 obstacles the
-    # recording program draws one in each episode, so each configuration is here with all three (the one set of 3
-    # obstacles three times): equal numbers of episodes for each entry are equal numbers for each configuration.
+    # All maps of the original recording program: 4 starts x 3 goals x 7 sets of obstacles.
+    "training": tuple(_map(s, g, _family(subset), 50) for s, g in _START_GOALS for subset in _SUBSETS),
+    # "36 configurations": 4 starts, 3 goals, and 1, 2 or 3 obstacles. The recording program draws one of the three sets
+    # of 1 or of 2 obstacles in each episode, so each configuration has three entries here (the only set of 3 obstacles
+    # is repeated): equal numbers of episodes for each entry are equal numbers for each configuration.
     "paper36": tuple(
         _map(s, g, _family(subset), 50)
-        for s, g in _PLACES
+        for s, g in _START_GOALS
         for size in (1, 2, 3)
         for subset in (*combinations(range(3), size),) * (3 if size == 3 else 1)
     ),
-    "holdout": tuple(_map(*_PLACES[i // 7], _family(draw), 45) for i, draw in enumerate(_HOLDOUT)),
-    "unseen": tuple(_map(s, g, layout, 45) for s, g in _PLACES for layout in _UNSEEN),
+    "holdout": tuple(_map(*_START_GOALS[i // 7], _family(draw), 45) for i, draw in enumerate(_HOLDOUT)),
+    "unseen": tuple(_map(s, g, layout, 45) for s, g in _START_GOALS for layout in _UNSEEN),
 }
-# For demonstrations of which a policy shall learn any layout: the paper's configurations and as many random layouts.
+# For training on arbitrary layouts: the paper's configurations and as many random layouts.
 MAP_SETS["varied"] = (*MAP_SETS["paper36"] * 5, *_random_layouts(540, seed=36))
 
 ORIGINAL_MAPS = tuple(config for name in ("training", "holdout", "unseen") for config in MAP_SETS[name])
-"""Maps of the original program."""
+"""All maps of the original program."""
 
 
 @functools.cache
@@ -112,12 +112,12 @@ def map_set(name: str, orientations: bool = False) -> tuple[MapConfig, ...]:
 
 
 def identify(config: MapConfig) -> tuple[str, str]:
-    """Name of a map and of its set, whatever the order of its obstacles.
+    """Name of a map and of its set; the order of the obstacles does not matter.
 
     Returns:
-        `("training-17", "training")` for a map of a set (a repeated map has the name of its first place,
-        a map of the paper's 36 its name in the training family), `("training-17-90deg", "training")` for one of its
-        start orientations, that of its file for a map of one, `("custom-1a2b3c4d", "custom")` for any other.
+        `("training-17", "training")` for a map of a set (of a repeated map, its first name; of a map of the paper's
+        36, its name in the training family), `("training-17-90deg", "training")` for one of its start orientations,
+        the name in its file for a map of a file, `("custom-1a2b3c4d", "custom")` for any other.
     """
     if config.named is not None:
         return config.named[:2]
@@ -137,17 +137,18 @@ def _names() -> dict[str, str]:
     return names
 
 
-def turned(chosen: ScenarioSet) -> ScenarioSet:
-    """A set with each map in the four start orientations; those that a map of a file has of its own do not count."""
+def turned(map_set: ScenarioSet) -> ScenarioSet:
+    """A set with each map in the four start orientations, which replace the orientations that a map file gives."""
     bases: dict[Any, tuple[MapConfig, int]] = {}
-    for place, (config, weight) in enumerate(zip(chosen.scenarios, chosen.weights, strict=True)):
-        bases.setdefault(place if config.named is None else _ANGLE.sub("", config.named.scenario), (config, weight))
-    scenarios = tuple(one for config, _ in bases.values() for one in _orientations(config))
-    return replace(chosen, scenarios=scenarios, weights=tuple(weight for _, weight in bases.values() for _ in range(4)))
+    for index, (config, weight) in enumerate(zip(map_set.scenarios, map_set.weights, strict=True)):
+        bases.setdefault(index if config.named is None else _ANGLE.sub("", config.named.scenario), (config, weight))
+    scenarios = tuple(turned for config, _ in bases.values() for turned in _orientations(config))
+    weights = tuple(weight for _, weight in bases.values() for _ in _ORIENTATIONS)
+    return replace(map_set, scenarios=scenarios, weights=weights)
 
 
 def start_at(config: MapConfig, theta: float) -> MapConfig:
-    """A map with another start orientation, rad; a name from a file says which, in degrees."""
+    """A map with another start orientation (rad), which is added to a name from a file in degrees."""
     name = config.named
     if name is not None:
         base = _ANGLE.sub("", name.scenario)

@@ -1,4 +1,4 @@
-"""The settings of the table's dynamics.
+"""Settings of the table's dynamics.
 
 Source: the environment of Ng, Liu and Kennedy (RA-L 2023). Units are px, rad and s; y points down, theta turns
 counter-clockwise on screen.
@@ -16,7 +16,7 @@ GOAL_SIZE = 92
 
 @dataclass(frozen=True)
 class Physics:
-    """Settings of the dynamics, with the corrected value of each as default.
+    """Settings of the dynamics; the defaults correct the defects of the original program.
 
     Attributes:
         angular_acceleration_limit: bound on the total angular acceleration, damping included, rad/s^2.
@@ -33,7 +33,7 @@ class Physics:
     lever: float = 1.0
     force_scale: float = 50.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.angular_acceleration_limit > 0:
             raise InvalidValueError("angular_acceleration_limit", "a positive number", self.angular_acceleration_limit)
         if self.step_limit < 1:

@@ -1,4 +1,4 @@
-"""Maps drawn at random within bounds, each of which can be carried."""
+"""Random maps within bounds, all with a reachable goal."""
 
 import math
 import random
@@ -9,18 +9,18 @@ from copolicy.dataset.exceptions import RunError
 from .map_config import MapConfig
 from .map_problems import map_problems
 
-_TRIES = 200  # a map, before the bounds count as too tight
+_TRIES = 200  # draws a map before the bounds count as too tight
 
 
 def random_maps(count: int, seed: int, bounds: Mapping[str, tuple[float, float]]) -> list[MapConfig]:
-    """Maps of which `map_problems` finds nothing, no two the same and no obstacle over another.
+    """Distinct maps that pass `map_problems` and whose obstacles do not overlap.
 
     Args:
-        bounds: lowest and highest value by the names of `MapFiles.bounds`; px, degrees for `start_theta`, and a number
-            for `obstacles`.
+        bounds: lowest and highest value by the names of `MapFiles.bounds`; px, degrees for `start_theta`, a count for
+            `obstacles`.
 
     Raises:
-        RunError: they leave no room for so many.
+        RunError: the bounds leave no room for so many maps.
     """
     draw = random.Random(seed)  # its sequence is the same in every version of Python
     maps: dict[str, MapConfig] = {}
@@ -29,30 +29,30 @@ def random_maps(count: int, seed: int, bounds: Mapping[str, tuple[float, float]]
         tries += 1
         if tries > _TRIES * count:
             raise RunError(f"--bounds: expected room for {count} maps, found {len(maps)} in {tries - 1} tries")
-        config = _drawn(draw, bounds)
+        config = _draw_map(draw, bounds)
         if config is not None and not list(map_problems([[config]])):
             maps.setdefault(config.digest, config)
     return list(maps.values())
 
 
-def _drawn(draw: random.Random, bounds: Mapping[str, tuple[float, float]]) -> MapConfig | None:
-    """A map, or None where its obstacles lie over each other."""
+def _draw_map(draw: random.Random, bounds: Mapping[str, tuple[float, float]]) -> MapConfig | None:
+    """A random map, or None where its obstacles overlap."""
 
     def value(name: str) -> float:
         return round(draw.uniform(*bounds[name]), 1)
 
-    def whole(name: str) -> int:
+    def whole_number(name: str) -> int:
         low, high = bounds[name]
         return math.floor(draw.uniform(math.ceil(low), math.floor(high) + 1 - 1e-9))
 
     start = (value("start_x"), value("start_y"), round(math.radians(draw.uniform(*bounds["start_theta"])), 4))
     goal = (value("goal_x"), value("goal_y"))
-    places: list[tuple[tuple[float, float], int]] = []
-    for _ in range(whole("obstacles")):
-        centre, size = (value("obstacle_x"), value("obstacle_y")), whole("obstacle_size")
-        for (x, y), other in places:
-            if max(abs(centre[0] - x), abs(centre[1] - y)) < (size + other) / 2:
+    squares: list[tuple[tuple[float, float], int]] = []
+    for _ in range(whole_number("obstacles")):
+        centre, size = (value("obstacle_x"), value("obstacle_y")), whole_number("obstacle_size")
+        for (x, y), other_size in squares:
+            if max(abs(centre[0] - x), abs(centre[1] - y)) < (size + other_size) / 2:
                 return None
-        places.append((centre, size))
-    centres, sizes = tuple(centre for centre, _ in places), tuple(size for _, size in places)
+        squares.append((centre, size))
+    centres, sizes = tuple(centre for centre, _ in squares), tuple(size for _, size in squares)
     return MapConfig(start, goal, centres, obstacle_sizes=sizes)

@@ -1,4 +1,4 @@
-"""The table in recordings: its messages, and its scene for Foxglove and Rerun."""
+"""Messages of the table in recordings: state, actions, interaction, and scenes for Foxglove and Rerun."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from copolicy.dataset.recording.messages.copolicy_pb2 import Interaction, PlayerAction, TableState
 from copolicy.dataset.recording.task_messages import SceneWriter, TaskMessages
-from copolicy.dataset.recording.topics import Record, Topic, of_player
+from copolicy.dataset.recording.topics import Record, Topic, player_metadata
 from copolicy.dataset.task_spec import RECORD_HZ
 
 from .artist.scene import SCENE, SCENE_MAP, TableScene, map_scene
@@ -25,7 +25,7 @@ _ROBOT, _HUMAN = (
     Topic(
         f"/player/{player}/action",
         PlayerAction,
-        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": _FRAME, **of_player(player)},
+        {"units": "fx, fy: a player's full force, [-1, 1]", "frame": _FRAME, **player_metadata(player)},
     )
     for player in range(2)
 )
@@ -34,7 +34,7 @@ INTERACTION = Topic("/interaction", Interaction, {"units": "force: a player's fu
 
 
 class TableMessages(TaskMessages):
-    """The messages that the recordings of every version have."""
+    """Encodes and decodes the table's messages; see `TaskMessages`."""
 
     scenario_file = "map_config.json"
     state = TABLE_STATE
@@ -77,11 +77,11 @@ class TableMessages(TaskMessages):
         return Interaction.FromString(payload).reward
 
     def scenario_records(self, scenario: MapConfig, time_ns: int) -> list[Record]:
-        """Goal, obstacles and window, and the solids of the table in its own frame."""
+        """Goal, obstacles and window border, and the table's solids in the frame `table`."""
         return [(SCENE_MAP, map_scene(scenario, time_ns)), *solid_records(scenario, time_ns)]
 
     def scene_writer(self) -> SceneWriter:
-        """The table, the forces, and the table's frame."""
+        """Writes the table and the forces as a SceneUpdate, and the table's frame as a FrameTransform."""
         scene, frame = TableScene(), TableFrame()
 
         def records(time_ns: int, recorded: Sequence[float], action: Sequence[float]) -> list[Record]:

@@ -1,14 +1,15 @@
-"""The map and the table as figures and pages draw them."""
+"""Vector outline of the map and the table, for figures, pages and screens."""
 
 import math
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.outline import Point, Shape, circle, square
 
 from .features import theta_of
+from .geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from .map_config import WINDOW, MapConfig
-from .outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from .physics import GOAL_SIZE
 
 _CORNER = [(math.cos(k * math.pi / 12), math.sin(k * math.pi / 12)) for k in range(7)]  # a quarter of a circle
@@ -49,10 +50,10 @@ class TableOutline:
             *(Shape("obstacle", square(centre, side)) for centre, side in scenario.squares),
         )
 
-    def poses(self, states: np.ndarray) -> np.ndarray:
+    def poses(self, states: Array) -> Array:
         """`(T, 3)` centre of the table and its orientation in [0, 2 pi)."""
         return np.column_stack((states[:, :2], theta_of(states)))
 
-    def forces(self, actions: np.ndarray) -> np.ndarray:
+    def forces(self, actions: Array) -> Array:
         """The actions are forces."""
         return actions

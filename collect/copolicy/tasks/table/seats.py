@@ -1,9 +1,11 @@
-"""The exchange of seats: who held the robot's end holds the human's."""
+"""Exchange of the two seats of the table."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
+
+from copolicy.dataset.arrays import Array
 
 from .map_config import MapConfig
 
@@ -11,9 +13,9 @@ _HALF_TURN = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])  # of x, y, cos_the
 
 
 class TableSeats:
-    """A table turned by pi has its ends exchanged; place, velocity and forces keep their axes, those of the window.
+    """Exchanges the seats by turning the table by pi; position, velocity and forces keep the axes of the window.
 
-    The dynamics are the same to rounding. The two ends are of unlike outline, so that a touch may come a step earlier
+    The dynamics are the same up to rounding. The two ends differ in outline, so a contact can come some steps earlier
     or later.
     """
 
@@ -22,10 +24,10 @@ class TableSeats:
         x, y, theta = scenario.start
         return replace(scenario, start=(x, y, (theta + math.pi) % (2 * math.pi)))
 
-    def states(self, states: np.ndarray) -> np.ndarray:
+    def states(self, states: Array) -> Array:
         """States `(..., 7)` turned by pi."""
         return states * _HALF_TURN
 
-    def actions(self, actions: np.ndarray) -> np.ndarray:
+    def actions(self, actions: Array) -> Array:
         """Joint actions `(..., 4)` with the players' halves exchanged."""
         return np.concatenate((actions[..., 2:], actions[..., :2]), axis=-1)

@@ -1,8 +1,8 @@
-"""The table, the obstacles and the goal as solids of pymunk."""
+"""The table, the obstacles and the goal as pymunk shapes."""
 
 import pymunk
 
-from .outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_FRINGE, CIRCLE_RADIUS, TRIANGLE
+from .geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_CENTRE, CIRCLE_FRINGE, CIRCLE_RADIUS, TRIANGLE
 
 
 def table_shapes(body: pymunk.Body) -> tuple[pymunk.Shape, ...]:
@@ -18,10 +18,10 @@ def table_shapes(body: pymunk.Body) -> tuple[pymunk.Shape, ...]:
 
 
 def square_shape(body: pymunk.Body, centre: tuple[float, float], size: int) -> pymunk.Poly:
-    """An obstacle or the goal as the hull of its pixels' centres.
+    """An obstacle or the goal as the convex hull of its pixels' centres.
 
-    The original puts the corner of the square at the whole pixel towards zero and compares pixels: a table that
-    reaches less than half a pixel into the square touches none of them.
+    The original truncates the corner of the square to a whole pixel and compares pixels, so a table that overlaps the
+    square by less than half a pixel does not touch it.
     """
     left, top = (int(value - size / 2) for value in centre)
     near, far = 0.5, size - 0.5

@@ -1,4 +1,4 @@
-"""The table as a task in plain data."""
+"""The table's `TaskSpec`: names, units and bounds of its vectors."""
 
 import math
 

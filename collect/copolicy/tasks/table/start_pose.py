@@ -1,4 +1,4 @@
-"""Episodes that begin beside a map's start, so that a policy learns to come back from there."""
+"""Displaced start poses, so that a policy learns to recover from states beside the demonstrated paths."""
 
 from dataclasses import replace
 
@@ -12,9 +12,9 @@ _TURN = 0.6  # rad
 
 
 def displaced_start(config: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
-    """The map with its start moved by up to `scale` times 90 px in x, 60 px in y and 0.6 rad, touching nothing.
+    """The map with its start displaced by up to `scale` times 90 px in x, 60 px in y and 0.6 rad, without contact.
 
-    The map's own start comes back where a hundred draws touch something (a start between obstacles, a large scale).
+    Returns the map unchanged where all of 100 draws are in contact (a start between obstacles, a large scale).
     """
     world = TableWorld(config)
     x, y, theta = config.start

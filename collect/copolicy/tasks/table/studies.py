@@ -1,9 +1,10 @@
-"""What results of studies say of the table."""
+"""Definitions and limits of studies with the table."""
 
 from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import Studies
 
 from .map_config import MapConfig
@@ -12,7 +13,7 @@ _STILL_SPEED, _STILL_SPIN = 6.0, 0.1  # px/s, rad/s
 
 
 class TableStudies(Studies):
-    """See `Studies`; the limit of steps is the paper's."""
+    """See `Studies`; the step limit is the paper's."""
 
     step_limit = 2000
     definitions = {  # noqa: RUF012 (read only, as the base says)
@@ -21,16 +22,16 @@ class TableStudies(Studies):
         "human_interaction_force": "|(u_robot - u_human) . e| / 2, full forces",
         "work": "the table's centre",
         "at_rest": f"below {_STILL_SPEED:g} px/s and {_STILL_SPIN:g} rad/s",
-        "change": "its mind about the route",
-        "partners": "scripted pilots with a will of their own sit at the human seat, no person took part; they know "
-        "every way of the map, which flatters any robot",
+        "change": "its route",
+        "partners": "scripted agents that choose their own route act at the human's seat, no person took part; they "
+        "know every route of the map, which favours any robot",
     }
 
     def factors(self, scenario: MapConfig) -> dict[str, Any]:
-        """The orientation that a map starts in, and how many obstacles it has."""
+        """Start orientation (rad) and number of obstacles of a map."""
         return {"start_theta": scenario.start[2], "obstacles": len(scenario.obstacles)}
 
-    def at_rest(self, recorded: np.ndarray) -> np.ndarray:
-        """By the speed and the spin of the table."""
+    def at_rest(self, recorded: Array) -> Array:
+        """`(T,)` whether speed and spin of the table are below the limits."""
         vx, vy, omega = recorded[:, 3:].T
         return (vx * vx + vy * vy < _STILL_SPEED**2) & (np.abs(omega) < _STILL_SPIN)

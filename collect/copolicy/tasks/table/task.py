@@ -1,4 +1,4 @@
-"""The table as a task: where its parts are."""
+"""The task of carrying a table; see `PairTask` for each part."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.features import GYM_ID
 from copolicy.dataset.scenarios import ScenarioName, ScenarioSet
 from copolicy.dataset.task import PairTask, PolicyFeatures, SimulatedPlayers, TaskRules, TaskStatistics
 
 from .dynamics import integrate
-from .features import environment_state, map_of, sizes_text, states_7, theta_of
+from .features import environment_state, format_sizes, map_from_vector, states_7, theta_of
 from .interaction import interaction_force
 from .map_config import MapConfig
 from .maps import MAP_SETS, identify, turned
@@ -47,10 +48,10 @@ class TableTask(PairTask):
 
     @property
     def agents(self) -> SimulatedPlayers:
-        """Simulated pairs, partners and robots."""
-        from .agents.players import PLAYERS
+        """Scripted pairs, partners and robots."""
+        from .agents.players import SCRIPTED_PLAYERS
 
-        return PLAYERS
+        return SCRIPTED_PLAYERS
 
     @property
     def scenario_sets(self) -> Mapping[str, Sequence[MapConfig]]:
@@ -61,25 +62,25 @@ class TableTask(PairTask):
         """See `MapConfig.from_json`."""
         return MapConfig.from_json(text)
 
-    def scenario_vector(self, scenario: MapConfig) -> np.ndarray:
-        """`(11,)` start pose, goal, and obstacles padded with zeros."""
+    def scenario_vector(self, scenario: MapConfig) -> Array:
+        """`(11,)` start pose, goal, and the centres of the obstacles padded with zeros."""
         return environment_state(scenario)
 
-    def scenario_of_vector(self, vector: np.ndarray, columns: Mapping[str, Any]) -> MapConfig:
-        """The map of an `environment_state`; the episode columns tell the size of its obstacles.
+    def scenario_of_vector(self, vector: Array, columns: Mapping[str, Any]) -> MapConfig:
+        """The map of an `environment_state`, with the obstacle sizes of the episode columns.
 
-        Data sets of earlier versions lack it: there the name of the map tells, and 50 px is that of no set.
+        Data sets of earlier versions have no such columns: there the map's name decides, and the default is 50 px.
         """
         paper = str(columns.get("map_id", "")).startswith(("holdout", "unseen"))
         size = columns.get("obstacle_size") or (45 if paper else MapConfig.obstacle_size)
-        return map_of(vector, size, columns.get("obstacle_sizes") or "")
+        return map_from_vector(vector, size, columns.get("obstacle_sizes") or "")
 
     def columns_of(self, scenario: MapConfig) -> dict[str, Any]:
-        """The size of the obstacles, and that of each where they differ."""
-        return {"obstacle_size": scenario.obstacle_size, "obstacle_sizes": sizes_text(scenario)}
+        """The columns `obstacle_size` and `obstacle_sizes`."""
+        return {"obstacle_size": scenario.obstacle_size, "obstacle_sizes": format_sizes(scenario)}
 
     def unseen(self, columns: Mapping[str, Any]) -> str:
-        """The sizes of obstacles that differ: the vector has their centres, and the scan takes all for 50 px."""
+        """Obstacle sizes that differ: the vector has centres only, and the range scan assumes 50 px for all."""
         sizes = columns.get("obstacle_sizes")
         return f"the size of each obstacle, where they differ ({sizes} px)" if sizes else ""
 
@@ -90,11 +91,11 @@ class TableTask(PairTask):
         return TableWorld(scenario, settings)
 
     def start_of(self, scenario: MapConfig) -> tuple[float, ...]:
-        """At rest at the start of the map, its orientation as the map has it."""
+        """At rest at the start of the map, with the map's orientation."""
         return (*scenario.start, 0.0, 0.0, 0.0)
 
-    def states_of(self, recorded: np.ndarray) -> np.ndarray:
-        """`(T, 6)` x, y, theta and velocity to `(T, 7)`, with the cosine that `TableWorld.observation` has."""
+    def states_of(self, recorded: Array) -> Array:
+        """`(T, 6)` x, y, theta and velocity to `(T, 7)`, bit for bit as `TableWorld.observation`."""
         thetas = recorded[:, 2].tolist()
         states = np.empty((len(recorded), 7))
         states[:, :2] = recorded[:, :2]
@@ -103,56 +104,56 @@ class TableTask(PairTask):
         states[:, 4:] = recorded[:, 3:]
         return states
 
-    def recorded_of(self, states: np.ndarray) -> np.ndarray:
+    def recorded_of(self, states: Array) -> Array:
         """`(T, 7)` to `(T, 6)` x, y, theta and velocity."""
         return np.column_stack((states[:, :2], theta_of(states), states[:, 4:]))
 
-    def rewards(self, scenario: MapConfig, states: np.ndarray) -> np.ndarray:
+    def rewards(self, scenario: MapConfig, states: Array) -> Array:
         """See `reward`; the position alone matters."""
         return np.array([reward(x, y, scenario) for x, y in states[:, :2].tolist()])
 
-    def integrate(self, scenario: MapConfig, settings: Physics, state: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """By `dynamics.integrate`, many times as fast as the world, which also asks what the table touches."""
+    def integrate(self, scenario: MapConfig, settings: Physics, state: Array, actions: Array) -> Array:
+        """By `dynamics.integrate`, which is much faster than `TableWorld`, since it does not check contacts."""
         x, y, _, _, vx, vy, omega = state.astype(float).tolist()
         return states_7(integrate((x, y, float(theta_of(state))), (vx, vy, omega), actions, settings))
 
-    def path(self, states: np.ndarray) -> np.ndarray:
+    def path(self, states: Array) -> Array:
         """`(T, 2)` the table's centre, px."""
         return states[:, :2]
 
-    def interaction(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def interaction(self, states: Array, actions: Array) -> Array:
         """See `interaction_force`."""
         return interaction_force(theta_of(states), actions)
 
-    def interaction_recorded(self, recorded: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """By the recorded orientation itself, not by its cosine and sine."""
+    def interaction_recorded(self, recorded: Array, actions: Array) -> Array:
+        """By the recorded orientation, without the detour through its cosine and sine."""
         return interaction_force(recorded[:, 2], actions)
 
     def layout(self, scenario: MapConfig, with_goal: bool = False) -> tuple:
-        """The obstacles, whatever their order, and the goal."""
-        # Without the size where it is the same for all: it then tells the map sets apart, which is not meant here.
+        """The sorted obstacles, and the goal."""
+        # Sizes count only where they differ, since a common size depends on the map set alone.
         sizes = scenario.obstacle_sizes or (0,) * len(scenario.obstacles)
         obstacles = sorted((x, y, size) for (x, y), size in zip(scenario.obstacles, sizes, strict=True))
         return tuple(obstacles), scenario.goal if with_goal else ()
 
-    def strategy(self, scenario: MapConfig, states: np.ndarray) -> str:
+    def strategy(self, scenario: MapConfig, states: Array) -> str:
         """See `route_class`."""
         return route_class(states[:, :2], scenario)
 
     def environment(self, settings: Mapping[str, float]) -> tuple[str, dict[str, Any]]:
-        """An environment of its own."""
+        """The table's own gymnasium environment."""
         names = ("step_limit", "angular_acceleration_limit")
         return GYM_ID, {name: settings[name] for name in names if name in settings}
 
     @property
     def words(self) -> "TaskWords":
-        """Of the table and its maps."""
+        """Words for the table and its maps."""
         from .words import WORDS
 
         return WORDS
 
-    def images(self, scenario: MapConfig, states: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
-        """The table on its map, as `SceneImage` draws it."""
+    def images(self, scenario: MapConfig, states: Array, size: tuple[int, int]) -> Iterator[Array]:
+        """Images by `SceneImage`."""
         from .artist.scene_image import scene_image  # pygame
 
         image = scene_image(scenario, size)
@@ -160,21 +161,21 @@ class TableTask(PairTask):
             yield image.draw((x, y, theta))
 
     def view(self, scenario: MapConfig) -> "TableView":
-        """The floor, the map and the table as people know them."""
+        """Draws the floor, the map and the table on a screen."""
         from .artist.table_view import TableView  # pygame
 
         return TableView(scenario)
 
     @property
     def drift_limits(self) -> Mapping[str, float]:
-        """Of position and orientation; sums of a double stay below 1e-9."""
+        """Limits of position and orientation; rounding of doubles stays below 1e-9."""
         return {"px": 0.01, "rad": 1e-4}
 
-    def drift(self, recorded: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """Of the position and of the orientation, the shorter way round."""
-        turn = recorded[:, 2] - other[:, 2]
+    def drift(self, recorded: Array, reference: Array) -> Array:
+        """Distance of the positions, px, and of the orientations, rad in [0, pi]."""
+        turn = recorded[:, 2] - reference[:, 2]
         rad = np.abs((turn + math.pi) % (2 * math.pi) - math.pi)
-        return np.column_stack((np.linalg.norm(recorded[:, :2] - other[:, :2], axis=1), rad))
+        return np.column_stack((np.linalg.norm(recorded[:, :2] - reference[:, :2], axis=1), rad))
 
     def displaced(self, scenario: MapConfig, scale: float, rng: np.random.Generator) -> MapConfig:
         """See `displaced_start`."""
@@ -183,59 +184,59 @@ class TableTask(PairTask):
         return displaced_start(scenario, scale, rng)
 
     def balanced(self, scenario: MapConfig) -> tuple:
-        """Start and goal."""
+        """Balances start and goal."""
         return scenario.start, scenario.goal
 
     @property
     def recording(self) -> "TableMessages":
-        """The table's own messages."""
+        """Messages of the table."""
         from .recording import TableMessages  # protobuf
 
         return TableMessages()
 
     @property
     def rules(self) -> TaskRules:
-        """Map, motion and contacts."""
+        """Rules for map, motion and contacts."""
         from .rules import RULES
 
         return RULES
 
     @property
     def statistics(self) -> TaskStatistics:
-        """Sides of obstacles, people's routes, the dip of the steering."""
+        """Statistics of the sides of obstacles, distance to people's routes, and dip test of the steering."""
         from .statistics import STATISTICS  # scipy, diptest
 
         return STATISTICS
 
     @property
     def features(self) -> PolicyFeatures:
-        """The map as seen from the table, mirroring, and the order of the obstacles."""
-        from .policy import FEATURES  # torch
+        """Encoders of the map relative to the table; mirror and permutation symmetries."""
+        from .policy import POLICY_FEATURES  # torch
 
-        return FEATURES
+        return POLICY_FEATURES
 
     def settings_summary(self, settings: Physics) -> str:
-        """The bound on the angular acceleration, and whatever else is not the default."""
+        """The bound on the angular acceleration, and all other settings that differ from the default."""
         limit = settings.angular_acceleration_limit
         default = asdict(Physics(angular_acceleration_limit=limit))
-        others = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
-        return ", ".join([f"angular acceleration up to {_LIMITS.get(limit, f'{limit!r}')} rad/s^2", *others])
+        changed = [f"{name} {value:g}" for name, value in asdict(settings).items() if value != default[name]]
+        return ", ".join([f"angular acceleration up to {_LIMITS.get(limit, f'{limit!r}')} rad/s^2", *changed])
 
     def identify(self, scenario: MapConfig) -> tuple[str, str]:
-        """Name of a map and of its set, whatever the order of its obstacles; see `maps.identify`."""
+        """See `maps.identify`."""
         return identify(scenario)
 
     def name_of(self, scenario: MapConfig) -> ScenarioName:
-        """The name that a map of a file has with it, or that of a map of a set."""
+        """The name of a map from a file, else the name by `identify`."""
         return scenario.named or super().name_of(scenario)
 
     @property
     def scenario_files(self) -> "MapFiles":
-        """Map files."""
+        """Files of maps in YAML or JSON."""
         from .map_files import MapFiles  # PyYAML
 
         return MapFiles()
 
-    def turned(self, chosen: ScenarioSet) -> ScenarioSet:
+    def turned(self, scenario_set: ScenarioSet) -> ScenarioSet:
         """See `maps.turned`."""
-        return turned(chosen)
+        return turned(scenario_set)

@@ -1,4 +1,4 @@
-"""How screens, cards, pages and figures speak of the table."""
+"""Words for the table on screens, cards, pages and figures."""
 
 from copolicy.dataset.task_words import TaskWords
 
@@ -17,8 +17,8 @@ WORDS = TaskWords(
     episode="one carry from start to end",
     record="One record an episode: who carried what with whom on which map, and how it ended.",
     invitation="carry the table together",
-    instruction="Carry the table to the green goal together. Nobody knows which way the other will go.",
-    purpose="carry an object *with* a partner, where there are several good ways and both have to settle on one",
+    instruction="Carry the table to the green goal together. You do not know which route your partner will take.",
+    purpose="carry an object *with* a partner, where there are several good routes and both have to agree on one",
     limits="The table moves in a plane under known dynamics",
     scenario="map",
     scenarios="maps",
@@ -28,19 +28,18 @@ WORDS = TaskWords(
     state_sees="the table's pose and velocity",
     acts="carries a table together with a partner, in a simulated plane seen from above",
     action="forces in [-1, 1]",
-    running="tables that are still being carried",
     success="reached the goal",
     failure="ended short of the goal",
     did_not="did not reach the goal",
     scene="The table, both players' forces and the map",
-    stand_in="Two scripted pilots, one at each end of the table, stand in for people.",
+    stand_in="Two scripted agents, one at each end of the table, stand in for people.",
     label="route",
     label_class="route class",
     labels=(
         "one letter an obstacle (L: the table passed below it on screen, R: above it)",
         "one letter an obstacle, L where the table passed below it on screen when carried to the right, R above it",
     ),
-    # The maps of all sets are carried through to the right.
+    # On the maps of all sets the table is carried to the right.
     meanings={"L": "below", "LL": "below all", "LLL": "below all", "R": "above", "RR": "above all", "RRR": "above all"},
     interaction="interaction force",
     interaction_unit="units of a player's full force",

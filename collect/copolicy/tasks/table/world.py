@@ -1,4 +1,4 @@
-"""The world: one table, two forces, and what the table touches."""
+"""The world of the table: its dynamics under two forces, and its contacts."""
 
 import math
 from collections.abc import Sequence
@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import pymunk
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
 from copolicy.dataset.task import RUNNING, Outcome
 
 from .features import state_vector
+from .geometry import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 from .map_config import WINDOW, MapConfig
-from .outline import IMAGE_SIZE, PART_BOUNDS, REACH, drawn_centre, image_size
 from .physics import GOAL_SIZE, Physics
 from .reward import reward
 from .solids import square_shape, table_shapes
@@ -28,7 +29,7 @@ _HALF_DIAGONAL = math.hypot(*IMAGE_SIZE) / 2 + _SLACK
 
 
 class Contact(NamedTuple):
-    """What a pose touches or leaves."""
+    """Whether the table at a pose touches an obstacle or the goal, or leaves the window (`wall`)."""
 
     obstacle: bool
     goal: bool
@@ -43,20 +44,20 @@ _TIMEOUT = Outcome(True, False, "timeout")
 
 
 class TableWorld:
-    """A table carried by two forces in a window of 1200 x 600 px, advanced in steps of 1/30 s.
+    """A table under two forces in a window of 1200 x 600 px, in steps of 1/30 s.
 
-    The dynamics are those of the original program, in its order: position to second order and velocity to first,
-    from the velocity before the step; the bound on the angular acceleration includes the damping. An episode ends
-    with any touch of the goal (a success even if an obstacle is touched too), else with a touch of an obstacle, else
-    where the box of the turned image leaves the window, else at the step limit. `step` goes on after an end:
-    stopping is up to the caller.
+    The dynamics are those of the original program, in the same order: position to second order and velocity to first
+    order, from the velocity before the step; the bound on the angular acceleration includes the damping. An episode
+    ends when the table touches the goal (a success even if it touches an obstacle too), else when it touches an
+    obstacle, else when the box of the rotated image leaves the window, else at the step limit. `step` may be called
+    after an end; the caller decides when to stop.
 
-    pymunk holds the solids and answers the contact queries. The original compares pixels of turned pictures; where
-    the two disagree the table is within a pixel of touching (see tests/test_world.py for the rate).
+    Contacts are pymunk shape queries. The original compares pixels of rotated images; where the two disagree, the
+    table is within a pixel of contact (see tests/test_world.py for the rate).
 
     Attributes:
         map_config: the map.
-        physics: the settings of the dynamics.
+        physics: settings of the dynamics.
         pose: (x, y, theta) in px and rad, theta in [0, 2 pi).
         velocity: (vx, vy, omega) in px/s and rad/s.
         step_count: steps since the last reset.
@@ -97,7 +98,7 @@ class TableWorld:
 
     @property
     def recorded(self) -> tuple[float, ...]:
-        """x, y, theta, vx, vy, omega (px, rad, px/s, rad/s), exact."""
+        """The exact state: x, y, theta, vx, vy, omega (px, rad, px/s, rad/s)."""
         return (*self.pose, *self.velocity)
 
     def restore(self, recorded: Sequence[float]) -> None:
@@ -105,11 +106,11 @@ class TableWorld:
         self.reset(recorded[:3], recorded[3:])
 
     @property
-    def observation(self) -> np.ndarray:
+    def observation(self) -> Array:
         """`(7,)` x, y, cos_theta, sin_theta, vx, vy, omega (px, px/s, rad/s)."""
         return state_vector(self.pose, self.velocity)
 
-    def step(self, action: np.ndarray | Sequence[float]) -> Outcome:
+    def step(self, action: Array | Sequence[float]) -> Outcome:
         """Advances by 1/30 s under `action` `(4,)`: robot xy, human xy, each clipped to [-1, 1].
 
         Raises:
@@ -148,16 +149,16 @@ class TableWorld:
         return _TIMEOUT if self.step_count >= self._step_limit else RUNNING
 
     def contact(self, pose: Sequence[float]) -> Contact:
-        """What the table would touch at a pose (x, y, theta), px and rad; the world stays as it is."""
+        """Contacts of the table at a pose (x, y, theta), px and rad; does not change the world."""
         x, y, theta = _triple("pose", pose)
         return self._contact(x, y, theta, math.cos(theta), math.sin(theta))
 
     def reward(self) -> float:
-        """Reward of the present pose (see `copolicy.tasks.table.reward`)."""
+        """Reward at the present pose; see `copolicy.tasks.table.reward`."""
         return reward(self.pose[0], self.pose[1], self.map_config)
 
     def _contact(self, x: float, y: float, theta: float, cos: float, sin: float) -> Contact:
-        # Most steps are far from everything; distances from the centre settle those without a shape query.
+        # In most steps the table is far from all solids; distances from its centre decide these without a shape query.
         close = []
         for solid in self._solids:
             dx, dy, half = abs(x - solid[0]), abs(y - solid[1]), solid[2]
@@ -194,7 +195,7 @@ class TableWorld:
         return Contact(obstacle, goal, wall)
 
 
-def _forces(action: np.ndarray | Sequence[float]) -> list[float]:
+def _forces(action: Array | Sequence[float]) -> list[float]:
     try:
         array = np.asarray(action, dtype=float)
     except (TypeError, ValueError):

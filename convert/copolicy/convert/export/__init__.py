@@ -1,1 +1,1 @@
-"""Data sets of this project out again, to the formats of diffusion_policy, robomimic and Minari."""
+"""Exports data sets of this project to the formats of diffusion_policy, robomimic and Minari."""

@@ -2,9 +2,9 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
-from copolicy.dataset.command_line.extras import TABLES
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.flag_numbers import number, seed
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
@@ -18,38 +18,38 @@ FORMATS = {
 _WRITERS = {"zarr": "numcodecs", "robomimic": "h5py", "minari": "h5py"}
 
 
-def add_export_command(commands: argparse._SubParsersAction) -> None:
+def add_export_command(commands: Commands) -> None:
     """Adds `export`."""
     parser = add_command(
         commands, "export", _export, "write a LeRobot data set of this project in another project's format",
         "copolicy-convert export datasets/table --format zarr --out exports/table.zarr",
-        lambda arguments: (*TABLES, _WRITERS[arguments.format]),
+        lambda arguments: (_WRITERS[arguments.format],),
     )  # fmt: skip
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot data set")
-    formats = "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+    formats = "; ".join(f"{name}: {description}" for name, description in FORMATS.items())
     parser.add_argument("--format", choices=tuple(FORMATS), required=True, help=formats)
-    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="what to write; must not exist")
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="the export; must not exist")
     parser.add_argument(
         "--alignment", choices=("ours", "upstream"), default=None,
-        help="zarr only: a row's action was taken in its state (ours, the default), or produced it (upstream, as in "
-        "the original's store)",
+        help="zarr only: the action of a row was taken in its state (ours, the default), or led to its state "
+        "(upstream, as in the store of the original program)",
     )  # fmt: skip
     parser.add_argument(
         "--valid", type=number("--valid", 0), metavar="PROPORTION",
-        help="robomimic only: episodes for its filter key `valid`, the others are `train` (default: the splits of the "
-        "data set, which copolicy-dataset split --as-splits writes)",
+        help="robomimic only: proportion of episodes in the filter key `valid`, the others are `train` (default: the "
+        "splits of the data set, which copolicy-dataset split --as-splits writes)",
     )  # fmt: skip
     parser.add_argument(
         "--valid-by", choices=("pairs", "maps", "episodes"),
-        help="with --valid: what is never in both, as in copolicy-dataset split (default: pairs)",
+        help="with --valid: what is never divided between both, as in copolicy-dataset split (default: pairs)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=seed(), help="with --valid: of the choice (default: 0)")
+    parser.add_argument("--seed", type=seed(), help="with --valid: seed of the random selection (default: 0)")
     parser.add_argument(
-        "--keep-discarded", action="store_true", help="export discarded and excluded episodes, too; they stay flagged"
+        "--keep-discarded", action="store_true", help="also export discarded and excluded episodes, with their flags"
     )
 
 
-def _export(arguments: argparse.Namespace) -> dict:
+def _export(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.alignment and arguments.format != "zarr":
         raise InvalidValueError("--alignment", "--format zarr beside it", arguments.format)
     for flag, value in (("--valid", arguments.valid), ("--valid-by", arguments.valid_by), ("--seed", arguments.seed)):

@@ -1,9 +1,9 @@
 """Exports to a Minari data set: a folder NAME-vN with `data/metadata.json` and `data/main_data.hdf5`.
 
-It is read with `minari.load_dataset("NAME-vN")` where MINARI_DATASETS_PATH is the folder that holds it, or with
-`minari.MinariDataset(".../NAME-vN/data")`. An episode has T actions and T + 1 observations, under the names of the
-environment; its metadata are the episode columns. `recover_environment()` makes the environment at the data set's rate
-and under its physics, where `lerobot_policy_copolicy[train]` is installed. Format: https://minari.farama.org/content/dataset_standards/
+Read it with `minari.load_dataset("NAME-vN")`, with MINARI_DATASETS_PATH set to its parent folder, or with
+`minari.MinariDataset(".../NAME-vN/data")`. An episode has T actions and T + 1 observations, with the environment's
+names; its metadata are the episode columns. `recover_environment()` needs `lerobot_policy_copolicy[train]` and makes
+the environment with the rate and physics of the data. Format: https://minari.farama.org/content/dataset_standards/
 """
 
 import json
@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import frames
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import ACTION, GYM_ID, OBSERVATION_KEYS, PAIR_GYM_ID, bounds_of
@@ -25,7 +26,7 @@ from .hdf5_file import new_hdf5
 from .source import ExportEpisode, ExportSource
 
 _FORMAT_VERSION = "0.5.0"
-"""Version of Minari whose layout this is; a later one reads it, an earlier one says that it cannot."""
+"""Version of Minari that defined this layout; later versions read it, earlier ones reject it."""
 
 _PACKAGE = "lerobot_policy_copolicy"
 _ENTRY_POINTS = {
@@ -39,7 +40,7 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
 
     Raises:
         InvalidValueError: the name of `out` is no id of a Minari data set.
-        OutputExistsError: there is something at `out`.
+        OutputExistsError: `out` exists.
     """
     if not re.fullmatch(r"[\w-]+-v\d+", out.name):
         raise InvalidValueError("--out", "a folder named as Minari names data sets, NAME-vN", out.name)
@@ -60,7 +61,7 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
             "total_episodes": len(source.rows),
             "total_steps": source.frames,
             "data_format": "hdf5",
-            # Minari keeps spaces as JSON texts inside the JSON file.
+            # Minari stores spaces as JSON strings inside the JSON file.
             "observation_space": json.dumps({"type": "Dict", "subspaces": subspaces}),
             "action_space": json.dumps(_box(bounds[ACTION])),
             "env_spec": json.dumps(_environment(source)),
@@ -76,12 +77,12 @@ def export_minari(source: ExportSource, out: Path) -> dict[str, Any]:
 
 
 def _environment(source: ExportSource) -> dict[str, Any]:
-    """The entries of gymnasium's `EnvSpec`."""
-    gym_id, told = source.environment
-    kwargs = {"step_limit": source.task.settings_type().step_limit, **told}
+    """The fields of gymnasium's `EnvSpec`."""
+    gym_id, arguments = source.environment
+    kwargs = {"step_limit": source.task.settings_type().step_limit, **arguments}
     return {
         "id": gym_id,
-        "entry_point": _ENTRY_POINTS.get(gym_id),  # None: an environment that a task brings is made by its id
+        "entry_point": _ENTRY_POINTS.get(gym_id),  # None: gymnasium makes the environment of another task by its id
         "reward_threshold": None,
         "nondeterministic": False,
         "max_episode_steps": frames(kwargs["step_limit"], source.fps, source.task.spec.record_hz),
@@ -93,8 +94,8 @@ def _environment(source: ExportSource) -> dict[str, Any]:
     }
 
 
-def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
-    # The task's bounds scale the values for training, the world can leave them a little; a space must hold all.
+def _widen(bounds: dict[str, Array], group: h5py.Group) -> None:
+    # The task's bounds scale values for training and can be exceeded slightly; a space must contain all values.
     paths = {feature: f"observations/{name}" for name, feature in OBSERVATION_KEYS.items()} | {ACTION: "actions"}
     for feature, path in paths.items():
         values = np.asarray(group[path])
@@ -102,7 +103,7 @@ def _widen(bounds: dict[str, np.ndarray], group: h5py.Group) -> None:
         bounds[feature] = np.stack((np.minimum(low, values.min(axis=0)), np.maximum(high, values.max(axis=0))))
 
 
-def _box(bounds: np.ndarray) -> dict[str, Any]:
+def _box(bounds: Array) -> dict[str, Any]:
     low, high = bounds
     return {
         "type": "Box", "dtype": "float32", "shape": list(low.shape), "low": low.tolist(), "high": high.tolist(),
@@ -111,7 +112,7 @@ def _box(bounds: np.ndarray) -> dict[str, Any]:
 
 def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> None:
     last = np.arange(len(episode)) == len(episode) - 1
-    # Any other end than those of the task cuts the episode off.
+    # A time-out, or an end that is no termination reason of the task, is a truncation.
     reason = episode.meta["termination_reason"]
     terminated = reason != TIMEOUT and reason in episode.task.spec.reasons
     observations = (
@@ -129,6 +130,6 @@ def _write_episode(group: h5py.Group, number: int, episode: ExportEpisode) -> No
     }
     for name, values in arrays.items():
         group.create_dataset(name, data=values, chunks=True, maxshape=(None, *values.shape[1:]))
-    # Minari's own key: a seed that is not known is none.
+    # Minari reads the attribute `seed`; an unknown seed (-1) is left out.
     columns = {name: value for name, value in episode.meta.items() if name != "seed" or value >= 0}
     group.attrs.update({"id": number, "total_steps": len(episode), "episode_index": episode.index, **columns})

@@ -1,17 +1,17 @@
-"""Exports to a Zarr v2 store as diffusion_policy's ReplayBuffer reads it, with the arrays of the original program.
+"""Exports to a Zarr v2 store that diffusion_policy's ReplayBuffer reads, with the arrays of the original program.
 
-`data/obs`, `data/action`, `data/past_action`, `meta/episode_ends (E,)`; obs is the state followed by the vector of the
-scenario: `(N, 18)` of the table, and actions `(N, 4)`. What a row means is the alignment:
+`data/obs`, `data/action`, `data/past_action`, `meta/episode_ends (E,)`; obs is the state followed by the scenario
+vector: `(N, 18)` for the table, actions `(N, 4)`. The alignment defines a row:
 
-    ours      obs[i] is the state in which action[i] was taken, past_action[i] the action of the row before. A policy
-              that the original's training makes of it acts on what it sees; this is what to train on.
+    ours      obs[i] is the state in which action[i] was taken, past_action[i] the action of the previous row. A policy
+              trained on it with the original program acts on its current observation; use this for training.
     upstream  obs[i] is the state one step of 1/30 s after action[i] began, past_action[i] the action of the step
-              before it, as in the released store: to mix with that store, or to repeat published results, where
-              each observation is paired with the action that produced it.
+              before it, as in the released store: for mixing with that store, or for reproducing published results,
+              which pair each observation with the action that produced it.
 
-For `upstream` a data set at 30 Hz gives all of that exactly (every third step is kept, the store has 10 Hz). One at
-10 Hz holds neither the state one step on, which is integrated under the episode's own physics (the default where it is
-not known), nor the step before, for which the action of the frame before stands in.
+For `upstream`, a data set at 30 Hz gives exact rows (every third step is kept, since the store has 10 Hz). From 10 Hz,
+the state one step later is integrated under the episode's physics (the default if unknown), and past_action is the
+action of the previous frame.
 """
 
 import json
@@ -21,13 +21,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import previous_actions
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError
 from copolicy.dataset.files.staging import new_folder
 from copolicy.dataset.task import TABLE
 from copolicy.dataset.task_spec import RECORD_HZ
 
-from ..upstream.zarr import ZARR_HZ, one_step_on
+from ..upstream.zarr_episodes import ZARR_HZ, advance_one_step
 from .source import ExportEpisode, ExportSource
 
 Alignment = Literal["ours", "upstream"]
@@ -41,9 +42,9 @@ def export_replay_buffer(source: ExportSource, out: Path, alignment: Alignment =
     """Writes the store at `out`; returns facts for the summary.
 
     Raises:
-        InvalidValueError: `upstream` of another task than the table, or of a data set at another rate than 10 or 30 Hz.
+        InvalidValueError: `upstream` for another task than the table, or for a data set not at 10 or 30 Hz.
         MissingExtraError: numcodecs is not installed.
-        OutputExistsError: there is something at `out`.
+        OutputExistsError: `out` exists.
     """
     spec = source.task.spec
     if alignment == "upstream" and spec.name != TABLE:
@@ -80,15 +81,15 @@ def _exact(fps: int, alignment: Alignment) -> bool:
     return alignment == "upstream" and fps == RECORD_HZ
 
 
-def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rows(episode: ExportEpisode, alignment: Alignment) -> tuple[Array, Array, Array]:
     """obs `(T, n)`, action and past_action `(T, m)`."""
     states, actions = episode.states.astype(float), episode.actions.astype(float)
     past = previous_actions(actions)
     if _exact(episode.fps, alignment):
-        kept = slice(None, None, RECORD_HZ // ZARR_HZ)
-        states, actions, past = episode.next_states().astype(float)[kept], actions[kept], past[kept]
+        sampled = slice(None, None, RECORD_HZ // ZARR_HZ)
+        states, actions, past = episode.next_states().astype(float)[sampled], actions[sampled], past[sampled]
     elif alignment == "upstream":
-        states = one_step_on(states, actions, episode.physics)
+        states = advance_one_step(states, actions, episode.settings)
     environment = np.tile(episode.environment.astype(float), (len(states), 1))
     return np.hstack((states, environment)), actions, past
 
@@ -102,7 +103,7 @@ def _write_group(folder: Path) -> None:
     (folder / ".zgroup").write_text(json.dumps({"zarr_format": 2}), encoding="utf-8")
 
 
-def _write_array(folder: Path, array: np.ndarray) -> None:
+def _write_array(folder: Path, array: Array) -> None:
     try:
         from numcodecs.blosc import Blosc
     except ImportError:
@@ -122,7 +123,7 @@ def _write_array(folder: Path, array: np.ndarray) -> None:
     }
     (folder / ".zarray").write_text(json.dumps(metadata, indent=1), encoding="utf-8")
     for number, start in enumerate(range(0, len(array), length)):
-        # Every chunk has the full length; what lies beyond the array's end is not looked at.
+        # Every chunk has the full length; readers ignore rows beyond the end of the array.
         chunk = np.zeros((length, *array.shape[1:]), array.dtype)
         chunk[: len(array) - start] = array[start : start + length]
         name = ".".join([str(number), *"0" * (array.ndim - 1)])

@@ -1,4 +1,4 @@
-"""The episodes of a LeRobot v3 data set, one after the other, for the exporters."""
+"""Reads the episodes of a LeRobot v3 data set one by one, for the exporters."""
 
 import math
 from collections import Counter
@@ -9,62 +9,63 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import stride
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, features_of
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.physics_text import physics_counts, physics_of
+from copolicy.dataset.settings_text import count_settings, parse_settings_text
 from copolicy.dataset.task import PairTask
 
 
 @dataclass(frozen=True, repr=False)
 class ExportEpisode:
-    """One episode as the data set has it: `actions[t]` was taken in `states[t]`.
+    """One stored episode; `actions[t]` was taken in `states[t]`.
 
     Attributes:
-        index: its `episode_index`.
+        index: `episode_index`.
         states: `(T, n)` float32.
-        environment: `(k,)` float32, the vector of the scenario.
-        human_actions: `(T, m / 2)` float32, of the frame before.
+        environment: `(k,)` float32, the scenario vector.
+        human_actions: `(T, m / 2)` float32, of the previous frame.
         actions: `(T, m)` float32.
         rewards: `(T,)` float32.
-        meta: its episode columns.
-        fps: frames a second.
-        physics: what led from state to state; the default where the data set does not say.
-        task: that it is of.
+        meta: the episode columns.
+        fps: frames per second.
+        settings: world settings of the episode, the default if unknown.
+        task: task of the episode.
     """
 
     index: int
-    states: np.ndarray
-    environment: np.ndarray
-    human_actions: np.ndarray
-    actions: np.ndarray
-    rewards: np.ndarray
+    states: Array
+    environment: Array
+    human_actions: Array
+    actions: Array
+    rewards: Array
     meta: dict[str, Any]
     fps: int
-    physics: Any
+    settings: Any
     task: PairTask
 
     def __len__(self) -> int:
         return len(self.actions)
 
-    def final_state(self) -> np.ndarray:
-        """`(n,)` float32, the state that the last action led to.
+    def final_state(self) -> Array:
+        """The state `(n,)` float32 after the last action.
 
-        The data set ends with the last action, so that it is integrated from the last state over the steps that
-        `duration_s` leaves for the last frame, under the episode's own physics.
+        It is not stored: it is integrated from the last state, under the episode's settings, over the steps of the last
+        frame, which follow from `duration_s`.
         """
         record_hz = self.task.spec.record_hz
         step, seconds = stride(self.fps, record_hz), self.meta["duration_s"]
         steps = round(seconds * record_hz) - step * (len(self) - 1) if math.isfinite(seconds) else step
-        held = np.repeat(self.actions[-1:].astype(float), min(max(steps, 1), step), axis=0)
+        actions = np.repeat(self.actions[-1:].astype(float), min(max(steps, 1), step), axis=0)
         scenario = self.task.scenario_of_vector(self.environment, self.meta)
-        return self.task.integrate(scenario, self.physics, self.states[-1], held)[-1].astype(np.float32)
+        return self.task.integrate(scenario, self.settings, self.states[-1], actions)[-1].astype(np.float32)
 
-    def next_states(self) -> np.ndarray:
-        """`(T, n)` float32, the state of the following frame."""
+    def next_states(self) -> Array:
+        """The states `(T, n)` float32 of the next frames."""
         return np.vstack((self.states[1:], self.final_state()))
 
 
@@ -73,16 +74,15 @@ class ExportSource:
     """A data set to export.
 
     Attributes:
-        hold: how a frame's action was made of its steps.
+        downsampling: how the action of a frame was computed from its steps.
         splits: ranges of `episode_index` by name.
-        rows: one dict an exported episode: `episode_index`, `length` and the episode columns.
-        left_out: discarded episodes that are not exported.
-        task: that the episodes are of.
+        rows: one dict per exported episode: `episode_index`, `length` and the episode columns.
+        left_out: number of discarded episodes that are not exported.
     """
 
     root: Path
     fps: int
-    hold: str
+    downsampling: str
     splits: dict[str, range]
     rows: tuple[dict[str, Any], ...]
     left_out: int
@@ -93,17 +93,17 @@ class ExportSource:
         """Reads the metadata of a data set.
 
         Args:
-            keep_discarded: export, too, what its operator discarded or `copolicy-dataset exclude` flagged.
+            keep_discarded: also export episodes that the operator or `copolicy-dataset exclude` flagged as discarded.
 
         Raises:
             FileFormatError: no LeRobot v3 data set.
-            RunError: no episode is left.
+            RunError: no episode remains.
         """
         folder = LeRobotFolder.open(root)
         task, info = folder.task, folder.info
         folder.require_task(tuple(features_of(task.spec)))
         record_hz = task.spec.record_hz
-        fps, hold = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))
+        fps, downsampling = info["fps"], str(info["features"][ACTION].get("hold", "unknown"))
         if fps != int(fps):
             raise FileFormatError(root / INFO_FILE, f"a rate that divides {record_hz}", str(fps))
         fps = int(fps)
@@ -112,65 +112,65 @@ class ExportSource:
         rows = folder.rows()
         for row in rows:
             try:
-                physics_of(row["physics"], task)
+                parse_settings_text(row["physics"], task)
             except InvalidValueError as error:
                 raise FileFormatError(root, f"the settings of episode {row['episode_index']}", str(error)) from None
-        kept = tuple(row for row in rows if keep_discarded or not row["discarded"])
-        if not kept:
+        exported = tuple(row for row in rows if keep_discarded or not row["discarded"])
+        if not exported:
             raise RunError(f"{root}: expected an episode to export, found {len(rows)}, all discarded")
-        return cls(root, fps, hold, splits, kept, len(rows) - len(kept), folder)
+        return cls(root, fps, downsampling, splits, exported, len(rows) - len(exported), folder)
 
     @property
     def frames(self) -> int:
-        """Frames of the exported episodes."""
+        """Number of exported frames."""
         return sum(row["length"] for row in self.rows)
 
     def facts(self) -> dict[str, Any]:
-        """What every exported file says of where it comes from."""
+        """Facts about the data set that every export stores."""
         sources = Counter(row["source"] for row in self.rows)
         licenses = sorted({row["license"] for row in self.rows} - {""})
         return {
             "format_of_origin": f"LeRobot v3, copolicy {self.task.spec.title}",
             "fps": self.fps,
-            "hold": self.hold,
+            "hold": self.downsampling,
             "sources": dict(sorted(sources.items())),
             "simulated": bool(sources["simulated"]),
             "licenses": licenses,
-            "physics": physics_counts((row["physics"] for row in self.rows), self.task),
+            "physics": count_settings((row["physics"] for row in self.rows), self.task),
         }
 
     @property
     def environment(self) -> tuple[str, dict[str, Any]]:
-        """Id of the environment, and what it must be told to go on as the episodes did, beside its defaults.
+        """Id of the gymnasium environment, and the arguments that reproduce the episodes' rate and settings.
 
-        A setting in which the episodes differ keeps its default; `facts` says which physics they have.
+        A setting that differs between episodes keeps its default; `facts` lists the settings of the episodes.
         """
         default: Any = self.task.settings_type()
-        settings = [physics_of(row["physics"], self.task) or default for row in self.rows]
-        others = {}
+        settings = [parse_settings_text(row["physics"], self.task) or default for row in self.rows]
+        common = {}
         for setting in fields(default):
-            values = {getattr(physics, setting.name) for physics in settings}
+            values = {getattr(episode_settings, setting.name) for episode_settings in settings}
             if len(values) == 1 and values != {getattr(default, setting.name)}:
-                others[setting.name] = values.pop()
-        gym_id, kwargs = self.task.environment(others)
+                common[setting.name] = values.pop()
+        gym_id, kwargs = self.task.environment(common)
         return gym_id, {"fps": self.fps, **kwargs}
 
     def episodes(self) -> Iterator[ExportEpisode]:
         """The exported episodes in order; one data file is in memory at a time.
 
         Raises:
-            FileFormatError: the frames are not those that the metadata tells of.
+            FileFormatError: the frames contradict the metadata.
         """
-        wanted = {row["episode_index"]: row for row in self.rows}
+        rows = {row["episode_index"]: row for row in self.rows}
         names = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION, "next.reward")
         features = features_of(self.task.spec)
-        for index, part in self._folder.frames({name: features[name]["shape"] for name in names}):
-            if index in wanted:
-                row = wanted[index]
-                physics = physics_of(row["physics"], self.task) or self.task.settings_type()
+        for index, frames in self._folder.frames({name: features[name]["shape"] for name in names}):
+            if index in rows:
+                row = rows[index]
+                settings = parse_settings_text(row["physics"], self.task) or self.task.settings_type()
                 yield ExportEpisode(
-                    index, part[STATE], part[ENVIRONMENT_STATE][0], part[HUMAN_ACTION], part[ACTION],
-                    part["next.reward"], {name: row[name] for name in EPISODE_COLUMNS}, self.fps, physics, self.task,
+                    index, frames[STATE], frames[ENVIRONMENT_STATE][0], frames[HUMAN_ACTION], frames[ACTION],
+                    frames["next.reward"], {name: row[name] for name in EPISODE_COLUMNS}, self.fps, settings, self.task,
                 )  # fmt: skip
 
     @property

@@ -1,9 +1,8 @@
-"""The data files of a LeRobot v3 data set: a row group an episode."""
+"""Writes the data files of a LeRobot v3 data set, one row group per episode."""
 
 from pathlib import Path
 
-import numpy as np
-
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import MissingExtraError
 
 from ..numbered_files import NumberedFiles
@@ -11,7 +10,6 @@ from ..numbered_files import NumberedFiles
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
-
     from lerobot.datasets.feature_utils import get_hf_features_from_features
     from lerobot.datasets.utils import DEFAULT_DATA_PATH
 except ImportError as error:
@@ -25,8 +23,8 @@ class FrameFiles(NumberedFiles):
         super().__init__(root, DEFAULT_DATA_PATH, file_mb, chunks_size)
         self._schema = get_hf_features_from_features(features).arrow_schema
 
-    def append(self, columns: dict[str, np.ndarray]) -> dict[str, int]:
-        """Adds an episode's columns, `(T,)` or `(T, n)`; returns the columns of meta/episodes that say where."""
+    def append(self, columns: dict[str, Array]) -> dict[str, int]:
+        """Appends an episode's columns, `(T,)` or `(T, n)`; returns its data file columns of meta/episodes."""
         if self._writer is not None and self._path.stat().st_size >= self._limit:
             self._next()
         if self._writer is None:
@@ -34,7 +32,7 @@ class FrameFiles(NumberedFiles):
         self._writer.write_table(self._table(columns))
         return {"data/chunk_index": self._chunk, "data/file_index": self._file}
 
-    def _table(self, columns: dict[str, np.ndarray]) -> "pa.Table":
+    def _table(self, columns: dict[str, Array]) -> "pa.Table":
         arrays = []
         for field in self._schema:
             values = columns[field.name]

@@ -1,5 +1,4 @@
-"""Everything about an episode that can be worked out without knowing its place in the data set, and whether it
-belongs into one."""
+"""Prepares episodes for a data set: everything that does not depend on their position in it."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -7,14 +6,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.arrays import Array
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import Episode, EpisodeMeta
 from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, RunError
 from copolicy.dataset.features import STATE
 from copolicy.dataset.task import get_task
 
 from ..column_statistics import episode_statistics
-from .frames import frame_columns
+from .frame_columns import frame_columns
 
 if TYPE_CHECKING:
     from ..video.scene_video import SceneClip
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conversion:
-    """How episodes become frames.
+    """Options of the conversion from recorded steps to frames.
 
     Attributes:
-        fps: frames a second, a divisor of 30.
-        hold: how the actions of a frame's steps become one.
-        license: filled in where an episode states none.
+        fps: frames per second, a divisor of the recording rate.
+        downsampling: how the actions of a frame's steps become one.
+        license: licence of episodes that state none.
         keep_discarded: keep episodes that the operator discarded.
-        drift: re-simulate each episode that does not say how far its replay drifts.
-        video: width and height (px) of the pictures to draw of each frame; None for no video.
+        drift: compute `replay_drift_px` by re-simulation where an episode does not state it.
+        video: width and height (px) of the images drawn of each frame; None for no video.
     """
 
     fps: int = 10
-    hold: Hold = "mean"
+    downsampling: Downsampling = "mean"
     license: str = ""
     keep_discarded: bool = False
     drift: bool = True
@@ -43,15 +43,15 @@ class Conversion:
 
 @dataclass(frozen=True)
 class PreparedEpisode:
-    """Frames, their statistics, the row of meta/episodes, and the film if one was asked for.
+    """An episode ready to be written: frames, their statistics, episode columns, and its video if requested.
 
     Attributes:
-        origin: the file that the episode was read from, for messages; no part of the data set.
+        origin: the file that the episode was read from, for messages; not written.
         task: name of its task.
     """
 
-    columns: dict[str, np.ndarray]
-    statistics: dict[str, dict[str, np.ndarray]]
+    columns: dict[str, Array]
+    statistics: dict[str, dict[str, Array]]
     meta: EpisodeMeta
     notes: tuple[str, ...] = ()
     scene: "SceneClip | None" = None
@@ -65,8 +65,8 @@ class PreparedEpisode:
 
 
 @dataclass(frozen=True)
-class NotPrepared:
-    """An episode that stays outside, by the name of its file."""
+class SkippedEpisode:
+    """An episode that is not written, by the name of its file."""
 
     name: str
     reason: Literal["damaged", "discarded"]
@@ -74,43 +74,43 @@ class NotPrepared:
 
 
 @dataclass
-class LeftOut:
-    """Names of the episodes that are not in a data set, and what is wrong with the damaged ones."""
+class SkipReport:
+    """Names of the skipped episodes, and the error messages of the damaged ones."""
 
     damaged: list[str] = field(default_factory=list)
     discarded: list[str] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
 
     def record(self) -> dict[str, list[str]]:
-        """The names alone: messages hold paths of the machine."""
+        """The names without the messages, which hold local paths."""
         return {"damaged": self.damaged, "discarded": self.discarded}
 
 
 class RepeatedEpisodeError(RunError):
-    """Two files hold one episode."""
+    """Two files hold the same episode."""
 
     def __init__(self, episode_uuid: str, first: str, second: str):
-        same = "twice there" if first == second else f"also in {first}"
+        repetition = "twice" if first == second else f"also in {first}"
         super().__init__(
-            f"{second}: expected every episode once, found episode {episode_uuid} {same}; nothing was written"
+            f"{second}: expected every episode once, found episode {episode_uuid} {repetition}; nothing was written"
         )
 
 
 class DamagedEpisodeError(RunError):
-    """A file that holds no usable episode, where none may be left out."""
+    """A file holds no usable episode, and `skip_damaged` is off."""
 
     def __init__(self, message: str):
-        super().__init__(f"{message}; nothing was written (--skip-damaged leaves such files out)")
+        super().__init__(f"{message}; nothing was written (--skip-damaged skips such files)")
 
 
 def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode:
-    """Frames with their statistics, and the episode's columns completed.
+    """Computes the frames of an episode, their statistics and the missing episode columns.
 
     Raises:
-        InvalidValueError: the episode cannot be had at this rate (see `frame_columns`).
-        MissingExtraError: a video is asked for and lerobot is not installed.
+        InvalidValueError: the episode cannot be converted to this rate (see `frame_columns`).
+        MissingExtraError: a video is requested and lerobot is not installed.
     """
-    columns = frame_columns(episode, conversion.fps, conversion.hold)
+    columns = frame_columns(episode, conversion.fps, conversion.downsampling)
     meta = episode.meta
     if not meta.license:
         meta = replace(meta, license=conversion.license)
@@ -120,23 +120,22 @@ def prepare_episode(episode: Episode, conversion: Conversion) -> PreparedEpisode
     if conversion.video is None:
         return PreparedEpisode(columns, statistics, meta, episode.notes, task=episode.task)
 
-    # They load what a conversion without a video never needs.
+    # Imported here: a conversion without video does not need PyAV.
     from ..video.scene_video import SCENE, scene_clip
 
     task = get_task(episode.task)
     images = task.images(episode.scenario, columns[STATE], conversion.video)
     if images is None:
-        raise InvalidValueError("--video", "a task that is drawn", task.missing("artist"))
+        raise InvalidValueError("--video", "a task with an artist", task.missing("artist"))
     clip = scene_clip(images, conversion.fps, conversion.video)
     statistics = {**statistics, SCENE: clip.statistics}
     return PreparedEpisode(columns, statistics, meta, episode.notes, clip, task=episode.task)
 
 
 def replay_drift(episode: Episode) -> float:
-    """Largest distance between the path recorded and the one that the actions give from the first state on; of the
-    table in px.
+    """Largest distance between the recorded path and the path simulated from the first state with the actions.
 
-    NaN where not every recorded action was stored, or the task tracks no point.
+    In the task's unit of length (table: px). NaN if not every recorded action was stored, or the task tracks no point.
     """
     task, path = get_task(episode.task), episode.path
     if path is None or episode.fps != task.spec.record_hz or not len(episode.actions):
@@ -145,28 +144,27 @@ def replay_drift(episode: Episode) -> float:
     return float(np.linalg.norm(replayed - path, axis=1).max())
 
 
-def prepare_from(
+def read_and_prepare(
     name: str, read: Callable[[], Episode], conversion: Conversion, origin: str | None = None
-) -> PreparedEpisode | NotPrepared:
-    """Reads and prepares an episode; a damaged or discarded one is reported, not raised, so that the result can
-    cross from one process to another.
+) -> PreparedEpisode | SkippedEpisode:
+    """Reads and prepares an episode; returns a damaged or discarded one as `SkippedEpisode` instead of raising.
 
     Args:
-        origin: path of the file, where `name` alone does not tell two files apart.
+        origin: path of the file, where `name` alone is ambiguous.
     """
     try:
         episode = read()
         if episode.meta.discarded and not conversion.keep_discarded:
-            return NotPrepared(name, "discarded")
+            return SkippedEpisode(name, "discarded")
         return replace(prepare_episode(episode, conversion), origin=origin or name)
     except CopolicyError as error:
-        return NotPrepared(name, "damaged", str(error))
+        return SkippedEpisode(name, "damaged", str(error))
 
 
 def admit(
-    results: Iterable[PreparedEpisode | NotPrepared], skip_damaged: bool, left_out: LeftOut
+    results: Iterable[PreparedEpisode | SkippedEpisode], skip_damaged: bool, skipped: SkipReport
 ) -> Iterator[PreparedEpisode]:
-    """The prepared episodes; the others are noted in `left_out`.
+    """Yields the prepared episodes and adds the skipped ones to `skipped`.
 
     Raises:
         DamagedEpisodeError: an episode is damaged and `skip_damaged` is off.
@@ -175,9 +173,9 @@ def admit(
         if isinstance(result, PreparedEpisode):
             yield result
         elif result.reason == "discarded":
-            left_out.discarded.append(result.name)
+            skipped.discarded.append(result.name)
         elif skip_damaged:
-            left_out.damaged.append(result.name)
-            left_out.messages.append(result.message)
+            skipped.damaged.append(result.name)
+            skipped.messages.append(result.message)
         else:
             raise DamagedEpisodeError(result.message)

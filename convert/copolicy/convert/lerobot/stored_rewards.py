@@ -1,4 +1,4 @@
-"""Whether the rewards in a data set are those that this version gives."""
+"""Compares the rewards stored in a data set with the definition of this version."""
 
 import math
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ from copolicy.dataset.task import PairTask
 
 _REWARD = "next.reward"
 _TOLERANCE = 1e-3  # rewards and positions are stored in single precision
-_FRAMES = 500  # of a file that are looked at
+_FRAMES = 500  # frames compared per file
 
 
-def foreign_rewards(roots: Sequence[Path]) -> list[str]:
-    """A line for each data set whose rewards follow another definition; some frames are looked at.
+def reward_differences(roots: Sequence[Path]) -> list[str]:
+    """Returns a line for each data set whose rewards follow another definition; compares a sample of frames.
 
     Raises:
         FileFormatError: a data file is not complete.
@@ -36,22 +36,22 @@ def foreign_rewards(roots: Sequence[Path]) -> list[str]:
 
 
 def _largest_error(path: Path, task: PairTask) -> float:
-    """The reward of a frame is that of the state that follows; what follows an episode's last one is not stored."""
+    """Compares each sampled frame but an episode's last: its reward is that of the next state."""
     table = read_parquet(path).sort_by("index")
     episodes, index = (table.column(name).to_numpy() for name in ("episode_index", "index"))
     followed = np.flatnonzero((np.diff(episodes) == 0) & (np.diff(index) == 1))
-    places = followed[:: max(1, len(followed) // _FRAMES)]
-    rows = table.take(places).select([ENVIRONMENT_STATE, _REWARD]).to_pylist()
-    states = table.take(places + 1).column(STATE).to_pylist()
+    sampled = followed[:: max(1, len(followed) // _FRAMES)]
+    rows = table.take(sampled).select([ENVIRONMENT_STATE, _REWARD]).to_pylist()
+    states = table.take(sampled + 1).column(STATE).to_pylist()
     largest = 0.0
     for row, state in zip(rows, states, strict=True):
         try:
             scenario = task.scenario_of_vector(np.array(row[ENVIRONMENT_STATE]), {})
         except InvalidValueError:
-            continue  # no scenario of this task, which the checks name
+            continue  # no scenario of this task: the checks report it
         (stored,) = np.ravel(row[_REWARD])
-        (given,) = task.rewards(scenario, np.array([state]))
-        error = abs(float(given) - float(stored))
+        (expected,) = task.rewards(scenario, np.array([state]))
+        error = abs(float(expected) - float(stored))
         if not math.isfinite(error):
             return math.inf
         largest = max(largest, error)

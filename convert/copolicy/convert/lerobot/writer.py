@@ -1,7 +1,7 @@
-"""Writes a LeRobot v3 data set in one go: whole episodes as row groups, metadata once at the end.
+"""Writes a LeRobot v3 data set in one pass: whole episodes as row groups, metadata once at the end.
 
-LeRobot's own `add_frame` / `save_episode` spends most of its time on images that are not there, rewrites the
-metadata at every episode, and loses the set when it is interrupted. The files are the same, row for row.
+LeRobot's `add_frame` / `save_episode` spends most of its time on image handling even without images, rewrites the
+metadata at every episode, and loses the data set if interrupted. The files are the same, row for row.
 """
 
 import json
@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from copolicy.dataset.clock import Hold
+from copolicy.dataset.arrays import Array
+from copolicy.dataset.clock import Downsampling
 from copolicy.dataset.episode import EPISODE_COLUMNS
 from copolicy.dataset.exceptions import MissingExtraError, RunError
 from copolicy.dataset.features import ACTION, features_of
@@ -36,7 +38,6 @@ from .prepare import PreparedEpisode, RepeatedEpisodeError
 try:
     import pyarrow as pa
     import pyarrow.parquet as pq
-
     from lerobot.datasets.compute_stats import aggregate_stats
     from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
     from lerobot.datasets.io_utils import write_info, write_stats
@@ -49,19 +50,19 @@ _ARROW_TYPES = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "b
 
 @dataclass(frozen=True)
 class WrittenDataset:
-    """What was written."""
+    """Facts about a written data set."""
 
     root: Path
     repo_id: str
     fps: int
-    hold: Hold
+    hold: Downsampling  # named like its key of the summary
     episodes: int
     frames: int
     successes: int
     mixtures: Mixtures
 
-    def summary(self) -> dict:
-        """For the end of a command."""
+    def summary(self) -> dict[str, Any]:
+        """Entries of a command's summary."""
         facts = {name: value for name, value in vars(self).items() if name != "mixtures"}
         return {**facts, "root": str(self.root), **self.mixtures.summary()}
 
@@ -71,43 +72,42 @@ def write_dataset(
     root: Path,
     repo_id: str,
     fps: int,
-    hold: Hold,
+    downsampling: Downsampling,
     record: Callable[[], dict],
     data_file_mb: int | None = None,
     video_file_mb: int | None = None,
 ) -> WrittenDataset:
     """Writes the episodes, in their order, as a LeRobot v3 data set at `root`.
 
-    How actions were held is an extra key of the feature `action` in meta/info.json, where it survives loading,
-    pushing, splitting and editing and keeps sets of different holds from being merged. The rest of `record`
-    (versions, sources, what was left out, notes by episode), and the spec of the task, which the robot type in
-    info.json names, is in meta/copolicy.json: extra keys at the top of
-    info.json do not survive, and inside a feature they would keep sets of different versions from being merged.
+    The downsampling is stored as the extra key `hold` of the feature `action` in meta/info.json: LeRobot preserves it
+    and refuses to merge data sets that differ in it. `record` (versions, sources, skipped episodes, notes by episode)
+    and the task spec go to meta/copolicy.json (the robot type in info.json names the task): LeRobot drops extra keys at
+    the top of info.json, and inside a feature they would prevent merging data sets of different versions.
 
     Args:
-        episodes: consumed one by one; all have a film, or none has.
-        record: JSON-able facts about the conversion, asked for once all episodes are consumed.
-        data_file_mb: size of a data file after which the next is begun, LeRobot's default if None.
-        video_file_mb: the same for a video file.
+        episodes: consumed one by one; all have a video, or none has.
+        record: returns JSON-able facts about the conversion; called once all episodes are consumed.
+        data_file_mb: size limit of a data file, LeRobot's default if None.
+        video_file_mb: size limit of a video file, LeRobot's default if None.
 
     Raises:
-        OutputExistsError: there is something at `root`; nothing is touched.
-        RunError: no episodes, episodes of several tasks, or two with the same episode_uuid; nothing is left behind.
+        OutputExistsError: `root` exists; it is not changed.
+        RunError: no episodes, episodes of several tasks, or two with the same episode_uuid; nothing is written.
     """
     with new_folder(root) as partial:
-        remaining = iter(episodes)
-        first = next(remaining, None)
+        iterator = iter(episodes)
+        first = next(iterator, None)
         if first is None:
             raise RunError(f"{root}: expected at least one episode to write, found none")
         task = get_task(first.task)
         spec = task.spec
-        features = _features(spec, hold, first)
+        features = _features(spec, downsampling, first)
         meta = LeRobotDatasetMetadata.create(
             repo_id, fps, features, robot_type(spec.name), partial, use_videos=SCENE in features,
             data_files_size_in_mb=data_file_mb, video_files_size_in_mb=video_file_mb,
         )  # fmt: skip
         meta.save_episode_tasks([spec.sentence])
-        rows, statistics, notes = _write_data(chain((first,), remaining), spec, meta)
+        rows, statistics, notes = _write_data(chain((first,), iterator), spec, meta)
         _write_episodes(rows, statistics, partial)
         meta.info.total_episodes, meta.info.total_frames = len(rows), rows[-1]["dataset_to_index"]
         meta.info.total_tasks, meta.info.splits = 1, {"train": f"0:{len(rows)}"}
@@ -115,28 +115,28 @@ def write_dataset(
             meta.update_video_info(SCENE, scene_encoder(fps))
         write_info(meta.info, partial)
         write_stats(aggregate_stats(statistics), partial)
-        text = json.dumps({**record(), "task": spec.to_dict(), "fps": fps, "hold": hold, "notes": notes}, indent=2)
-        (partial / RECORD_FILE).write_text(text + "\n", encoding="utf-8")
+        document = {**record(), "task": spec.to_dict(), "fps": fps, "hold": downsampling, "notes": notes}
+        (partial / RECORD_FILE).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
         write_minimal_card(partial / CARD_FILE, {row["license"] for row in rows}, spec.name)
     _warn_of_licences(root, rows)
-    successes = sum(row["success"] for row in rows)
-    frames = rows[-1]["dataset_to_index"]
-    return WrittenDataset(root, repo_id, fps, hold, len(rows), frames, successes, Mixtures.of(rows, task))
+    successes, frames = sum(row["success"] for row in rows), rows[-1]["dataset_to_index"]
+    mixtures = Mixtures.from_rows(rows, task)
+    return WrittenDataset(root, repo_id, fps, downsampling, len(rows), frames, successes, mixtures)
 
 
 def _warn_of_licences(root: Path, rows: list[dict]) -> None:
-    """Recordings say what they say; that a card will refuse it is told before the data set is worked with."""
+    """Warns of licences that are no identifier of the Hub, since `copolicy-cards` will refuse them later."""
     unlisted = Counter(row["license"] for row in rows if row["license"] and not licence_identifier(row["license"]))
     for licence, count in unlisted.items():
         logging.warning(
-            "warning: %s: %d episodes state the licence %r, which is none of the Hub's identifiers: "
-            "a card will refuse it", root, count, licence,
+            "warning: %s: %d episodes state the licence %r, which is no identifier of the Hub: "
+            "copolicy-cards will refuse it", root, count, licence,
         )  # fmt: skip
 
 
-def _features(spec: TaskSpec, hold: Hold, example: PreparedEpisode) -> dict[str, dict]:
+def _features(spec: TaskSpec, downsampling: Downsampling, example: PreparedEpisode) -> dict[str, dict]:
     features = features_of(spec)
-    action = {**features[ACTION], "hold": hold, "record_hz": spec.record_hz}
+    action = {**features[ACTION], "hold": downsampling, "record_hz": spec.record_hz}
     video = {SCENE: scene_feature(example.scene.size)} if example.scene else {}
     return {**features, ACTION: action, **video}
 
@@ -144,7 +144,7 @@ def _features(spec: TaskSpec, hold: Hold, example: PreparedEpisode) -> dict[str,
 def _write_data(
     episodes: Iterable[PreparedEpisode], spec: TaskSpec, meta
 ) -> tuple[list[dict], list[dict], dict[str, list[str]]]:
-    """Rows of meta/episodes without statistics, statistics of every episode, and notes by episode."""
+    """Writes data and video files; returns rows of meta/episodes, statistics of every episode, and notes by episode."""
     rows: list[dict] = []
     statistics: list[dict] = []
     notes: dict[str, list[str]] = {}
@@ -156,8 +156,8 @@ def _write_data(
     ):
         for index, episode in enumerate(episodes):
             if episode.task != spec.name:
-                found = f"one of {episode.task!r}"
-                raise RunError(f"{episode.origin}: expected an episode of the task {spec.name!r}, found {found}")
+                expected = f"an episode of the task {spec.name!r}"
+                raise RunError(f"{episode.origin}: expected {expected}, found one of {episode.task!r}")
             uuid = episode.meta.episode_uuid
             if uuid in origins:
                 raise RepeatedEpisodeError(uuid, origins[uuid], episode.origin or f"episode {index}")
@@ -185,7 +185,7 @@ def _write_data(
     return rows, statistics, notes
 
 
-def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, np.ndarray]:
+def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, Array]:
     order = np.arange(frames)
     return {
         "timestamp": (order / fps).astype(np.float32),
@@ -199,12 +199,14 @@ def _clock_columns(index: int, start: int, frames: int, fps: int) -> dict[str, n
 def _write_episodes(rows: list[dict], statistics: list[dict], root: Path) -> None:
     columns = {}
     for name in rows[0]:
-        kind = EPISODE_COLUMNS.get(name)
-        # A number that is not known is no number: every reader of tables takes null for that.
-        columns[name] = pa.array([row[name] for row in rows], _ARROW_TYPES[kind] if kind else None, from_pandas=True)
-    for feature, kinds in statistics[0].items():
-        for kind in kinds:
-            columns[f"stats/{feature}/{kind}"] = pa.array([entry[feature][kind].tolist() for entry in statistics])
+        column_type = _ARROW_TYPES.get(EPISODE_COLUMNS.get(name, ""))
+        # NaN (unknown) becomes null, which every parquet reader understands.
+        columns[name] = pa.array([row[name] for row in rows], column_type, from_pandas=True)
+    for feature, values in statistics[0].items():
+        for statistic in values:
+            columns[f"stats/{feature}/{statistic}"] = pa.array(
+                [entry[feature][statistic].tolist() for entry in statistics]
+            )
     path = root / DEFAULT_EPISODES_PATH.format(chunk_index=0, file_index=0)
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=True)

@@ -1,1 +1,1 @@
-"""Several data sets of this project, of several labs perhaps, as one."""
+"""Merges several data sets of this project, for example of several labs, to one."""

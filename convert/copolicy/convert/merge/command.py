@@ -2,17 +2,18 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import DATASETS
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.publication.repo_id import checked_repo_id
 
 
-def add_merge_command(commands: argparse._SubParsersAction) -> None:
+def add_merge_command(commands: Commands) -> None:
     """Adds `merge`."""
     parser = add_command(
-        commands, "merge", _merge, "join LeRobot data sets of this project, such as those of two labs, to one",
+        commands, "merge", _merge, "merge LeRobot data sets of this project, such as those of two labs",
         "copolicy-convert merge lab_a/table lab_b/table --prefix-people kth tudelft --out both --repo-id me/both",
         DATASETS,
     )  # fmt: skip
@@ -22,16 +23,16 @@ def add_merge_command(commands: argparse._SubParsersAction) -> None:
     people = parser.add_mutually_exclusive_group()
     people.add_argument(
         "--prefix-people", nargs="+", metavar="LAB",
-        help="one name a data set, put before its pseudonyms, session and consent ids: P01 becomes LAB-P01",
+        help="one prefix per data set for its pseudonyms, session and consent ids: P01 becomes LAB-P01",
     )  # fmt: skip
     people.add_argument(
         "--same-people", action="store_true",
-        help="a pseudonym in several of the data sets is the same person (sessions of one lab)",
+        help="a pseudonym that occurs in several data sets is the same person (sessions of one lab)",
     )  # fmt: skip
 
 
-def _merge(arguments: argparse.Namespace) -> dict:
-    from .merging import merge_datasets
+def _merge(arguments: argparse.Namespace) -> dict[str, Any]:
+    from .merge_datasets import merge_datasets
 
     if len(arguments.roots) < 2:
         raise InvalidValueError("PATH", "at least two data sets", len(arguments.roots))

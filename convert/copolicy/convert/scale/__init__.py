@@ -1,4 +1,4 @@
-"""Thousands of recordings in shards, each restartable, run by datatrove here, on SLURM or on Ray.
+"""Converts thousands of recordings in restartable shards, with datatrove: locally, on SLURM or on Ray.
 
-`command.convert_in_shards` does it; this file imports nothing, so that a conversion without shards stays quick.
+Imports nothing: a conversion without shards must not load datatrove.
 """

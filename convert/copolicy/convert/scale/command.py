@@ -1,4 +1,4 @@
-"""`copolicy-convert mcap --workers N`: flags, and the way from recordings to the merged data set."""
+"""`copolicy-convert mcap` in shards: the flags, and the conversion of recordings to the merged data set."""
 
 import argparse
 import shutil
@@ -14,25 +14,25 @@ from copolicy.dataset.files.staging import require_new
 
 from ..lerobot.prepare import Conversion
 from ..recordings import find_recordings, require_rate
-from .plan import LOCK_FILE, ShardPlan, absolute
+from .shard_plan import LOCK_FILE, ShardPlan, absolute
 
 SHARD_EPISODES = 500
-"""Recordings in a shard where none is asked for: seconds of work that a kill can lose, few parts to merge."""
+"""Default number of recordings in a shard: a killed process loses seconds of work, and few parts are merged."""
 
 _EXECUTORS = ("local", "slurm", "ray")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How the work is spread.
+    """How a conversion in shards is distributed.
 
     Attributes:
         executor: `local`, `slurm` or `ray`.
-        workers: shards at a time; None for one here, for all on a cluster.
+        workers: number of shards converted at a time; None for one locally, for all on a cluster.
         shard_episodes: recordings in a shard.
-        folder: where shards are kept; by default beside the data set, until it is complete.
-        statistics: compute the statistics of the data set, too.
-        slurm: of the jobs.
+        folder: where shards are kept; by default beside the data set until it is complete.
+        statistics: also compute the statistics of the data set.
+        slurm: arguments of `SlurmOptions`.
     """
 
     executor: str = "local"
@@ -47,47 +47,47 @@ def add_scale_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of a conversion in shards."""
     group = parser.add_argument_group(
         "many recordings",
-        "With one of these flags, recordings are converted in shards that are finished or not there at all, and merged "
-        "at the end: after an interruption the same call goes on. --workers alone makes shards of more than "
-        f"{SHARD_EPISODES} recordings only; fewer are read by that many processes and written in one go.",
+        "With one of these flags, recordings are converted in shards, which are merged at the end; after an "
+        "interruption, the same call continues with the unfinished shards. --workers alone uses shards for more than "
+        f"{SHARD_EPISODES} recordings only; fewer are read by N processes and written in one pass.",
     )
     group.add_argument(
         "--workers",
         type=whole_number("--workers", None, 1024),
         metavar="N",
-        help="shards at a time (default: 1; on a cluster: all)",
+        help="number of shards converted at a time (default: 1; on a cluster: all)",
     )
-    group.add_argument("--executor", choices=_EXECUTORS, help="where shards are made (default: local)")
+    group.add_argument("--executor", choices=_EXECUTORS, help="where shards are converted (default: local)")
     group.add_argument(
         "--shard-episodes",
         type=whole_number("--shard-episodes", None),
         metavar="N",
-        help=f"in each (default: {SHARD_EPISODES})",
+        help=f"recordings in a shard (default: {SHARD_EPISODES})",
     )
     group.add_argument(
         "--shards", type=Path, metavar="FOLDER",
-        help="keep shards and findings there (default: beside OUT, until it is complete)",
+        help="keep shards and findings in FOLDER (default: beside OUT until OUT is complete)",
     )  # fmt: skip
-    group.add_argument("--stats", action="store_true", help="compute meta/copolicy_stats.json, too")
-    group.add_argument("--partition", help="of SLURM")
-    group.add_argument("--time", metavar="HH:MM:SS", help="limit of a shard's SLURM job (default: 01:00:00)")
-    group.add_argument("--memory-gb", type=whole_number("--memory-gb"), metavar="N", help="of a SLURM job (default: 4)")
+    group.add_argument("--stats", action="store_true", help="also compute meta/copolicy_stats.json")
+    group.add_argument("--partition", help="SLURM partition")
+    group.add_argument("--time", metavar="HH:MM:SS", help="time limit of a shard's SLURM job (default: 01:00:00)")
+    group.add_argument("--memory-gb", type=whole_number("--memory-gb"), metavar="N", help="per SLURM job (default: 4)")
     group.add_argument(
-        "--setup", metavar="COMMAND", help="makes this environment active in a SLURM job (default: this virtual one)"
+        "--setup", metavar="COMMAND", help="activates the environment of a SLURM job (default: this virtual one)"
     )
     group.add_argument(
         "--sbatch", action="append", metavar="KEY=VALUE", help="further option of sbatch, such as account=lab"
     )
 
 
-def asks_for_shards(arguments: argparse.Namespace) -> bool:
-    """Whether a flag asks for shards, however many recordings there are."""
-    asked = (arguments.executor, arguments.shard_episodes, arguments.shards, arguments.stats or None)
-    return any(value is not None for value in asked)
+def shards_requested(arguments: argparse.Namespace) -> bool:
+    """Whether a flag requests shards for any number of recordings."""
+    flags = (arguments.executor, arguments.shard_episodes, arguments.shards, arguments.stats or None)
+    return any(value is not None for value in flags)
 
 
-def scale_of(arguments: argparse.Namespace) -> Scale | None:
-    """The scale that the flags ask for, None where none of them asks for shards."""
+def scale_from_flags(arguments: argparse.Namespace) -> Scale | None:
+    """Returns the scale that the flags state, None for a conversion without shards."""
     slurm = {
         name: value
         for name in ("partition", "time", "memory_gb", "setup")
@@ -104,9 +104,9 @@ def scale_of(arguments: argparse.Namespace) -> Scale | None:
         if value is not None and value < 1:
             raise InvalidValueError(name.removeprefix("--"), "at least 1", value)
     scale = Scale(executor, arguments.workers, size, arguments.shards, arguments.stats, slurm)
-    if asks_for_shards(arguments):
+    if shards_requested(arguments):
         if arguments.append:
-            raise InvalidValueError("--append", "without shards, whose flags stand beside it", True)
+            raise InvalidValueError("--append", "no flag of a conversion in shards beside it", True)
         return scale
     if arguments.append:
         return None
@@ -120,15 +120,15 @@ def convert_in_shards(
 ) -> dict[str, Any]:
     """Converts the recordings in `folders` in shards and merges these; see `recordings.convert_recordings`.
 
-    Shards that an earlier call finished are not made again, unless a recording in them changed.
+    Shards that an earlier call finished are converted again only if one of their recordings changed.
 
     Returns:
-        Summary of what was written, left out and found; for SLURM, of what was submitted.
+        Summary of the written and skipped episodes and the findings; for SLURM, of the submitted jobs.
 
     Raises:
-        OutputExistsError: there is something at `root`.
-        FileFormatError: no recordings, or a folder of shards that is none.
-        InvalidValueError: the shards are those of another call.
+        OutputExistsError: `root` exists.
+        FileFormatError: no recordings, or the folder holds something else than shards.
+        InvalidValueError: the shards were made by a call with other options.
         RunError: damaged recordings, or a killed process; the finished shards are kept.
         MissingExtraError: datatrove or lerobot is not installed.
     """
@@ -145,7 +145,7 @@ def convert_in_shards(
         tuple(unfinished),
     )  # fmt: skip
     plan.require_own()
-    refusal = f"{folder}: expected shards that nobody works on, found another call at work"
+    refusal = f"{folder}: expected shards that no other call works on, found one at work"
     with FolderLock(folder / LOCK_FILE, refusal):
         finished = plan.prepare()
         if scale.executor == "slurm":
@@ -157,7 +157,7 @@ def convert_in_shards(
             run_ray(plan, scale.workers)
         else:
             run_local(plan, scale.workers or 1)
-        from .merge import merge_shards
+        from .merge_shards import merge_shards
 
         summary = {**merge_shards(plan), "finished_before": finished}
     if scale.folder is not None:

@@ -1,4 +1,4 @@
-"""The executors of datatrove that run a plan."""
+"""Runs a shard plan with the executors of datatrove."""
 
 import importlib.util
 import shutil
@@ -21,13 +21,13 @@ from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.worker_pool import WorkerPool
 
 from ..lerobot.prepare import DamagedEpisodeError
-from .plan import ShardPlan
+from .shard_plan import ShardPlan
 
 SUMMARY_FILE = "summary.json"
 
 
 class _Step(PipelineStep):
-    """A step of datatrove's; its only output are files."""
+    """A pipeline step of datatrove that only writes files."""
 
     type = "copolicy"
 
@@ -37,25 +37,25 @@ class _Step(PipelineStep):
 
 
 class ConvertShard(_Step):
-    """One shard a rank."""
+    """Converts one shard per rank."""
 
     name = "convert a shard"
 
     def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Makes shard `rank` of the plan."""
+        """Converts shard `rank` of the plan."""
         from .shard import convert_shard
 
         self.stat_update("episodes", value=convert_shard(self.plan, rank))
 
 
 class MergeShards(_Step):
-    """All shards to one data set, in a job of its own; the summary is kept beside the shards."""
+    """Merges all shards to one data set; writes the summary beside the shards."""
 
     name = "merge the shards"
 
     def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Makes the data set of the plan."""
-        from .merge import merge_shards
+        """Writes the data set of the plan."""
+        from .merge_shards import merge_shards
 
         summary = merge_shards(self.plan)
         replace_json(self.plan.folder / SUMMARY_FILE, summary)
@@ -63,14 +63,14 @@ class MergeShards(_Step):
 
 @dataclass(frozen=True)
 class SlurmOptions:
-    """What a cluster wants to know of a job.
+    """Options of SLURM jobs.
 
     Attributes:
-        time: limit of one shard's job, as sbatch takes it.
-        memory_gb: of one job.
-        setup: shell command that makes this environment active in a job; by default the virtual environment that
-            runs now, which the nodes must see.
-        arguments: further options of sbatch, for example `{"account": "lab"}`.
+        time: time limit of one shard's job, in sbatch's format.
+        memory_gb: memory of one job.
+        setup: shell command that activates the environment in a job; by default activates the current virtual
+            environment, which must be visible to the nodes.
+        arguments: further options of sbatch, for example `(("account", "lab"),)`.
     """
 
     partition: str | None = None
@@ -81,10 +81,10 @@ class SlurmOptions:
 
 
 def require_executor(name: str, partition: str | None = None) -> None:
-    """Checks that an executor can be used from here.
+    """Checks that an executor is usable on this machine.
 
     Raises:
-        InvalidValueError: Ray is not installed; no sbatch here, or no partition given.
+        InvalidValueError: Ray is not installed, sbatch is not found, or no partition is given.
     """
     if name == "ray" and importlib.util.find_spec("ray") is None:
         raise InvalidValueError("--executor", "local or slurm, as ray is not installed (pip install ray)", name)
@@ -96,10 +96,10 @@ def require_executor(name: str, partition: str | None = None) -> None:
 
 
 def run_local(plan: ShardPlan, workers: int) -> None:
-    """Makes all shards in processes of this machine.
+    """Converts all shards in local processes.
 
     Raises:
-        RunError: a process was killed, or shards hold damaged recordings; the other shards are finished.
+        RunError: a process was killed, or shards hold damaged recordings; finished shards are kept.
     """
     executor = LocalExecutor([ConvertShard(plan)], len(plan), workers, str(plan.logs))
     try:
@@ -107,17 +107,17 @@ def run_local(plan: ShardPlan, workers: int) -> None:
             errors = executor.run()
     except BrokenProcessPool:
         raise RunError(
-            f"{plan.folder}: a process was killed, perhaps for want of memory; {_finished(plan)}: run the same again"
+            f"{plan.folder}: a process was killed, perhaps out of memory; {_progress_text(plan)}: run the command again"
         ) from None
     for error in errors:
         if not isinstance(error, DamagedEpisodeError):
             raise error
     if errors:
-        raise _damage(plan)
+        raise _damage_error(plan)
 
 
 def run_ray(plan: ShardPlan, workers: int | None) -> None:
-    """Makes all shards on the Ray cluster that this process belongs to.
+    """Converts all shards on the Ray cluster of this process.
 
     Raises:
         RunError: not all shards were finished.
@@ -126,23 +126,23 @@ def run_ray(plan: ShardPlan, workers: int | None) -> None:
         executor = RayPipelineExecutor([ConvertShard(plan)], len(plan), workers or -1, logging_dir=str(plan.logs))
         executor.run()
     if executor.get_incomplete_ranks():
-        raise _damage(plan)
+        raise _damage_error(plan)
 
 
 def submit_slurm(plan: ShardPlan, workers: int | None, options: SlurmOptions) -> dict[str, Any]:
-    """Hands an array of jobs, one for each unfinished shard, and a job that merges them afterwards to SLURM.
+    """Submits an array of SLURM jobs, one per unfinished shard, and a job that merges the shards afterwards.
 
     Returns:
-        Ids of the jobs; `shards` is None where every shard is finished.
+        Ids of the jobs; `shards` is None if every shard is finished.
 
     Raises:
-        RunError: SLURM refused.
+        RunError: sbatch failed.
     """
     shards = _slurm(plan, [ConvertShard(plan)], len(plan), "copolicy-shards", plan.logs, options, workers or -1)
-    # Without the last option a merge whose shards failed would wait in the queue for ever.
+    # Without kill-on-invalid-dep, a merge whose shards failed would stay in the queue forever.
     merge = _slurm(
         plan, [MergeShards(plan)], 1, "copolicy-merge", plan.merge_logs, options, -1,
-        depends=shards, more={"kill-on-invalid-dep": "yes"},
+        depends=shards, extra_arguments={"kill-on-invalid-dep": "yes"},
     )  # fmt: skip
     try:
         with quiet():
@@ -154,7 +154,7 @@ def submit_slurm(plan: ShardPlan, workers: int | None, options: SlurmOptions) ->
 
 def _slurm(
     plan: ShardPlan, pipeline: list, tasks: int, name: str, logs: Path, options: SlurmOptions, workers: int,
-    depends: SlurmPipelineExecutor | None = None, more: dict[str, str] | None = None,
+    depends: SlurmPipelineExecutor | None = None, extra_arguments: dict[str, str] | None = None,
 ) -> SlurmPipelineExecutor:  # fmt: skip
     activate = Path(sys.prefix) / "bin" / "activate"
     return SlurmPipelineExecutor(
@@ -167,39 +167,41 @@ def _slurm(
         job_name=name,
         qos="",  # the cluster's own default; datatrove's "normal" is unknown to many
         env_command=options.setup or (f"source {activate}" if activate.is_file() else ""),
-        sbatch_args={**dict(options.arguments), **(more or {})},
+        sbatch_args={**dict(options.arguments), **(extra_arguments or {})},
         depends=depends,
         logging_dir=str(logs),
     )
 
 
-def _finished(plan: ShardPlan) -> str:
+def _progress_text(plan: ShardPlan) -> str:
     done = sum(plan.record(rank) is not None for rank in range(len(plan)))
     return f"{done} of {len(plan)} shards are finished and kept in {plan.folder}"
 
 
-def _damage(plan: ShardPlan) -> RunError:
+def _damage_error(plan: ShardPlan) -> RunError:
     lists = [plan.damage_list(rank) for rank in range(len(plan))]
     lines = [line for path in lists if path.is_file() for line in path.read_text(encoding="utf-8").splitlines()]
     if not lines:
-        return RunError(f"{plan.logs}: expected all jobs to end well, found others, see their logs; {_finished(plan)}")
-    others = f" (and {len(lines) - 1} more, in {lists[0].parent})" if len(lines) > 1 else ""
-    advice = "mend or remove such files, or add --skip-damaged, and run again"
-    return RunError(f"{lines[0]}{others}; {_finished(plan)}: {advice}")
+        return RunError(
+            f"{plan.logs}: expected all jobs to succeed, found failed ones, see their logs; {_progress_text(plan)}"
+        )
+    more_lines = f" (and {len(lines) - 1} more, in {lists[0].parent})" if len(lines) > 1 else ""
+    advice = "repair or remove such files, or add --skip-damaged, and run again"
+    return RunError(f"{lines[0]}{more_lines}; {_progress_text(plan)}: {advice}")
 
 
 class LocalExecutor(LocalPipelineExecutor):
-    """Runs ranks in processes of this machine, like its parent, with another pool.
+    """Runs ranks in local processes, like its parent, with another pool.
 
-    The parent's `multiprocess.Pool` waits for ever for the rank of a process that was killed, and terminates every
-    rank at the first that fails. Here a killed process ends the run, and a rank that fails ends alone.
+    The parent's `multiprocess.Pool` waits forever for the rank of a killed process, and terminates all ranks when one
+    fails. Here a killed process ends the run, and a failed rank does not affect the others.
     """
 
     def run(self) -> list[CopolicyError]:
-        """Runs the ranks that are not completed.
+        """Runs the unfinished ranks.
 
         Returns:
-            The errors of those that failed.
+            The errors of the failed ranks.
 
         Raises:
             BrokenProcessPool: a process was killed.
@@ -209,13 +211,13 @@ class LocalExecutor(LocalPipelineExecutor):
             return []
         self.save_executor_as_json()
         if self.workers == 1:
-            return [error for rank in progress(ranks, len(ranks), "shards") if (error := self._outcome(rank))]
+            return [error for rank in progress(ranks, len(ranks), "shards") if (error := self._run_rank(rank))]
         with WorkerPool(min(self.workers, len(ranks))) as pool:
-            futures: list[Future[CopolicyError | None]] = [pool.submit(self._outcome, rank) for rank in ranks]
+            futures: list[Future[CopolicyError | None]] = [pool.submit(self._run_rank, rank) for rank in ranks]
             done = progress(as_completed(futures), len(futures), "shards")
             return [error for future in done if (error := future.result())]
 
-    def _outcome(self, rank: int) -> CopolicyError | None:
+    def _run_rank(self, rank: int) -> CopolicyError | None:
         try:
             with quiet():
                 self._run_for_rank(rank, local_rank=rank)
@@ -226,8 +228,7 @@ class LocalExecutor(LocalPipelineExecutor):
 
 @contextmanager
 def quiet():
-    """Keeps datatrove's log off the terminal: it shows its pipeline, paths and tracebacks of what is reported in one
-    line elsewhere."""
+    """Disables datatrove's log, whose tracebacks repeat errors that are reported in one line elsewhere."""
     logger.disable("datatrove")
     try:
         yield

@@ -1,78 +1,80 @@
-"""One shard: its recordings read, checked and converted to a data set of its own."""
+"""Reads and checks the recordings of one shard and converts them to a data set."""
 
 import shutil
 from dataclasses import asdict
 from importlib.metadata import version
+from typing import Any
 
-from copolicy.dataset.checks.checking import check_table, of_recordings
-from copolicy.dataset.checks.read_recordings import not_verified, recordings_table
+from copolicy.dataset.checks.checking import check_data, judges_one_recording
+from copolicy.dataset.checks.read_recordings import data_of_recordings, unverified_findings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.files.staging import new_folder, replace_json, replace_text
-from copolicy.dataset.recording.log import read_episode
+from copolicy.dataset.recording.reader import read_episode
 
-from ..lerobot.prepare import DamagedEpisodeError, LeftOut, NotPrepared, PreparedEpisode, admit, prepare_from
-from .plan import DATA_SET, RECORD_FILE, ShardPlan
+from ..lerobot.prepare import DamagedEpisodeError, PreparedEpisode, SkippedEpisode, SkipReport, admit, read_and_prepare
+from .shard_plan import DATA_SET, RECORD_FILE, ShardPlan
 
 
 def convert_shard(plan: ShardPlan, rank: int) -> int:
-    """Makes a shard, unless it is there; what a killed process left of it goes first.
+    """Converts a shard unless it is finished; first removes partial output of a killed process.
 
-    Every recording is read once: its check sums are verified, it is held against the rules for single recordings
-    at their rate, and its frames are written. The shard appears complete, in one renaming, or not at all.
+    Every recording is read once: its check sums are verified, the rules for single recordings are checked at its
+    recording rate, and its frames are written. The shard appears complete, in one rename, or not at all.
 
     Returns:
-        Number of its episodes.
+        Number of episodes in the shard.
 
     Raises:
-        DamagedEpisodeError: recordings are damaged and may not be left out; `plan.damage_list` has a line for each.
+        DamagedEpisodeError: recordings are damaged and `skip_damaged` is off; `plan.damage_list` has a line for each.
     """
     target = plan.shard(rank)
-    for left in target.parent.glob(f".{target.name}.*.partial"):
-        shutil.rmtree(left)
+    for partial_folder in target.parent.glob(f".{target.name}.*.partial"):
+        shutil.rmtree(partial_folder)
     record = plan.record(rank)
     if record is not None:
         return len(record["episodes"])
-    digest = plan.digest(rank)  # before the files are read: one that changes meanwhile is read again
+    digest = plan.digest(rank)  # before reading: a file that changes meanwhile makes the next call convert again
     episodes: list[Episode] = []
     results = [_read(plan, path, episodes) for path in plan.files_of(rank)]
     _stop_at_damage(plan, rank, results)
-    left_out = LeftOut()
-    prepared = list(admit(results, plan.skip_damaged, left_out))
+    skipped = SkipReport()
+    prepared = list(admit(results, plan.skip_damaged, skipped))
     with new_folder(target) as partial:
         partial.mkdir()
         if prepared:
-            from ..lerobot.writer import write_dataset  # seconds, and a shard may hold nothing to write
+            from ..lerobot.writer import write_dataset  # takes seconds to import, and a shard may have no episode
 
-            conversion = plan.conversion
-            about = {"version": version("lerobot_policy_copolicy")}
-            write_dataset(prepared, partial / DATA_SET, plan.repo_id, conversion.fps, conversion.hold, lambda: about)
+            fps, downsampling = plan.conversion.fps, plan.conversion.downsampling
+            versions = {"version": version("lerobot_policy_copolicy")}
+            write_dataset(prepared, partial / DATA_SET, plan.repo_id, fps, downsampling, lambda: versions)
         document = {
             "digest": digest,
             "episodes": [episode.meta.episode_uuid for episode in prepared],
             "origins": [episode.origin for episode in prepared],
-            "left_out": asdict(left_out),
+            "left_out": asdict(skipped),
             **_findings(plan, prepared, episodes),
         }
         replace_json(partial / RECORD_FILE, document, indent=1)
     return len(prepared)
 
 
-def _read(plan: ShardPlan, path, episodes: list[Episode]) -> PreparedEpisode | NotPrepared:
-    """Prepares a recording, and keeps the episode itself if it goes into the data set."""
-    read: list[Episode] = []
+def _read(plan: ShardPlan, path, episodes: list[Episode]) -> PreparedEpisode | SkippedEpisode:
+    """Prepares a recording; appends its episode to `episodes` if it is written to the data set."""
+    loaded: list[Episode] = []
 
     def read_once() -> Episode:
-        read.append(read_episode(path))
-        return read[0]
+        loaded.append(read_episode(path))
+        return loaded[0]
 
-    result = prepare_from(path.name, read_once, plan.conversion, str(path))
+    result = read_and_prepare(path.name, read_once, plan.conversion, str(path))
     if isinstance(result, PreparedEpisode):
-        episodes += read
+        episodes += loaded
     return result
 
 
-def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | NotPrepared]) -> None:
-    damaged = [result.message for result in results if isinstance(result, NotPrepared) and result.reason == "damaged"]
+def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | SkippedEpisode]) -> None:
+    skipped = [result for result in results if isinstance(result, SkippedEpisode)]
+    damaged = [result.message for result in skipped if result.reason == "damaged"]
     path = plan.damage_list(rank)
     path.unlink(missing_ok=True)
     if damaged and not plan.skip_damaged:
@@ -80,13 +82,13 @@ def _stop_at_damage(plan: ShardPlan, rank: int, results: list[PreparedEpisode | 
         raise DamagedEpisodeError(damaged[0])
 
 
-def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[Episode]) -> dict:
-    """Findings of the recordings at their rate, named by their place among the shard's episodes."""
+def _findings(plan: ShardPlan, prepared: list[PreparedEpisode], episodes: list[Episode]) -> dict[str, Any]:
+    """Findings in the recordings at their recording rate, labelled with the episode's index in the shard."""
     if not episodes:
         return {"applied": [], "findings": []}
-    labels = [str(place) for place in range(len(prepared))]
-    result = check_table(recordings_table(plan.root, labels, episodes), of_recordings)
+    labels = [str(index) for index in range(len(prepared))]
+    result = check_data(data_of_recordings(plan.root, labels, episodes), judges_one_recording)
     findings = list(result.findings)
     for label, episode in zip(labels, episodes, strict=True):
-        findings += not_verified(label, episode)
+        findings += unverified_findings(label, episode)
     return {"applied": list(result.applied), "findings": [finding.to_dict() for finding in findings]}

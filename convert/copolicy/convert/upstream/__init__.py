@@ -1,1 +1,1 @@
-"""Files of the original program, in its three formats."""
+"""Imports files of the original program, in its three formats."""

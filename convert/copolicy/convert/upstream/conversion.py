@@ -1,4 +1,4 @@
-"""Converts files of the original program to a LeRobot v3 data set: finds out which of its three formats they are."""
+"""Detects which of the original program's three formats a path holds, and converts it to a LeRobot v3 data set."""
 
 import functools
 import logging
@@ -8,22 +8,23 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-from copolicy.dataset.clock import Hold, stride
+from copolicy.dataset.clock import Downsampling, stride
 from copolicy.dataset.command_line.commands import progress
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import broken_links, distinct_files
 from copolicy.dataset.files.staging import require_new
 from copolicy.tasks.table.spec import SPEC
 
-from ..lerobot.prepare import Conversion, LeftOut, PreparedEpisode, admit, prepare_from
-from .episode import UpstreamOptions
+from ..lerobot.prepare import Conversion, PreparedEpisode, SkipReport, admit, read_and_prepare
+from .build_episode import UpstreamOptions
 from .processed import read_processed
 from .raw import read_raw
-from .zarr import OBSERVATIONS, ZARR_HZ, ZarrStore
-from .zarr_store import array_metadata_files, is_zipped
+from .zarr_arrays import array_metadata_files, is_zipped
+from .zarr_episodes import OBSERVATIONS, ZARR_HZ, ZarrStore
 
 FORMATS = {
     "raw": "trajectories/ep_N.pkl",
@@ -32,7 +33,7 @@ FORMATS = {
 }
 
 Reader = tuple[str, Callable[[UpstreamOptions], Episode]]
-"""An episode by its name, and what reads it."""
+"""Name of an episode, and the function that reads it."""
 
 
 @dataclass(frozen=True)
@@ -44,29 +45,31 @@ class UpstreamSource:
 
 
 def open_upstream(path: Path) -> UpstreamSource:
-    """The episodes at `path`: files in the order of their numbers, a store in its own order.
+    """Finds the episodes at `path`: files sorted by number, episodes of a store in stored order.
 
     Raises:
-        FileFormatError: none of the formats, or more than one.
+        FileFormatError: none of the formats, or several.
     """
     if not path.is_dir() and not is_zipped(path):
-        raise FileFormatError(path, "a folder of the original program's files or a zipped Zarr store", kind_of(path))
+        raise FileFormatError(
+            path, "a folder of the original program's files or a zipped Zarr store", describe_path(path)
+        )
     files = distinct_files(path, "*") if path.is_dir() else []
     for link in broken_links(path) if path.is_dir() else ():
         if link.suffix not in (".pkl", ".npz"):
-            logging.warning("warning: %s: a link that leads nowhere; what it led to is left out", link)
+            logging.warning("warning: %s: a broken link; its target is skipped", link)
     raw = sorted((file for file in files if file.match("trajectories/*.pkl")), key=_by_number)
     processed = sorted(
         (file for file in files if file.match("*.npz") and file.stem == file.parent.name), key=_by_number
     )
     stores = _stores(path, files)
-    found = {name: len(files) for name, files in (("raw", raw), ("processed", processed), ("zarr", stores)) if files}
-    if len(found) != 1 or len(stores) > 1:
+    counts = {name: len(files) for name, files in (("raw", raw), ("processed", processed), ("zarr", stores)) if files}
+    if len(counts) != 1 or len(stores) > 1:
         layouts = "; ".join(f"{name}: {layout}" for name, layout in FORMATS.items())
-        parts = ", ".join(f"{count} {name}" for name, count in found.items()) or kind_of(path)
-        if not found and parts.startswith("a Zarr store"):
-            parts = f"a Zarr store without an array {OBSERVATIONS}"
-        raise FileFormatError(path, f"files of one format ({layouts})", parts)
+        contents = ", ".join(f"{count} {name}" for name, count in counts.items()) or describe_path(path)
+        if not counts and contents.startswith("a Zarr store"):
+            contents = f"a Zarr store without an array {OBSERVATIONS}"
+        raise FileFormatError(path, f"files of one format ({layouts})", contents)
     if stores:
         store = ZarrStore(stores[0])
         return UpstreamSource("zarr", [(f"episode {i}", functools.partial(store.read, i)) for i in range(len(store))])
@@ -80,24 +83,24 @@ def convert_upstream(
     root: Path,
     repo_id: str,
     fps: int = 10,
-    hold: Hold | None = None,
+    downsampling: Downsampling | None = None,
     options: UpstreamOptions = UpstreamOptions(),  # noqa: B008 - frozen
     license: str = "",
     skip_damaged: bool = False,
-) -> dict:
+) -> dict[str, Any]:
     """Writes the episodes at `path` as a data set at `root`.
 
     Args:
-        hold: `mean` by default; `first` and nothing else for a Zarr store, which holds the first action of three.
+        downsampling: default `mean`; a Zarr store stores the first action of three steps and allows `first` only.
 
     Returns:
-        Summary of what was written, left out, and noticed.
+        Summary of the written and skipped episodes, flags and notes.
 
     Raises:
-        OutputExistsError: there is something at `root`.
-        FileFormatError: `path` holds none of the formats, or more than one.
-        InvalidValueError: a Zarr store at another rate than 10 Hz or with another hold.
-        DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is left behind.
+        OutputExistsError: `root` exists.
+        FileFormatError: `path` holds none of the formats, or several.
+        InvalidValueError: a Zarr store with an `fps` other than 10 or a downsampling other than `first`.
+        DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is written.
         MissingExtraError: lerobot or zarr is not installed.
     """
     stride(fps, SPEC.record_hz)
@@ -106,36 +109,38 @@ def convert_upstream(
     if source.format == "zarr":
         if fps != ZARR_HZ:
             raise InvalidValueError("fps", f"{ZARR_HZ}: the store holds every third step only", fps)
-        if hold == "mean":
-            raise InvalidValueError("hold", "'first': the store holds the first of three actions only", hold)
-    hold = hold or ("first" if source.format == "zarr" else "mean")
-    # Nobody discarded anything here; what is excluded for its map stays in the data set, flagged.
-    conversion = Conversion(fps, hold, license, keep_discarded=True)
-    left_out, noticed = LeftOut(), _Noticed()
-    results = (prepare_from(name, lambda read=read: read(options), conversion) for name, read in source.readers)
+        if downsampling == "mean":
+            raise InvalidValueError(
+                "downsampling", "'first': the store holds the first of three actions only", downsampling
+            )
+    downsampling = downsampling or ("first" if source.format == "zarr" else "mean")
+    # Episodes excluded for a wrong map stay in the data set, flagged; there are no other discarded ones.
+    conversion = Conversion(fps, downsampling, license, keep_discarded=True)
+    skipped, collected = SkipReport(), _Collected()
+    results = (read_and_prepare(name, lambda read=read: read(options), conversion) for name, read in source.readers)
 
     from ..lerobot.writer import write_dataset
 
-    shown = progress(results, len(source.readers), "converting")
+    episodes = admit(progress(results, len(source.readers), "converting"), skip_damaged, skipped)
     written = write_dataset(
-        noticed.watch(admit(shown, skip_damaged, left_out)), root, repo_id, fps, hold,
+        collected.watch(episodes), root, repo_id, fps, downsampling,
         lambda: {
             "converter": "copolicy-convert upstream", "version": version("lerobot_policy_copolicy"),
-            "format": source.format, "options": asdict(options), "left_out": left_out.record(),
+            "format": source.format, "options": asdict(options), "left_out": skipped.record(),
         },
     )  # fmt: skip
     return {
         "format": source.format,
         **written.summary(),
-        "damaged_left_out": left_out.messages,
-        "excluded": noticed.excluded,
-        "quality_flags": dict(noticed.flags),
-        "noticed": noticed.notes,
+        "damaged_left_out": skipped.messages,
+        "excluded": collected.excluded,
+        "quality_flags": dict(collected.flags),
+        "noticed": collected.notes,
     }
 
 
-class _Noticed:
-    """What the importers flagged, gathered for the summary while episodes pass by."""
+class _Collected:
+    """Flags and notes of the imported episodes, for the summary."""
 
     def __init__(self):
         self.flags: Counter[str] = Counter()
@@ -143,16 +148,17 @@ class _Noticed:
         self.excluded = 0
 
     def watch(self, episodes: Iterator[PreparedEpisode]) -> Iterator[PreparedEpisode]:
+        """Yields the episodes unchanged."""
         for episode in episodes:
             self.flags.update(flag for flag in episode.meta.quality_flags.split(",") if flag)
             self.excluded += episode.meta.discarded
-            origin, *rest = episode.notes
-            self.notes += [f"{note} ({origin})" for note in rest]
+            origin, *notes = episode.notes
+            self.notes += [f"{note} ({origin})" for note in notes]
             yield episode
 
 
 def _stores(path: Path, files: Sequence[Path]) -> list[Path]:
-    """Zarr stores, folders and zip files, at a path and below it."""
+    """Zarr stores (folders and zip files) at a path and below it."""
     if path.is_file():
         return [path]
     arrays = {folder for file in files for folder in file.parents if folder.match(OBSERVATIONS)}

@@ -1,15 +1,16 @@
-"""Imports `ep_N/ep_N.npz`, what the original's `process_data.py` makes of the raw files.
+"""Imports `ep_N/ep_N.npz`, the output of the original's `process_data.py`.
 
-Its rows hold the pose after each action in single precision, and no velocities: the script overwrites them. An
-episode starts at rest and the dynamics are known, so the velocities follow from the actions; the positions then
-prove that they do. Goal and obstacles come from a map file that may be another episode's (see `upstream_map`).
-Files written with the script's options to skip, drop or smooth rows no longer hold what happened and are refused.
+Its rows hold the pose after each action in single precision, and no velocities, which the script overwrites. They are
+computed from the actions, since an episode starts at rest and the dynamics are known, and verified by the positions.
+Goal and obstacles come from a map file that may be another episode's (see `played_map`). Files written with the
+script's options to skip, drop or smooth rows do not hold consecutive steps and are rejected.
 """
 
 from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.task_spec import RECORD_HZ
@@ -17,8 +18,8 @@ from copolicy.tasks.table.dynamics import step_linear, torque
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
-from .episode import Trajectory, UpstreamOptions, best_fit, build_episode
-from .maps import check_by_rewards, rounded
+from .build_episode import Trajectory, UpstreamOptions, best_fit, build_episode
+from .played_map import check_by_rewards, rounded
 from .restricted_npz import load_npz
 
 _FOLLOWS = 0.01  # px, rad; single precision alone gives 1e-4
@@ -26,7 +27,7 @@ _WIDTHS = {"states": 8, "actions": 4, "rewards": 1, "conditioning_var": 8}
 
 
 def read_processed(path: Path, options: UpstreamOptions) -> Episode:
-    """One processed episode.
+    """Reads one processed episode.
 
     Raises:
         FileFormatError: a damaged file, or one whose rows are not the consecutive steps of 1/30 s of an episode.
@@ -34,8 +35,8 @@ def read_processed(path: Path, options: UpstreamOptions) -> Episode:
     fields = _parse(path)
     actions = np.clip(fields["actions"], -1, 1)
     x, y, cosine, sine = fields["states"][:, :4].T
-    after = np.column_stack((x, y, np.unwrap(np.arctan2(sine, cosine))))
-    trajectory = best_fit(lambda physics: _reconstruct(after, actions, physics), options.angular_limit)
+    next_poses = np.column_stack((x, y, np.unwrap(np.arctan2(sine, cosine))))
+    trajectory = best_fit(lambda physics: _reconstruct(next_poses, actions, physics), options.angular_limit)
     if trajectory.residual > _FOLLOWS:
         raise FileFormatError(
             path,
@@ -43,13 +44,13 @@ def read_processed(path: Path, options: UpstreamOptions) -> Episode:
             f"a step off by {trajectory.residual:.2g} px or rad (written with rows skipped, dropped or smoothed?)",
         )
     stored = _stored_map(fields, path, options.obstacle_size)
-    finding = check_by_rewards(stored, trajectory.states[0], after[:, :2], fields["rewards"][:, 0])
+    finding = check_by_rewards(stored, trajectory.states[0], next_poses[:, :2], fields["rewards"][:, 0])
     origin = f"{path.parent.name}/{path.name}"
     content = path.read_bytes()
     return build_episode(trajectory, finding.config, content, RECORD_HZ, origin, finding.flags, finding.notes)
 
 
-def _parse(path: Path) -> dict[str, np.ndarray]:
+def _parse(path: Path) -> dict[str, Array]:
     fields = load_npz(path)
     missing = {*_WIDTHS, "table_init", "table_goal", "obstacles"} - set(fields)
     if missing:
@@ -67,7 +68,7 @@ def _parse(path: Path) -> dict[str, np.ndarray]:
     return fields
 
 
-def _stored_map(fields: dict[str, np.ndarray], path: Path, obstacle_size: int) -> MapConfig:
+def _stored_map(fields: dict[str, Array], path: Path, obstacle_size: int) -> MapConfig:
     try:
         x, y = fields["table_init"].reshape(2)
         (goal_x, goal_y), *obstacles = np.vstack((fields["table_goal"], fields["obstacles"].reshape(-1, 2)))
@@ -77,26 +78,26 @@ def _stored_map(fields: dict[str, np.ndarray], path: Path, obstacle_size: int) -
         raise FileFormatError(path, "table_init, table_goal and obstacles as positions", str(error)) from None
 
 
-def _reconstruct(after: np.ndarray, actions: np.ndarray, physics: Physics) -> Trajectory:
-    """States from the poses `(T, 3)` after the actions, starting at rest."""
+def _reconstruct(next_poses: Array, actions: Array, physics: Physics) -> Trajectory:
+    """Reconstructs the states from the poses `(T, 3)` after the actions, starting at rest."""
     dt, limit = physics.dt, physics.angular_acceleration_limit
     damping = physics.angular_damping / physics.inertia
-    velocity = np.zeros((len(after) + 1, 2))
+    velocity = np.zeros((len(next_poses) + 1, 2))
     for step, action in enumerate(actions):
         _, velocity[step + 1] = step_linear(velocity[step], velocity[step], action, physics)
-    # The torque is taken at the stored orientation, which keeps errors from growing.
-    first = after[0, 2]
+    # The torque is computed at the stored orientation, so that errors do not accumulate.
+    first = next_poses[0, 2]
     for _ in range(20):
         alpha = np.clip(torque(first, actions[0], physics) / physics.inertia, -limit, limit)
-        first = after[0, 2] - alpha * dt * dt / 2
-    pushes = torque(np.append(first, after[:-1, 2]), actions, physics) / physics.inertia
+        first = next_poses[0, 2] - alpha * dt * dt / 2
+    accelerations = torque(np.append(first, next_poses[:-1, 2]), actions, physics) / physics.inertia
     spin = [0.0]
-    for push in pushes.tolist():
-        spin.append(spin[-1] + min(max(push - damping * spin[-1], -limit), limit) * dt)
+    for acceleration in accelerations.tolist():
+        spin.append(spin[-1] + min(max(acceleration - damping * spin[-1], -limit), limit) * dt)
     omega = np.array(spin)
-    travelled = (velocity[:-1] + velocity[1:]) * dt / 2
-    turned = (omega[:-1] + omega[1:]) * dt / 2
-    poses = np.vstack(((*(after[0, :2] - travelled[0]), first), after))
+    displacement = (velocity[:-1] + velocity[1:]) * dt / 2
+    rotation = (omega[:-1] + omega[1:]) * dt / 2
+    poses = np.vstack(((*(next_poses[0, :2] - displacement[0]), first), next_poses))
     states = np.column_stack((poses[:, :2], poses[:, 2] % (2 * np.pi), velocity, omega))
-    wrong = np.column_stack((np.diff(poses[:, :2], axis=0) - travelled, np.diff(poses[:, 2]) - turned))
-    return Trajectory(states[:-1], actions, states[-1], physics, float(np.abs(wrong).max()))
+    errors = np.column_stack((np.diff(poses[:, :2], axis=0) - displacement, np.diff(poses[:, 2]) - rotation))
+    return Trajectory(states[:-1], actions, states[-1], physics, float(np.abs(errors).max()))

@@ -1,7 +1,7 @@
-"""Reads pickles of NumPy data without running anything that the file names.
+"""Reads pickles of NumPy data without executing any function that the file names.
 
-A pickle may call any importable function. This reader knows the few names that NumPy's arrays need and answers each
-with a stand-in of its own, so that not even NumPy's reconstruction sees the file's bytes; any other is refused.
+A pickle may call any importable function. This reader replaces the few names that NumPy arrays need by classes and
+functions of its own, so that not even NumPy's reconstruction code runs on the file's bytes; it rejects other names.
 """
 
 import io
@@ -10,34 +10,35 @@ from pathlib import Path
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import FileFormatError
 
 _NUMBERS = frozenset(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8)) | {"f2", "f4", "f8", "b1"}
 
 
 def load_pickle(data: bytes, path: Path | str) -> object:
-    """The object in a pickle of plain Python values, NumPy numbers and NumPy arrays.
+    """Reads a pickle of plain Python values, NumPy numbers and NumPy arrays.
 
     Args:
         data: the pickle, of any protocol.
-        path: the file it came from, for errors.
+        path: its file, for errors.
 
     Raises:
-        FileFormatError: the pickle is damaged, or names anything but NumPy arrays and numbers.
+        FileFormatError: the pickle is damaged, or holds other objects.
     """
     try:
-        return _settle(_Unpickler(io.BytesIO(data)).load())
-    except (Exception, MemoryError) as error:  # damaged opcodes fail in as many ways as there are opcodes
+        return _resolve(_Unpickler(io.BytesIO(data)).load())
+    except (Exception, MemoryError) as error:  # damaged opcodes raise many types of errors
         raise FileFormatError(path, "a pickle of NumPy arrays and plain values", first_line(error)) from None
 
 
 def first_line(error: BaseException) -> str:
-    """What an error of any kind says, in one line."""
+    """First line of an error's message, or its type if there is none."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0]
 
 
 class _Dtype:
-    """Stands in for numpy.dtype: a number's kind and size, and the byte order from its state."""
+    """Replaces numpy.dtype: kind and size of a number, and the byte order from the pickled state."""
 
     def __init__(self, code: str = "", *_):
         if code not in _NUMBERS and code not in ("O", "O8"):
@@ -54,12 +55,12 @@ class _Dtype:
     def holds_objects(self) -> bool:
         return self.code.startswith("O")
 
-    def real(self) -> np.dtype:
+    def to_numpy(self) -> np.dtype:
         return np.dtype(self.order + self.code)
 
 
 class _Array:
-    """Stands in for numpy.ndarray: keeps its state until the whole pickle is read."""
+    """Replaces numpy.ndarray: stores the pickled state until the whole pickle is read."""
 
     def __init__(self, *_):
         self.state: tuple | None = None
@@ -67,7 +68,7 @@ class _Array:
     def __setstate__(self, state):
         self.state = state
 
-    def real(self) -> np.ndarray:
+    def to_numpy(self) -> Array:
         if self.state is None:
             raise pickle.UnpicklingError("an array without content")
         _, shape, dtype, by_column, content = self.state
@@ -75,16 +76,16 @@ class _Array:
         if dtype.holds_objects:
             values = np.empty(len(content), dtype=object)
             for index, value in enumerate(content):
-                values[index] = _settle(value)
+                values[index] = _resolve(value)
         else:
-            values = np.frombuffer(content, dtype.real())
+            values = np.frombuffer(content, dtype.to_numpy())
         return values.reshape(shape, order=order).copy()
 
 
 def _scalar(dtype: _Dtype, content: bytes = b""):
     if dtype.holds_objects:
         raise pickle.UnpicklingError("a number of data type object")
-    return np.frombuffer(content, dtype.real())[0]
+    return np.frombuffer(content, dtype.to_numpy())[0]
 
 
 def _from_buffer(content, dtype: _Dtype, shape: tuple, order: str) -> _Array:
@@ -100,7 +101,7 @@ def _latin1(text: str, encoding: str) -> bytes:
 
 
 _NAMES = {
-    "_codecs.encode": _latin1,  # how protocol 2 writes the bytes of an array
+    "_codecs.encode": _latin1,  # protocol 2 writes the bytes of an array as text
     "builtins.bytes": lambda: b"",
     "numpy.dtype": _Dtype,
     "numpy.ndarray": _Array,
@@ -128,14 +129,14 @@ class _Unpickler(pickle.Unpickler):
         return _NAMES[name]
 
 
-def _settle(value):
-    """Replaces the stand-ins inside plain containers by arrays."""
+def _resolve(value):
+    """Replaces each `_Array` inside plain containers by its NumPy array."""
     if isinstance(value, _Array):
-        return value.real()
+        return value.to_numpy()
     if isinstance(value, dict):
-        return {key: _settle(item) for key, item in value.items()}
+        return {key: _resolve(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return type(value)(_settle(item) for item in value)
+        return type(value)(_resolve(item) for item in value)
     if isinstance(value, _Dtype) or (isinstance(value, type) or callable(value)):
         raise pickle.UnpicklingError(f"{value!r} where a value should be")
     return value

@@ -1,1 +1,1 @@
-"""The image of each frame, encoded as the video of a data set."""
+"""Encodes the image of each frame as the video of a data set."""

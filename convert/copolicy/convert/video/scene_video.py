@@ -1,9 +1,9 @@
-"""The feature `observation.images.scene`: the table on its map as a film, one picture a frame of the data set.
+"""Encodes the feature `observation.images.scene`: a video of the scene, one image per frame of the data set.
 
-Each episode is encoded by itself, by one thread and without pictures that refer to later ones: its packets are the
-same whatever stands before or after it in a file, so that the content hash does not depend on the layout. Nor does it
-depend on the processor: x264 and FFmpeg's conversion of colours choose their arithmetic by the instructions that the
-processor has, and round differently; x264 is told not to, and colours are converted here.
+Each episode is encoded separately, by one thread and without B-frames: its packets do not depend on its neighbours in
+the file, so the content hash does not depend on the layout. Nor does it depend on the processor: x264 and FFmpeg's
+colour conversion select arithmetic by the processor's instruction set and round differently, so x264 runs with
+`cpu-independent`, and colours are converted here.
 """
 
 import io
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, RunError
 from copolicy.dataset.features import SCENE_IMAGE, SCENE_SIDES
 
@@ -33,32 +34,32 @@ SCENE = SCENE_IMAGE
 VideoSize = tuple[int, int]
 """Width and height, px."""
 
-_SAMPLED = 4  # every so many pixels of a row and of a column go into the statistics
+_SAMPLING = 4  # every fourth pixel of a row and of a column enters the statistics
 _LEVELS = 256
-# Parts of red, green and blue in Y, Cb and Cr, of 65,536, for values from 16 to 235 and to 240.
+# BT.601 weights of red, green and blue in Y, Cb and Cr times 65,536, for Y from 16 to 235, Cb and Cr from 16 to 240.
 _LUMA, _BLUE, _RED = (16829, 33039, 6416), (-9714, -19070, 28784), (28784, -24103, -4681)
 
 
 @dataclass(frozen=True)
 class SceneClip:
-    """One episode's film.
+    """The encoded video of one episode.
 
     Attributes:
-        mp4: the bytes of a file of its own.
-        size: of the pictures.
-        statistics: as LeRobot keeps them of pictures, `(3, 1, 1)` in [0, 1]; `count` is `(1,)`.
+        mp4: bytes of a complete mp4 file.
+        size: width and height of the images, px.
+        statistics: LeRobot's image statistics, `(3, 1, 1)` in [0, 1]; `count` is `(1,)`.
     """
 
     mp4: bytes
     size: VideoSize
-    statistics: dict[str, np.ndarray]
+    statistics: dict[str, Array]
 
 
 def parse_size(text: str) -> VideoSize:
-    """`600x300` as width and height.
+    """Parses a size such as `600x300` to width and height.
 
     Raises:
-        InvalidValueError: no two even numbers from 64 to 3840.
+        InvalidValueError: not two even numbers within `SCENE_SIDES`.
     """
     width, _, height = text.partition("x")
     size = tuple(int(part) if part.isdecimal() else 0 for part in (width, height))
@@ -69,79 +70,80 @@ def parse_size(text: str) -> VideoSize:
 
 
 def scene_encoder(fps: int) -> RGBEncoderConfig:
-    """How scenes are encoded: H.264, which browsers play, with a key picture a second."""
-    # LeRobot tells of the codec each time, which would be a line an episode.
+    """Returns the encoder settings: H.264, which browsers play, with one key frame per second."""
+    # LeRobot logs the codec at each construction, which would be a line per episode.
     logging.getLogger(RGBEncoderConfig.__module__).setLevel(logging.WARNING)
-    # What stands still costs next to nothing between key pictures; LeRobot's every second one triples the size.
+    # LeRobot's default, a key frame at every second frame, triples the size: static parts compress well between them.
     options = {"bf": 0, "x264-params": "cpu-independent=1"}
     return RGBEncoderConfig(vcodec="h264", g=fps, crf=23, preset="veryfast", extra_options=options)
 
 
-def scene_feature(size: VideoSize) -> dict:
-    """The entry of LeRobot's feature table."""
+def scene_feature(size: VideoSize) -> dict[str, Any]:
+    """Returns the entry of LeRobot's features."""
     return {"dtype": "video", "shape": (size[1], size[0], 3), "names": ["height", "width", "channels"]}
 
 
-def scene_clip(pictures: Iterable[np.ndarray], fps: int, size: VideoSize) -> SceneClip:
-    """Encodes the pictures of an episode, `(height, width, 3)` uint8 each; one is in memory at a time.
+def scene_clip(images: Iterable[Array], fps: int, size: VideoSize) -> SceneClip:
+    """Encodes the images of an episode, `(height, width, 3)` uint8 each; one is in memory at a time.
 
     Raises:
         RunError: the encoder failed.
     """
-    # PyAV is silent unless told otherwise; LeRobot, when it has looked at a video, lets the encoder talk to stderr.
+    # LeRobot enables FFmpeg's log on stderr when it reads a video.
     av.logging.set_level(None)
     encoder = scene_encoder(fps)
     levels, count = np.zeros((3, _LEVELS), np.int64), 0
-    film = io.BytesIO()
+    buffer = io.BytesIO()
     try:
-        with av.open(film, "w", format="mp4") as container:
-            # One thread: what x264 makes of the pictures depends on how many it has.
+        with av.open(buffer, "w", format="mp4") as container:
+            # One thread: the output of x264 depends on the number of threads.
             options = encoder.get_codec_options(1, as_strings=True)
             stream: Any = container.add_stream(encoder.vcodec, rate=fps, options=options)
             stream.width, stream.height = size
             stream.pix_fmt = encoder.pix_fmt
-            for picture in pictures:
+            for image in images:
                 count += 1
-                for channel, counts in enumerate(levels):
-                    sampled = picture[::_SAMPLED, ::_SAMPLED, channel]
-                    counts += np.bincount(sampled.reshape(-1), minlength=_LEVELS)
-                frame = av.VideoFrame.from_ndarray(_yuv420(picture), format=encoder.pix_fmt)
+                for channel, channel_levels in enumerate(levels):
+                    sampled = image[::_SAMPLING, ::_SAMPLING, channel]
+                    channel_levels += np.bincount(sampled.reshape(-1), minlength=_LEVELS)
+                frame = av.VideoFrame.from_ndarray(_yuv420(image), format=encoder.pix_fmt)
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
     except FFmpegError as error:
         raise RunError(f"--video: expected PyAV to encode the scene, found {error}") from None
-    return SceneClip(film.getvalue(), size, _statistics(levels, count))
+    return SceneClip(buffer.getvalue(), size, _statistics(levels, count))
 
 
-def _yuv420(picture: np.ndarray) -> np.ndarray:
-    """`(height * 3 / 2, width)` the planes of a picture by BT.601, as players take it: chroma of 2 x 2 pixels each."""
-    height, width, _ = picture.shape
-    colours = np.ascontiguousarray(picture.transpose(2, 0, 1)).astype(np.int32)
+def _yuv420(image: Array) -> Array:
+    """Converts an image to its YUV 4:2:0 planes by BT.601, `(height * 3 / 2, width)`: one chroma value per 2 x 2 px."""
+    height, width, _ = image.shape
+    colours = np.ascontiguousarray(image.transpose(2, 0, 1)).astype(np.int32)
     rows = colours[:, ::2] + colours[:, 1::2]
     blocks = rows[..., ::2] + rows[..., 1::2]
-    planes = [_mixed(colours, _LUMA, 16) + 16, _mixed(blocks, _BLUE, 18) + 128, _mixed(blocks, _RED, 18) + 128]
+    luma = _weighted_sum(colours, _LUMA, 16) + 16
+    planes = [luma, *(_weighted_sum(blocks, weights, 18) + 128 for weights in (_BLUE, _RED))]
     return np.concatenate([plane.ravel() for plane in planes]).astype(np.uint8).reshape(height * 3 // 2, width)
 
 
-def _mixed(colours: np.ndarray, parts: tuple[int, int, int], bits: int) -> np.ndarray:
-    """`(h, w)` the weighted sum of red, green and blue `(3, h, w)`, rounded after a division by `2 ** bits`."""
-    red, green, blue = (part * colour for part, colour in zip(parts, colours, strict=True))
+def _weighted_sum(colours: Array, weights: tuple[int, int, int], bits: int) -> Array:
+    """Weighted sum of red, green and blue `(3, h, w)`, divided by `2 ** bits` and rounded: `(h, w)`."""
+    red, green, blue = (weight * colour for weight, colour in zip(weights, colours, strict=True))
     return (red + green + blue + (1 << bits - 1)) >> bits
 
 
-def _statistics(levels: np.ndarray, frames: int) -> dict[str, np.ndarray]:
-    """Exact statistics of the sampled pixels from how often each of 256 levels occurs, `(3, 256)`."""
+def _statistics(levels: Array, frames: int) -> dict[str, Array]:
+    """Exact statistics of the sampled pixels from the histogram of their levels, `(3, 256)`."""
     values = np.arange(_LEVELS) / (_LEVELS - 1)
-    share = levels / levels.sum(axis=1, keepdims=True)
-    mean = share @ values
-    below = np.cumsum(levels, axis=1)
+    proportion = levels / levels.sum(axis=1, keepdims=True)
+    mean = proportion @ values
+    cumulative = np.cumsum(levels, axis=1)
     rows = {
         "min": values[(levels > 0).argmax(axis=1)],
         "max": values[_LEVELS - 1 - (levels[:, ::-1] > 0).argmax(axis=1)],
         "mean": mean,
-        "std": np.sqrt(np.maximum(share @ values**2 - mean**2, 0)),
+        "std": np.sqrt(np.maximum(proportion @ values**2 - mean**2, 0)),
     }
     for name, quantile in QUANTILES.items():
-        wanted = np.ceil(quantile * below[:, -1:])
-        rows[name] = values[(below >= wanted).argmax(axis=1)]
+        rank = np.ceil(quantile * cumulative[:, -1:])
+        rows[name] = values[(cumulative >= rank).argmax(axis=1)]
     return {**{name: row.reshape(3, 1, 1) for name, row in rows.items()}, "count": np.array([frames])}

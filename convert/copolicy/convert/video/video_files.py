@@ -1,4 +1,4 @@
-"""Joins the films of episodes to the video files of a LeRobot v3 data set, without encoding anew."""
+"""Concatenates the videos of episodes to the video files of a LeRobot v3 data set, without re-encoding."""
 
 import io
 from pathlib import Path
@@ -18,8 +18,8 @@ except ImportError as error:
 class VideoFiles(NumberedFiles):
     """The video files of one feature: `videos/KEY/chunk-000/file-000.mp4`, ...
 
-    LeRobot joins by writing the whole file anew at every episode. Here packets go to the end of the open file, with
-    their times moved on; memory holds one episode and the index of the file.
+    LeRobot rewrites the whole file at every episode. Here packets are appended to the open file with shifted
+    timestamps; memory holds one episode and the index of the file.
     """
 
     def __init__(self, root: Path, key: str, fps: int, file_mb: float, chunks_size: int):
@@ -29,33 +29,33 @@ class VideoFiles(NumberedFiles):
         self._stream: Any = None
 
     def append(self, mp4: bytes, frames: int) -> dict[str, int | float]:
-        """Adds an episode's film.
+        """Appends an episode's video.
 
         Args:
             mp4: a file with one video stream; all have the same codec, size and rate.
-            frames: pictures that it must have.
+            frames: expected number of images.
 
         Returns:
-            The columns of meta/episodes: chunk, file, and the times (s) between which the file shows the episode.
+            The columns of meta/episodes: chunk, file, and start and end time (s) of the episode in the file.
 
         Raises:
-            RunError: another number of pictures.
+            RunError: another number of images.
         """
         with av.open(io.BytesIO(mp4), "r") as source:
             stream = source.streams.video[0]
             packets = [packet for packet in source.demux(stream) if packet.size]
             if len(packets) != frames:
-                raise RunError(f"{self._key}: expected {frames} pictures of an episode, found {len(packets)}")
+                raise RunError(f"{self._key}: expected {frames} images of an episode, found {len(packets)}")
             if self._writer is not None and self._bytes + len(mp4) >= self._limit:
                 self._next()
             if self._writer is None:
                 self._open(stream)
             container: Any = self._writer
             assert stream.time_base is not None
-            moved = round(self._frames / self._fps / stream.time_base)
+            offset = round(self._frames / self._fps / stream.time_base)
             for packet in packets:
-                packet.pts = (packet.pts or 0) + moved
-                packet.dts = (packet.dts or 0) + moved
+                packet.pts = (packet.pts or 0) + offset
+                packet.dts = (packet.dts or 0) + offset
                 packet.stream = self._stream
                 container.mux(packet)
         start, self._frames = self._frames, self._frames + frames

@@ -1,4 +1,4 @@
-"""Rules that a data set should keep before anybody uses it: one family a module, every limit in `limits`.
+"""The rules of `copolicy-dataset check`: one family per module, all limits in `limits`.
 
-`checking.check_dataset` runs them all; this file imports nothing, so that a command line without a check stays quick.
+`checking.check_dataset` applies them. This file imports nothing, so that other commands start quickly.
 """

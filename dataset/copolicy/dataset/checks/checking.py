@@ -1,4 +1,4 @@
-"""Runs every rule over a data set."""
+"""Applies the rules to a data set or to recordings."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,130 +6,127 @@ from pathlib import Path
 import numpy as np
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..files.listing import broken_links, distinct_files
 from ..files.meta_files import INFO_FILE
 from ..task import PairTask
 from ..task_parts import Rule
-from . import balance, check_sums, inputs, leakage, loading, maps, mixtures, schema, timing
-from .episode_table import EpisodeTable
+from . import balance, episode_scenario, inputs, integrity, leakage, loading, provenance, schema, timing
+from .episode_data import EpisodeData
 from .finding import SEVERITIES, Finding
 from .read_recordings import read_recordings
 from .result import CheckResult
 
 RULES: tuple[Rule, ...] = (
     *schema.RULES,
-    *check_sums.RULES,
+    *integrity.RULES,
     *loading.RULES,
     *timing.RULES,
     *inputs.RULES,
     *timing.MOTION_RULES,
     *leakage.DUPLICATE_RULES,
-    *maps.RULES,
+    *episode_scenario.RULES,
     Rule("goal_contact", "rule for where successes end"),
     Rule("obstacle_contact", "rule for the obstacles on its way"),
     Rule("wall_contact", "rule for the walls around it"),
     *balance.RULES,
-    *mixtures.CONSENT_RULES,
+    *provenance.CONSENT_RULES,
     *leakage.RULES,
-    *mixtures.RULES,
+    *provenance.RULES,
 )
-"""The generic rules in the order of the report, and the places of those that only a task can bring."""
+"""The generic rules in the order of the report, with placeholders for rules that only a task can define."""
 
 
 def rules_of(task: PairTask) -> tuple[Rule, ...]:
-    """Every rule for data of a task."""
-    own = {rule.name: rule for rule in task.rules.rules}
-    return (*(own.pop(rule.name, rule) for rule in RULES), *own.values())
+    """All rules for data of a task: generic rules, replaced and extended by those of the task."""
+    task_rules = {rule.name: rule for rule in task.rules.rules}
+    return (*(task_rules.pop(rule.name, rule) for rule in RULES), *task_rules.values())
 
 
-def of_recordings(rule: Rule) -> bool:
-    """Whether a rule says something of each recording, whatever else there is: any part of a folder can be held
-    against such rules on its own, and the data set that the recordings became against the others."""
+def judges_one_recording(rule: Rule) -> bool:
+    """Whether a rule judges each recording on its own, so that it can be applied to any part of a folder."""
     return "recordings" in rule.kinds and not rule.whole
 
 
-def of_data_sets(rule: Rule) -> bool:
-    """The others: both together leave no rule out."""
-    return not of_recordings(rule)
+def judges_data_set(rule: Rule) -> bool:
+    """Whether a rule needs the whole data set: every rule that `judges_one_recording` excludes."""
+    return not judges_one_recording(rule)
 
 
-def read_table(root: Path) -> EpisodeTable:
-    """A LeRobot data set (it has `meta/info.json`) or a folder of recordings.
+def read_data(root: Path) -> EpisodeData:
+    """Reads a LeRobot data set (a folder with `meta/info.json`) or a folder of recordings.
 
     Raises:
-        FileFormatError: neither, or data of a task that is not installed.
-        MissingExtraError: a LeRobot data set without pyarrow.
+        FileFormatError: the folder is neither, or its task is not installed.
     """
     if (root / INFO_FILE).is_file():
         from .read_lerobot import read_lerobot
 
         return read_lerobot(root)
     if not root.is_dir() or not distinct_files(root, "*.mcap", "*.mcap.part"):
-        broken = [f"a link that leads nowhere, {path.name}" for path in broken_links(root)] if root.is_dir() else []
-        found = broken[0] if broken else kind_of(root)
-        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", found)
+        broken = next(iter(broken_links(root)), None) if root.is_dir() else None
+        actual = describe_path(root) if broken is None else f"a link that leads nowhere, {broken.name}"
+        raise FileFormatError(root, "recordings (*.mcap) or a LeRobot data set (meta/info.json)", actual)
     return read_recordings(root)
 
 
 def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
-    """Applies every rule that the data have the columns for. Nothing is changed.
+    """Checks a LeRobot data set or a folder of recordings; changes nothing.
 
     Args:
-        root: a LeRobot data set or a folder of recordings.
-        against: another one that must share no episode with it, for example the test data.
+        root: folder to check.
+        against: another folder that must share no episode with it, for example the test data.
+
+    Raises:
+        FileFormatError: a folder is neither a data set nor recordings, or its task is not installed.
     """
-    result = check_table(read_table(root))
+    result = check_data(read_data(root))
     return result if against is None else add_leaks(result, root, against)
 
 
 def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:
-    """The same with the episodes that a data set shares with another one.
-
-    Args:
-        result: of the check of `root`.
-    """
-    other = read_table(against)
+    """Adds findings for the episodes and people that `root`, with the check result `result`, shares with `against`."""
+    against_data = read_data(against)
     shared = leakage.leaks(
-        leakage.Part(root.name, result.table, range(len(result.table.labels))),
-        leakage.Part(against.name, other, range(len(other.labels))),
+        leakage.ComparedEpisodes(root.name, result.data, range(len(result.data.labels))),
+        leakage.ComparedEpisodes(against.name, against_data, range(len(against_data.labels))),
     )
     findings = _worst_first([*result.findings, *shared])
-    return CheckResult(result.table, findings, (*result.applied, "against"), result.not_applied)
+    return CheckResult(result.data, findings, (*result.applied, "against"), result.not_applied)
 
 
-def check_table(table: EpisodeTable, wanted: Callable[[Rule], bool] = lambda rule: True) -> CheckResult:
-    """Applies every wanted rule that a table has the columns for and its task the part."""
+def check_data(data: EpisodeData, applies: Callable[[Rule], bool] = lambda rule: True) -> CheckResult:
+    """Applies the rules for which `applies` is true and the data have the columns and the task the part."""
     findings: list[Finding] = []
     applied: list[str] = []
     not_applied: dict[str, str] = {}
-    for rule in filter(wanted, rules_of(table.task)):
-        reason = _why_not(rule, table)
+    for rule in filter(applies, rules_of(data.task)):
+        reason = _reason_not_applied(rule, data)
         if reason or rule.find is None:
-            not_applied[rule.name] = reason or table.task.missing(rule.what)
+            not_applied[rule.name] = reason or data.task.missing(rule.what)
             continue
         applied.append(rule.name)
-        with np.errstate(all="ignore"):  # a number that is none is a finding of `finite`
-            findings += rule.find(table)
-    lacking = [name for name, reason in not_applied.items() if reason.startswith("needs")]
-    if lacking and not any(finding.severity == "error" for finding in findings):
-        # Whatever these rules were to find may be there.
-        message = f"rules that could not be applied: {', '.join(f'{name} {not_applied[name]}' for name in lacking)}"
-        findings.append(Finding("", "applied", len(lacking), 0, "error", message))
-    return CheckResult(table, _worst_first(findings), tuple(applied), not_applied)
+        with np.errstate(all="ignore"):  # NaN is a finding of the rule `finite`
+            findings += rule.find(data)
+    unapplied = [name for name, reason in not_applied.items() if reason.startswith("needs")]
+    if unapplied and not any(finding.severity == "error" for finding in findings):
+        # The data may violate these rules.
+        message = f"rules that could not be applied: {', '.join(f'{name} {not_applied[name]}' for name in unapplied)}"
+        findings.append(Finding("", "applied", len(unapplied), 0, "error", message))
+    return CheckResult(data, _worst_first(findings), tuple(applied), not_applied)
 
 
 def _worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
-def _why_not(rule: Rule, table: EpisodeTable) -> str:
-    if table.kind not in rule.kinds:
-        return f"says nothing about {table.kind}"
-    missing = [name for name in rule.columns if name not in table.columns]
-    missing += [name for name in rule.frames if name not in table.frames]
+def _reason_not_applied(rule: Rule, data: EpisodeData) -> str:
+    if data.kind not in rule.kinds:
+        return f"does not apply to {data.kind}"
+    missing = [name for name in rule.columns if name not in data.columns]
+    missing += [name for name in rule.frames if name not in data.frames]
     if missing:
         return f"needs {', '.join(missing)}"
-    if rule.frames and not len(table.starts):
+    if rule.frames and not len(data.starts):
         return "needs the frames of at least one episode"
     return ""

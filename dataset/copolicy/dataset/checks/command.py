@@ -6,16 +6,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..exceptions import InvalidValueError
 from ..files.meta_files import CHECK_FILE
 from ..files.staging import replace_json
 from ..hub.local_copy import local_copy
 from ..task import TABLE, get_task
+from .check_report import check_document, content_hash
 from .limits import limits_of
 from .result import CheckResult
-from .stored_check import check_document, content_hash
 
 _EXAMPLE = """copolicy-dataset check recordings/session-1
   copolicy-dataset check datasets/train --against datasets/test --strict
@@ -23,63 +22,59 @@ _EXAMPLE = """copolicy-dataset check recordings/session-1
 _SHOWN = ("kind", "episodes", "frames", "rules", "not_applied", "counts")
 
 
-def add_check_command(commands: argparse._SubParsersAction) -> None:
+def add_check_command(commands: Commands) -> None:
     """Adds `check`."""
     parser = add_command(
-        commands, "check", _check, "look for what is wrong with recordings or a data set; repairs nothing", _EXAMPLE,
-        _needs,
+        commands, "check", _check, "check recordings or a data set against rules; changes no data", _EXAMPLE,
     )  # fmt: skip
     parser.add_argument(
         "path", nargs="?", metavar="PATH", help="folder of recordings, data set, or USER/NAME on the Hub"
     )
     parser.add_argument("--revision", help="tag, branch or commit on the Hub")
-    parser.add_argument("--against", metavar="PATH", help="data that must share no episode with PATH")
-    parser.add_argument("--strict", action="store_true", help="warnings, too, give exit status 1")
+    parser.add_argument("--against", metavar="PATH", help="data that must not share an episode with PATH")
+    parser.add_argument("--strict", action="store_true", help="exit with status 1 for warnings, too")
     parser.add_argument(
         "--save",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help=f"keep the findings in a data set folder, as {CHECK_FILE} (default: yes)",
+        help=f"write the findings into the data set folder, as {CHECK_FILE} (default: yes)",
     )
-    parser.add_argument("--rules", action="store_true", help="print every limit with its reason, and check nothing")
-    parser.add_argument("--task", default=TABLE, metavar="NAME", help="with --rules: whose (default: %(default)s)")
+    parser.add_argument("--rules", action="store_true", help="print every limit with its reason; check nothing")
+    parser.add_argument(
+        "--task", default=TABLE, metavar="NAME", help="task whose rules --rules prints (default: %(default)s)"
+    )
 
 
-def _needs(arguments: argparse.Namespace) -> tuple[str, ...]:
-    paths = [] if arguments.rules else [arguments.path, arguments.against]
-    return TABLES if any(path is not None and Path(path, "meta").is_dir() for path in paths) else ()
-
-
-def _check(arguments: argparse.Namespace) -> dict:
+def _check(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.rules:
         return {
-            name: f"{one.value:g} {one.unit}: {one.reason}" for name, one in limits_of(get_task(arguments.task)).items()
+            name: f"{limit.value:g} {limit.unit}: {limit.reason}"
+            for name, limit in limits_of(get_task(arguments.task)).items()
         }
     if arguments.path is None:
         raise InvalidValueError("PATH", "a folder, or USER/NAME of a data set on the Hub", None)
-    from .checking import add_leaks, check_dataset  # scipy, which `--help` need not wait for
+    from .checking import add_leaks, check_dataset  # imports scipy, not needed for `--help`
 
     root = local_copy(arguments.path, arguments.revision, ("PATH", "--revision"))
     against = None if arguments.against is None else local_copy(arguments.against)
-    alone = check_dataset(root)
-    # What the Hub's client keeps of a data set is a cache, no place for findings.
-    wanted = arguments.save and alone.table.kind == "lerobot" and Path(arguments.path).exists()
-    content = content_hash(root) if alone.table.kind == "lerobot" and (wanted or arguments.json) else None
-    saved = _save(root, check_document(alone, content)) if wanted else None
-    result = alone if against is None else add_leaks(alone, root, against)
+    own_result = check_dataset(root)
+    # Findings of a data set on the Hub are not written into the client's cache.
+    save = arguments.save and own_result.data.kind == "lerobot" and Path(arguments.path).exists()
+    content = content_hash(root) if own_result.data.kind == "lerobot" and (save or arguments.json) else None
+    saved = _save(root, check_document(own_result, content)) if save else None
+    result = own_result if against is None else add_leaks(own_result, root, against)
     document = check_document(result, content, arguments.strict)
     return _summary(arguments, result, document, saved)
 
 
 def _save(root: Path, document: dict[str, Any]) -> str | None:
-    """Keeps the findings of the data set alone, whatever it was compared with; a folder may refuse them."""
+    """Writes the check report into the data set; returns its path, or None with a warning if that fails."""
     try:
         replace_json(root / CHECK_FILE, document, allow_nan=False)
     except OSError as error:
         reason = error.strerror or str(error)
-        logging.warning(
-            "warning: %s: the findings were not kept there: %s; --no-save does not try", root / CHECK_FILE, reason
-        )
+        message = "warning: %s: the findings were not written: %s; --no-save does not try"
+        logging.warning(message, root / CHECK_FILE, reason)
         return None
     return str(root / CHECK_FILE)
 
@@ -94,5 +89,5 @@ def _summary(
     for finding in result.findings:
         print(finding)
     sys.stdout.flush()
-    kept = {} if saved is None else {"saved": saved}
-    return {**path, **{name: document[name] for name in _SHOWN}, **kept, "passed": document["passed"], **status}
+    saved_entry = {} if saved is None else {"saved": saved}
+    return {**path, **{name: document[name] for name in _SHOWN}, **saved_entry, "passed": document["passed"], **status}

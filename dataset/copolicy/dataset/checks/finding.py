@@ -1,8 +1,8 @@
-"""What a check has to say: which episode, which rule, the figure, its limit, and how bad it is."""
+"""One finding of a check."""
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Severity = Literal["error", "warning", "info"]
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info")
@@ -11,14 +11,14 @@ Figure = float | int | str | None
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a person should know before the data are used.
+    """One finding: episode, rule, measured figure and its limit, severity and message.
 
     Attributes:
-        episode: index of the episode in a LeRobot data set, name of its file in a folder of recordings; empty where
-            the finding is about the whole.
-        rule: name of the rule, a key of `limits.LIMITS` or of a rule without a number.
-        figure: what was measured.
-        limit: what it is measured against.
+        episode: index of the episode in a LeRobot data set, or file name in a folder of recordings; empty for a finding
+            about the whole.
+        rule: name of the violated rule or limit.
+        figure: measured value.
+        limit: value with which the figure was compared.
     """
 
     episode: str
@@ -28,17 +28,17 @@ class Finding:
     severity: Severity
     message: str
 
-    def to_dict(self) -> dict:
-        """JSON-able; numbers that JSON does not know become None."""
+    def to_dict(self) -> dict[str, Any]:
+        """A JSON-compatible dictionary; NaN and infinity become None."""
         return {
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in asdict(self).items()
         }
 
     def __str__(self) -> str:
-        place = f"episode {self.episode}: " if self.episode else ""
+        prefix = f"episode {self.episode}: " if self.episode else ""
         figures = "" if self.figure is None else f" ({_text(self.figure)}; limit {_text(self.limit)})"
-        return f"{self.severity}: {self.rule}: {place}{self.message}{figures}"
+        return f"{self.severity}: {self.rule}: {prefix}{self.message}{figures}"
 
 
 def _text(value: Figure) -> str:

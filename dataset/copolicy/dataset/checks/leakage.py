@@ -1,4 +1,4 @@
-"""Episodes that are there twice: in one data set, or in what a policy is trained on and what it is tested on."""
+"""Rules on duplicate episodes within a data set, and on leakage between training and test data."""
 
 import hashlib
 from collections import defaultdict
@@ -11,135 +11,128 @@ import numpy as np
 from ..features import ACTION, STATE
 from ..lerobot_folder.info import split_range
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding, Severity
 
 PEOPLE = ("pair_id", "player_0_id", "player_1_id")
 
 
 @dataclass(frozen=True)
-class Part:
-    """One side of a comparison: some episodes of a table, by their places."""
+class ComparedEpisodes:
+    """One side of a leakage comparison: episodes of `data` by their indices, under a name."""
 
     name: str
-    table: EpisodeTable
-    places: Sequence[int]
+    data: EpisodeData
+    indices: Sequence[int]
 
 
-def splits(table: EpisodeTable) -> tuple[list[Part], list[Finding]]:
-    """The splits of `meta/info.json` (`"train": "0:40"`), and what is wrong with their ranges."""
-    parts: list[Part] = []
+def splits(data: EpisodeData) -> tuple[list[ComparedEpisodes], list[Finding]]:
+    """The splits of `meta/info.json` (`"train": "0:40"`), and findings about their ranges."""
+    split_episodes: list[ComparedEpisodes] = []
     findings: list[Finding] = []
-    entries = table.info.get("splits")
-    indices = {label: place for place, label in enumerate(table.labels)}
+    entries = data.info.get("splits")
+    index_of = {label: index for index, label in enumerate(data.labels)}
     for name, text in (entries if isinstance(entries, dict) else {}).items():
         if (span := split_range(text)) is None:
-            findings.append(Finding("", "splits", str(text), "FIRST:END", "error", f"split {name} is no range"))
+            findings.append(Finding("", "splits", str(text), "FIRST:END", "error", f"split {name} is not a range"))
             continue
-        if span.stop > len(table.labels) or span.start > span.stop:
-            message = f"split {name} is not a range of the {len(table.labels)} episodes"
-            findings.append(Finding("", "splits", str(text), f"0:{len(table.labels)}", "error", message))
-        places = [place for label, place in indices.items() if int(label) in span]
-        parts.append(Part(str(name), table, places))
-    for one, other in combinations(parts, 2):
-        shared = len(set(one.places) & set(other.places))
+        if span.stop > len(data.labels) or span.start > span.stop:
+            message = f"split {name} is not a range within the {len(data.labels)} episodes"
+            findings.append(Finding("", "splits", str(text), f"0:{len(data.labels)}", "error", message))
+        indices = [index for label, index in index_of.items() if int(label) in span]
+        split_episodes.append(ComparedEpisodes(str(name), data, indices))
+    for first, second in combinations(split_episodes, 2):
+        shared = len(set(first.indices) & set(second.indices))
         if shared:
-            message = f"episodes are in both splits, {one.name} and {other.name}"
+            message = f"episodes are in both splits, {first.name} and {second.name}"
             findings.append(Finding("", "splits", shared, 0, "error", message))
-    return parts, findings
+    return split_episodes, findings
 
 
-def leaks(one: Part, other: Part) -> Iterator[Finding]:
-    """What two parts share: episodes, by name or bit for bit, and people."""
-    for what, ours, theirs in (
-        ("episode_uuid", _texts(one, "episode_uuid"), _texts(other, "episode_uuid")),
-        ("source_sha256", _texts(one, "source_sha256"), _texts(other, "source_sha256")),
-        ("states and actions", _motions(one), _motions(other)),
+def leaks(first: ComparedEpisodes, second: ComparedEpisodes) -> Iterator[Finding]:
+    """Findings for the episodes (by name or bit-identical) and people that two sides share."""
+    for key, first_values, second_values in (
+        ("episode_uuid", _texts(first, "episode_uuid"), _texts(second, "episode_uuid")),
+        ("source_sha256", _texts(first, "source_sha256"), _texts(second, "source_sha256")),
+        ("states and actions", _motions(first), _motions(second)),
     ):
-        shared = sorted(set(ours) & set(theirs))
+        shared = sorted(set(first_values) & set(second_values))
         for value in shared:
-            message = f"same {what} as episode {theirs[value]} of {other.name}"
-            label = ours[value] if one.table is other.table else f"{ours[value]} of {one.name}"
+            message = f"same {key} as episode {second_values[value]} of {second.name}"
+            label = first_values[value] if first.data is second.data else f"{first_values[value]} of {first.name}"
             yield Finding(label, "leakage", 1, 0, "error", message)
     for column in PEOPLE:
-        shared = sorted(set(_texts(one, column)) & set(_texts(other, column)))
+        shared = sorted(set(_texts(first, column)) & set(_texts(second, column)))
         if shared:
-            # Scripted pilots are meant to be met again; a person in both says nothing about new people.
-            severity: Severity = "warning" if _people(one) or _people(other) else "info"
+            # Scripted agents may recur; a person on both sides means that the test does not cover new people.
+            severity: Severity = "warning" if _includes_people(first) or _includes_people(second) else "info"
             names = ", ".join(shared[:5]) + (", ..." if len(shared) > 5 else "")
-            message = f"the same {column} in {one.name} and {other.name}: {names}"
+            message = f"the same {column} in {first.name} and {second.name}: {names}"
             yield Finding("", "leakage_people", len(shared), 0, severity, message)
 
 
-def _between_splits(table: EpisodeTable) -> Iterator[Finding]:
-    parts, findings = splits(table)
+def _between_splits(data: EpisodeData) -> Iterator[Finding]:
+    split_episodes, findings = splits(data)
     yield from findings
-    for one, other in combinations(parts, 2):
-        yield from leaks(one, other)
+    for first, second in combinations(split_episodes, 2):
+        yield from leaks(first, second)
 
 
-def _texts(part: Part, column: str) -> dict[str, str]:
-    if column not in part.table.columns:
+def _texts(compared: ComparedEpisodes, column: str) -> dict[str, str]:
+    if column not in compared.data.columns:
         return {}
-    values = part.table.columns[column]
-    return {str(values[place]): part.table.labels[place] for place in part.places if values[place]}
+    values = compared.data.columns[column]
+    return {str(values[index]): compared.data.labels[index] for index in compared.indices if values[index]}
 
 
-def _motions(part: Part) -> dict[str, str]:
-    table = part.table
-    if STATE not in table.frames or ACTION not in table.frames or not len(table.starts):
+def _motions(compared: ComparedEpisodes) -> dict[str, str]:
+    data = compared.data
+    if STATE not in data.frames or ACTION not in data.frames or not len(data.starts):
         return {}
-    wanted = set(part.places)
-    digests = zip(table.framed.tolist(), motion_digests(table), strict=True)
-    return {digest: table.labels[place] for place, digest in digests if place in wanted}
+    indices = set(compared.indices)
+    digests = zip(data.framed.tolist(), motion_digests(data), strict=True)
+    return {digest: data.labels[index] for index, digest in digests if index in indices}
 
 
-def _people(part: Part) -> bool:
-    sources = part.table.columns.get("source")
-    return sources is None or bool(np.isin(sources[list(part.places)], ("human", "upstream")).any())
+def _includes_people(compared: ComparedEpisodes) -> bool:
+    sources = compared.data.columns.get("source")
+    return sources is None or bool(np.isin(sources[list(compared.indices)], ("human", "upstream")).any())
 
 
-def motion_digests(table: EpisodeTable) -> list[str]:
-    """`(F,)` sha256 of each episode's states and actions, in single precision as a data set stores them."""
-    rows = np.ascontiguousarray(np.hstack((table.frames[STATE], table.frames[ACTION])), np.float32)
+def motion_digests(data: EpisodeData) -> list[str]:
+    """`(F,)` sha256 of each episode's states and actions, in single precision as data sets store them."""
+    rows = np.ascontiguousarray(np.hstack((data.frames[STATE], data.frames[ACTION])), np.float32)
     return [
         hashlib.sha256(rows[start : start + count].tobytes()).hexdigest()
-        for start, count in zip(table.starts, table.counts, strict=True)
+        for start, count in zip(data.starts, data.counts, strict=True)
     ]
 
 
-def _by_column(table: EpisodeTable) -> Iterator[Finding]:
-    for column, what in (("episode_uuid", "the same episode_uuid as"), ("source_sha256", "made of the same file as")):
-        if column in table.columns:
-            yield from _repeated(table.columns[column].tolist(), list(table.labels), what)
+def _by_column(data: EpisodeData) -> Iterator[Finding]:
+    for column, relation in (("episode_uuid", "same episode_uuid as"), ("source_sha256", "same source file as")):
+        if column in data.columns:
+            yield from _repeated(data.columns[column].tolist(), list(data.labels), relation)
 
 
-def _by_bits(table: EpisodeTable) -> Iterator[Finding]:
-    labels = [table.labels[place] for place in table.framed]
-    yield from _repeated(motion_digests(table), labels, "the same states and actions, bit for bit, as")
+def _by_bits(data: EpisodeData) -> Iterator[Finding]:
+    labels = [data.labels[index] for index in data.framed]
+    yield from _repeated(motion_digests(data), labels, "states and actions bit-identical to")
 
 
-def _repeated(values: Iterable[str], labels: list[str], what: str) -> Iterator[Finding]:
-    seen: dict[str, list[str]] = defaultdict(list)
+def _repeated(values: Iterable[str], labels: list[str], relation: str) -> Iterator[Finding]:
+    labels_of: dict[str, list[str]] = defaultdict(list)
     for value, label in zip(values, labels, strict=True):
-        if value and seen[value]:
-            message = f"{what} episode {seen[value][0]}"
-            yield Finding(label, "duplicate", len(seen[value]) + 1, 1, "error", message)
-        seen[value].append(label)
+        if value and labels_of[value]:
+            message = f"{relation} episode {labels_of[value][0]}"
+            yield Finding(label, "duplicate", len(labels_of[value]) + 1, 1, "error", message)
+        labels_of[value].append(label)
 
 
 DUPLICATE_RULES = (
-    Rule(
-        "duplicate_names",
-        "every episode_uuid and every source file once",
-        _by_column,
-        (),
-        ("episode_uuid",),
-        whole=True,
-    ),
+    Rule("duplicate_names", "every episode_uuid and every source file once", _by_column, (), ("episode_uuid",),
+         whole=True),
     Rule("duplicate_motion", "no two episodes with the same states and actions", _by_bits, (STATE, ACTION), whole=True),
-)
-
+)  # fmt: skip
 
 RULES = (
     Rule("leakage", "the splits of meta/info.json share nothing", _between_splits, kinds=("lerobot",), whole=True),

@@ -1,4 +1,4 @@
-"""The form of the data: feature table, rate, episode columns and what may stand in them."""
+"""Rules on the schema: format version, rate, features, episode columns and their values, outcomes."""
 
 from collections.abc import Iterable, Iterator
 from typing import get_args
@@ -9,7 +9,7 @@ from ..episode import EPISODE_COLUMNS, Source, termination_reasons
 from ..features import ACTION, HUMAN_ACTION, features_of
 from ..lerobot_folder.info import stripped_hint
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 CLOCK_FEATURES: dict[str, dict] = {
@@ -22,93 +22,93 @@ CLOCK_FEATURES: dict[str, dict] = {
 """The features that LeRobot adds to every data set."""
 
 
-def _format(table: EpisodeTable) -> Iterator[Finding]:
-    version = str(table.info.get("codebase_version"))
+def _format(data: EpisodeData) -> Iterator[Finding]:
+    version = str(data.info.get("codebase_version"))
     if not version.startswith("v3."):
         yield Finding("", "schema", version, "v3.x", "error", "another version of LeRobot's format")
-    record_hz = table.task.spec.record_hz
-    if not table.fps or record_hz % table.fps:
+    record_hz = data.task.spec.record_hz
+    if not data.fps or record_hz % data.fps:
         message = f"the rate is no divisor of {record_hz} Hz"
-        yield Finding("", "schema", table.fps, f"a divisor of {record_hz}", "error", message)
+        yield Finding("", "schema", data.fps, f"a divisor of {record_hz}", "error", message)
 
 
-def _features(table: EpisodeTable) -> Iterator[Finding]:
-    features, ours = table.info["features"], features_of(table.task.spec)
-    for name, expected in {**ours, **CLOCK_FEATURES}.items():
+def _features(data: EpisodeData) -> Iterator[Finding]:
+    features, task_features = data.info["features"], features_of(data.task.spec)
+    for name, expected in {**task_features, **CLOCK_FEATURES}.items():
         entry = features.get(name)
         if entry is None:
             yield Finding("", "schema", None, None, "error", f"no feature {name} in meta/info.json")
             continue
-        for part in ("dtype", "shape", "names"):
-            found, wanted = entry.get(part), expected[part]
-            if part == "shape":
-                found, wanted = tuple(entry["shape"]), tuple(wanted)
-            if found != wanted and not (part == "names" and wanted is None):
-                yield Finding("", "schema", str(found), str(wanted), "error", f"feature {name} with another {part}")
-        if not table.files:
-            continue  # that no file can be read is said elsewhere, once
-        if name not in table.files:
-            if name in ours:
+        for key in ("dtype", "shape", "names"):
+            actual, target = entry.get(key), expected[key]
+            if key == "shape":
+                actual, target = tuple(entry["shape"]), tuple(target)
+            if actual != target and not (key == "names" and target is None):
+                yield Finding("", "schema", str(actual), str(target), "error", f"feature {name} with another {key}")
+        if not data.files:
+            continue  # unreadable files are findings of `reading`
+        if name not in data.files:
+            if name in task_features:
                 yield Finding("", "schema", None, None, "error", f"no column {name} in the data files")
             continue
-        kind, width = {"float32": "float"}.get(expected["dtype"], expected["dtype"]), expected["shape"][0]
-        # A list without a fixed size, as some tools write it, is judged by its rows.
-        rows = table.frames.get(name)
-        found_width = rows.shape[1] if rows is not None and rows.ndim == 2 else table.files[name][1]
-        found_kind = str(rows.dtype).replace("float32", "float") if rows is not None else table.files[name][0]
-        if (found_kind, found_width) != (kind, width):
-            message = f"column {name} of the data files is of another type"
-            yield Finding("", "schema", f"{found_kind} x {found_width}", f"{kind} x {width}", "error", message)
+        dtype, width = {"float32": "float"}.get(expected["dtype"], expected["dtype"]), expected["shape"][0]
+        # For a list of variable size, as some tools write, the rows decide.
+        rows = data.frames.get(name)
+        actual_width = rows.shape[1] if rows is not None and rows.ndim == 2 else data.files[name][1]
+        actual_dtype = str(rows.dtype).replace("float32", "float") if rows is not None else data.files[name][0]
+        if (actual_dtype, actual_width) != (dtype, width):
+            message = f"column {name} of the data files has the wrong type"
+            yield Finding("", "schema", f"{actual_dtype} x {actual_width}", f"{dtype} x {width}", "error", message)
 
 
-def _columns(table: EpisodeTable) -> Iterator[Finding]:
-    missing = [name for name in EPISODE_COLUMNS if name not in table.columns]
+def _columns(data: EpisodeData) -> Iterator[Finding]:
+    missing = [name for name in EPISODE_COLUMNS if name not in data.columns]
     if missing:
-        hint = stripped_hint(table.info, table.root) if "episode_uuid" in missing and table.kind == "lerobot" else ""
+        hint = stripped_hint(data.info, data.root) if "episode_uuid" in missing and data.kind == "lerobot" else ""
         message = f"meta/episodes has no usable columns {', '.join(missing)}{hint}"
         yield Finding("", "schema", len(missing), 0, "error", message)
-    reasons = termination_reasons(table.task.spec)
+    reasons = termination_reasons(data.task.spec)
     for name, choices in {"source": get_args(Source), "termination_reason": reasons}.items():
-        if name in table.columns:
-            values = table.columns[name]
+        if name in data.columns:
+            values = data.columns[name]
             unknown = ~np.isin(values, choices)
-            yield from table.found("schema", unknown, values, "one of the known", f"unknown {name}")
-    if "episode_uuid" in table.columns:
-        uuids = table.columns["episode_uuid"]
-        yield from table.found("schema", uuids == "", uuids, "a name", "no episode_uuid")
+            yield from data.findings("schema", unknown, values, "one of the known", f"unknown {name}")
+    if "episode_uuid" in data.columns:
+        uuids = data.columns["episode_uuid"]
+        yield from data.findings("schema", uuids == "", uuids, "a name", "no episode_uuid")
 
 
-def _outcome(table: EpisodeTable) -> Iterator[Finding]:
-    reasons, successes = table.columns["termination_reason"], table.task.spec.successes
-    reached, success = np.isin(reasons, successes), table.columns["success"]
+def _outcome(data: EpisodeData) -> Iterator[Finding]:
+    reasons, successes = data.columns["termination_reason"], data.task.spec.successes
+    reached, success = np.isin(reasons, successes), data.columns["success"]
     goal = " or ".join(successes)
-    message = f"ended at the {goal} but is no success"
-    yield from table.found("outcome", reached & ~success, reasons, "success", message)
-    # An episode of the original program may be a success by its own flag; ours end as soon as the goal is touched.
+    message = f"ended at the {goal} but is not a success"
+    yield from data.findings("outcome", reached & ~success, reasons, "success", message)
+    # The original program may flag a success elsewhere; our episodes end as soon as the goal is touched.
     message = f"a success that did not end at the {goal}"
-    yield from table.found("outcome", ~reached & success, reasons, goal, message)
+    yield from data.findings("outcome", ~reached & success, reasons, goal, message)
 
 
-def _outcome_of_frames(table: EpisodeTable) -> Iterator[Finding]:
-    last = np.zeros(table.frame_count, bool)
-    last[table.ends] = True
+def _outcome_of_frames(data: EpisodeData) -> Iterator[Finding]:
+    last = np.zeros(data.frame_count, bool)
+    last[data.ends] = True
     for name, expected, message in (
         ("next.done", last, "next.done is not true at the last frame alone"),
-        ("next.success", last & np.repeat(table.of_framed("success"), table.counts),
+        ("next.success", last & np.repeat(data.framed_column("success"), data.counts),
          "next.success contradicts the episode's success"),
     ):  # fmt: skip
-        marks = table.count(table.frames[name].reshape(-1).astype(bool) != expected)
-        yield from table.found("outcome", marks > 0, marks, 0, message)
+        marks = data.count(data.frames[name].reshape(-1).astype(bool) != expected)
+        yield from data.findings("outcome", marks > 0, marks, 0, message)
 
 
-def _alignment(table: EpisodeTable) -> Iterable[Finding]:
-    human, stored = np.split(table.frames[ACTION], 2, axis=1)[1], table.frames[HUMAN_ACTION]
+def _alignment(data: EpisodeData) -> Iterable[Finding]:
+    human, stored = np.split(data.frames[ACTION], 2, axis=1)[1], data.frames[HUMAN_ACTION]
     previous = np.zeros_like(human)
     previous[1:] = human[:-1]
-    previous[table.starts] = 0
-    off, bound = table.largest(np.abs(stored - previous).max(axis=1)).astype(float), table.limit("previous_action")
-    message = f"{HUMAN_ACTION} is not the human action of the frame before"
-    return table.found("alignment", ~(off <= bound), off, bound, message)
+    previous[data.starts] = 0
+    errors, bound = data.maximum(np.abs(stored - previous).max(axis=1)).astype(float), data.limit("previous_action")
+    message = f"{HUMAN_ACTION} is not the human action of the previous frame"
+    return data.findings("alignment", ~(errors <= bound), errors, bound, message)
 
 
 RULES = (

@@ -1,47 +1,49 @@
-"""Time: late ticks, the rate that was kept, gaps between frames, whether motion fits the clock, and re-simulation."""
+"""Rules on timing: late steps, achieved rate, timestamps, duration and length of episodes."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from ..task_parts import Rule
-from .episode_table import EpisodeTable
+from .episode_data import EpisodeData
 from .finding import Finding
 
 
-def _late_ticks(table: EpisodeTable) -> Iterator[Finding]:
-    steps = np.maximum(np.rint(table.columns["duration_s"] * table.task.spec.record_hz), 1)
-    yield from table.graded("late_ticks", table.columns["late_ticks"] / steps, "share of steps that began late")
+def _late_ticks(data: EpisodeData) -> Iterator[Finding]:
+    steps = np.maximum(np.rint(data.columns["duration_s"] * data.task.spec.record_hz), 1)
+    yield from data.graded("late_ticks", data.columns["late_ticks"] / steps, "proportion of steps that began late")
 
 
-def _achieved_hz(table: EpisodeTable) -> Iterator[Finding]:
-    kept, hz = table.columns["achieved_hz"], table.task.spec.record_hz
-    yield from table.graded("achieved_hz", np.abs(kept / hz - 1), f"the loop's rate was this share away from {hz} Hz")
-    unknown = np.isnan(kept) & (table.columns["source"] == "human")
+def _achieved_hz(data: EpisodeData) -> Iterator[Finding]:
+    achieved, hz = data.columns["achieved_hz"], data.task.spec.record_hz
+    yield from data.graded(
+        "achieved_hz", np.abs(achieved / hz - 1), f"relative deviation of the loop's rate from {hz} Hz"
+    )
+    unknown = np.isnan(achieved) & (data.columns["source"] == "human")
     if unknown.any():
-        message = "episodes of people that do not tell the rate their loop kept"
+        message = "episodes of people without the achieved rate of their loop"
         yield Finding("", "achieved_hz", int(unknown.sum()), 0, "warning", message)
 
 
-def _timestamps(table: EpisodeTable) -> Iterator[Finding]:
-    place = np.arange(table.frame_count) - np.repeat(table.starts, table.counts)
-    stored = table.frames["timestamp"].reshape(-1).astype(float)
+def _timestamps(data: EpisodeData) -> Iterator[Finding]:
+    frame_index = np.arange(data.frame_count) - np.repeat(data.starts, data.counts)
+    stored = data.frames["timestamp"].reshape(-1).astype(float)
     # Single precision at 1000 s resolves 6e-5 s, within the tolerance.
-    off = table.largest(np.abs(stored - place / table.fps))
-    message = "a timestamp is not its frame's; frames are missing or the rate is another"
-    yield from table.beyond("timestamp", off, message)
+    errors = data.maximum(np.abs(stored - frame_index / data.fps))
+    message = "a timestamp does not match its frame: frames are missing or the rate is wrong"
+    yield from data.over_limit("timestamp", errors, message)
 
 
-def _duration(table: EpisodeTable) -> Iterator[Finding]:
-    off = np.abs(table.columns["duration_s"] * table.fps - table.columns["length"])
-    bound = table.limit("duration")
+def _duration(data: EpisodeData) -> Iterator[Finding]:
+    errors = np.abs(data.columns["duration_s"] * data.fps - data.columns["length"])
+    bound = data.limit("duration")
     message = "duration_s and the number of frames differ by this many frames"
-    yield from table.found("duration", ~(off <= bound + 1e-6), off, bound, message)
+    yield from data.findings("duration", ~(errors <= bound + 1e-6), errors, bound, message)
 
 
-def _short(table: EpisodeTable) -> Iterator[Finding]:
-    seconds, bound = table.columns["length"] / table.fps, table.limit("short")
-    yield from table.found("short", seconds < bound, seconds, bound, "the episode lasts this many s", "warning")
+def _short(data: EpisodeData) -> Iterator[Finding]:
+    seconds, bound = data.columns["length"] / data.fps, data.limit("short")
+    yield from data.findings("short", seconds < bound, seconds, bound, "the episode lasts this many s", "warning")
 
 
 RULES = (

@@ -1,1 +1,1 @@
-"""What every command has in common: parsers, output, exit status, flags that are numbers."""
+"""Shared parts of all commands: parsers, output, exit status, numeric flags."""

@@ -1,4 +1,4 @@
-"""What every command of every room shares: flags, exit status, progress, and errors of one line."""
+"""Shared by the commands of all rooms: common flags, exit status, progress bars, one-line errors."""
 
 import argparse
 import contextlib
@@ -14,38 +14,41 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 from ..exceptions import CopolicyError
-from ..files.staging import causes, refusal
-from .extras import extra_behind, require_packages
+from ..files.staging import disk_error_number, error_chain
+from .extras import missing_extra_error, require_packages
 
 DISTRIBUTION = "lerobot_policy_copolicy"
-"""The package as it is installed."""
+"""Name of the installed distribution."""
+
+type Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
+"""Where the commands of a script are added."""
 
 Handler = Callable[[argparse.Namespace], dict]
-"""A command: takes its parsed flags, returns its summary as a JSON-able dict."""
+"""Runs a command: takes the parsed flags, returns a summary that JSON can store."""
 
 Needs = Sequence[str] | Callable[[argparse.Namespace], Sequence[str]]
-"""Packages of extras that a command imports (see `extras`), or what says so of its parsed flags."""
+"""Packages of extras that a command imports (see `extras`), or a function that lists them for the parsed flags."""
 
 
-def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
-    """Parser of one room's script, and where its commands are added."""
+def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, Commands]:
+    """Returns the parser of a room's script and the object that its commands are added to."""
     parser = argparse.ArgumentParser(prog=prog, description=description)
     add_version_flag(parser)
     return parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
 
 def add_version_flag(parser: argparse.ArgumentParser) -> None:
-    """The flag of every script that says which release it is of."""
+    """Adds `--version`, which prints the installed release."""
     parser.add_argument("--version", action="version", version=f"%(prog)s {version(DISTRIBUTION)}")
 
 
 def add_command(
-    commands: argparse._SubParsersAction, name: str, handler: Handler, help: str, example: str, needs: Needs = ()
-):
+    commands: Commands, name: str, handler: Handler, help: str, example: str, needs: Needs = ()
+) -> argparse.ArgumentParser:
     """Adds a command with `--json`, `--debug` and an example at the end of its `--help`.
 
     Args:
-        needs: checked before the handler is called, so that nothing is begun where a package is missing.
+        needs: packages that are checked before the handler is called.
     """
     parser = commands.add_parser(
         name,
@@ -59,10 +62,8 @@ def add_command(
     return parser
 
 
-def add_group(
-    commands: argparse._SubParsersAction, name: str, help: str, description: str, examples: Sequence[str]
-) -> argparse._SubParsersAction:
-    """Adds a command of several steps, each to be added by `add_command` to what comes back."""
+def add_group(commands: Commands, name: str, help: str, description: str, examples: Sequence[str]) -> Commands:
+    """Adds a command with sub-commands; `add_command` adds them to the returned object."""
     parser = commands.add_parser(
         name,
         help=help,
@@ -74,35 +75,35 @@ def add_group(
 
 
 def add_common_flags(parser: argparse.ArgumentParser) -> None:
-    """The two flags that every command has."""
+    """Adds `--json` and `--debug`."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout; logs go to stderr")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> int:
-    """Parses, runs the handler, prints its summary; returns the exit status (0, 1 or 2).
+    """Parses the flags, runs the handler, prints its summary and returns the exit status (0, 1 or 2).
 
-    A summary may hold `exit_status` when the work was done but its result is a finding (1). Whoever reads the output,
-    such as `head`, may stop before its end: the work is done all the same, in silence.
+    A summary may contain `exit_status`, 1 where the work was done but its result is a finding. If the reader of the
+    output, such as `head`, closes the pipe early, the command still completes without an error.
     """
-    with quiet_when_closed():
+    with tolerate_closed_pipes():
         logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
         try:
             arguments = parser.parse_args(argv)
-        except CopolicyError as error:  # of a value that a flag does not take
+        except CopolicyError as error:  # raised by a flag's `type` function
             print(f"{parser.prog}: {error}", file=sys.stderr)
             return error.exit_status
-        return _handled(parser.prog, arguments)
+        return _run_handler(parser.prog, arguments)
 
 
-def _handled(prog: str, arguments: argparse.Namespace) -> int:
+def _run_handler(prog: str, arguments: argparse.Namespace) -> int:
     try:
         needs: Needs = getattr(arguments, "needs", ())
         require_packages(*(needs(arguments) if callable(needs) else needs))
         try:
             summary = dict(arguments.handler(arguments))
         except ImportError as error:
-            if missing := extra_behind(error):
+            if missing := missing_extra_error(error):
                 raise missing from error
             raise
     except CopolicyError as error:
@@ -126,34 +127,34 @@ def _handled(prog: str, arguments: argparse.Namespace) -> int:
 
 
 def system_line(error: BaseException) -> str | None:
-    """What the system refused in one line with the path, None for an error of another kind.
+    """Describes a system error in one line with its path; None for any other error.
 
-    Libraries hide it behind errors of their own: h5py and pyarrow have an OSError without number and path, safetensors
-    and torch none at all.
+    Libraries wrap system errors: h5py and pyarrow raise an OSError without number and path, safetensors and torch
+    raise other types.
     """
-    number = refusal(error)
+    number = disk_error_number(error)
     if number is None and not isinstance(error, OSError):
         return None
     texts = (error.strerror, " ".join(str(error).split())) if isinstance(error, OSError) else ()
     text = os.strerror(number) if number is not None else next(filter(None, texts), type(error).__name__)
-    chain = causes(error) if number is not None else (error,)
+    chain = error_chain(error) if number is not None else (error,)
     paths = (getattr(cause, "filename", None) for cause in chain)
     path = next((path for path in paths if isinstance(path, (str, bytes, os.PathLike))), None)
     return text if path is None else f"{os.fsdecode(path)}: {text}"
 
 
-def progress[Item](items: Iterable[Item], total: int | None, what: str) -> Iterable[Item]:
-    """Passes items on under a progress bar."""
-    with progress_bar(total, what) as bar:
+def progress[Item](items: Iterable[Item], total: int | None, label: str) -> Iterable[Item]:
+    """Iterates over items with a progress bar."""
+    with progress_bar(total, label) as bar:
         for item in items:
             yield item
             bar.update()
 
 
-def progress_bar(total: int | None, what: str) -> tqdm:
-    """A progress bar on stderr when that is a terminal (or `COPOLICY_PROGRESS=1`), silent otherwise."""
+def progress_bar(total: int | None, label: str) -> "tqdm[Any]":
+    """A progress bar on stderr, shown if stderr is a terminal or `COPOLICY_PROGRESS=1`."""
     shown = sys.stderr.isatty() or os.environ.get("COPOLICY_PROGRESS") == "1"
-    return tqdm(total=total, desc=what, disable=not shown, file=sys.stderr, mininterval=0.5)
+    return tqdm(total=total, desc=label, disable=not shown, file=sys.stderr, mininterval=0.5)
 
 
 def _lines(summary: dict, indent: str = "") -> Iterable[str]:
@@ -170,8 +171,8 @@ def _lines(summary: dict, indent: str = "") -> Iterable[str]:
             yield f"{indent}{key:<{width}}  {value}"
 
 
-class _PipeEnd(io.FileIO):
-    """A file descriptor that forgets what nobody reads any more."""
+class _TolerantPipe(io.FileIO):
+    """A file descriptor that discards data written after the reader closed the pipe."""
 
     def write(self, data: Any, /) -> int | None:
         try:
@@ -181,34 +182,34 @@ class _PipeEnd(io.FileIO):
 
 
 @contextlib.contextmanager
-def quiet_when_closed() -> Iterator[None]:
-    """In this block a closed pipe behind stdout or stderr is no error: the command does its work to the end.
+def tolerate_closed_pipes() -> Iterator[None]:
+    """Ignores closed pipes behind stdout and stderr in this block, so that the command runs to its end.
 
-    Streams that are not those of the process, such as a test's, are left as they are.
+    Streams that do not belong to the process, such as those of a test, are left unchanged.
     """
-    before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = ours = tuple(map(_tolerant, before))
+    original = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = wrapped = tuple(map(_tolerant, original))
     try:
         yield
     finally:
-        for stream, old in zip(ours, before, strict=True):
-            if stream is not old and not stream.closed:
+        for stream, original_stream in zip(wrapped, original, strict=True):
+            if stream is not original_stream and not stream.closed:
                 stream.flush()
-        sys.stdout, sys.stderr = before
+        sys.stdout, sys.stderr = original
 
 
 def _tolerant(stream: TextIO) -> TextIO:
     if not isinstance(stream, io.TextIOWrapper):
         return stream
     if stream.errors in ("strict", "surrogateescape"):
-        # A letter that the terminal's encoding lacks, or a file name of another one, is no reason to stop.
+        # Characters that the terminal cannot encode are escaped instead of raising an error.
         stream.reconfigure(errors="backslashreplace")
-    raw = getattr(stream.buffer, "raw", stream.buffer)  # without a buffer under `python -u`
+    raw = getattr(stream.buffer, "raw", stream.buffer)  # `python -u` has no buffer
     if type(raw) is not io.FileIO:
         return stream
     stream.flush()
     return io.TextIOWrapper(
-        io.BufferedWriter(_PipeEnd(raw.fileno(), "w", closefd=False)),
+        io.BufferedWriter(_TolerantPipe(raw.fileno(), "w", closefd=False)),
         encoding=stream.encoding,
         errors=stream.errors,
         line_buffering=stream.line_buffering,

@@ -1,12 +1,12 @@
-"""The packages that an installation may lack, the extra that brings each, and how a command asks for them."""
+"""Optional packages, the extra that installs each, and checks that they are installed."""
 
 from importlib.util import find_spec
 
 from ..exceptions import MissingExtraError
 
 _TRAIN = (
-    "accelerate", "av", "datasets", "diffusers", "diptest", "gymnasium", "h5py", "httpx", "huggingface_hub", "lerobot",
-    "matplotlib", "numcodecs", "pandas", "PIL", "pyarrow", "safetensors", "sklearn", "torch", "zarr",
+    "accelerate", "av", "datasets", "diffusers", "gymnasium", "h5py", "lerobot", "matplotlib", "numcodecs", "pandas",
+    "PIL", "safetensors", "torch", "zarr",
 )  # fmt: skip
 EXTRAS = {
     **dict.fromkeys(_TRAIN, "train"),
@@ -16,35 +16,31 @@ EXTRAS = {
     "onnx": "onnx",
     "onnxruntime": "onnx",
 }
-"""The extra that brings a package, by the name under which it is imported."""
+"""Name of the extra by import name of a package."""
 
-DISTRIBUTIONS = {"PIL": "Pillow", "sklearn": "scikit-learn"}
-"""Names of packages that are installed under another one."""
+DISTRIBUTIONS = {"PIL": "Pillow"}
+"""Distribution name by import name, where they differ."""
 
-TABLES = ("pyarrow",)
-"""Reading and writing LeRobot data sets."""
-DATASETS = ("pyarrow", "lerobot", "datasets")
-"""Making LeRobot data sets through LeRobot."""
+DATASETS = ("lerobot", "datasets")
+"""Packages to create data sets through LeRobot."""
 POLICIES = ("torch", "lerobot", "diffusers")
-"""Loading a policy."""
-TRAINING = ("lerobot", "torch", "accelerate", "diffusers", "datasets", "pyarrow")
-"""LeRobot's trainer."""
+"""Packages to load a policy."""
+TRAINING = ("lerobot", "torch", "accelerate", "diffusers", "datasets")
+"""Packages of LeRobot's trainer."""
 FIGURES = ("matplotlib",)
-"""Drawing figures."""
+"""Packages to draw figures."""
 BACKEND_PACKAGES = {"onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}
-"""What runs the network of a policy, beside torch."""
-HUB = ("huggingface_hub", "httpx")
-"""The client of the Hub."""
+"""Packages by inference backend, beside torch."""
 
 
 def require_packages(*packages: str) -> None:
     """Checks that packages are installed, without importing them.
 
     Args:
-        packages: names under which they are imported, each a key of `EXTRAS`.
+        packages: import names, each a key of `EXTRAS`.
 
     Raises:
-        MissingExtraError: one is not; it names the first of them and its extra.
+        MissingExtraError: a package is missing; the message names the first one and its extra.
     """
     for package in packages:
         if find_spec(package) is None:
@@ -52,11 +48,11 @@ def require_packages(*packages: str) -> None:
 
 
 def missing_extra(package: str) -> MissingExtraError:
-    """The error for a package that is not there, whose extra is known."""
+    """The error for a missing package of an extra."""
     return MissingExtraError(DISTRIBUTIONS.get(package, package), EXTRAS[package])
 
 
-def extra_behind(error: ImportError) -> MissingExtraError | None:
-    """The same for an import that failed; None where the module is no package of an extra."""
+def missing_extra_error(error: ImportError) -> MissingExtraError | None:
+    """The error for a failed import; None if the module does not belong to an extra."""
     package = (error.name or "").partition(".")[0]
     return missing_extra(package) if package in EXTRAS and find_spec(package) is None else None

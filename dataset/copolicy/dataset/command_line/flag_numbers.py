@@ -1,7 +1,7 @@
-"""Numbers of the command line, held against their bounds before any work begins.
+"""Number flags whose bounds are checked before any work begins.
 
-Each function makes the `type` of a flag, which raises InvalidValueError for another number, NaN, or no number: argparse
-passes it on, and `commandline.run` makes it one line.
+Each function returns the `type` of a flag. It raises InvalidValueError for NaN, a number out of bounds or other text;
+argparse passes the error on and `commands.run` prints it as one line.
 """
 
 import argparse
@@ -11,46 +11,48 @@ from collections.abc import Callable
 from ..exceptions import InvalidValueError
 
 LARGEST_SEED = 2**32 - 1
-"""The largest that numpy's and LeRobot's generators take."""
+"""Largest seed that the generators of numpy and LeRobot accept."""
 
-MOST = 10**6
-"""Episodes, steps, plans or processes of one call; more are a slip of the hand."""
+MAX_COUNT = 10**6
+"""Upper bound of counts such as episodes or steps; catches typing errors."""
 
 
-def whole_number(flag: str, least: int | None = 1, most: int = MOST) -> Callable[[str], int]:
-    """A whole number from `least` to `most`; without `least` the command looks at that side itself."""
+def whole_number(flag: str, minimum: int | None = 1, maximum: int = MAX_COUNT) -> Callable[[str], int]:
+    """A whole number from `minimum` to `maximum`; without `minimum` the command checks the lower bound itself."""
 
     def parse(text: str) -> int:
         try:
             value = int(text)
         except ValueError:
             raise InvalidValueError(flag, "a whole number", text) from None
-        if least is not None and value < least:
-            raise InvalidValueError(flag, f"at least {least}", value)
-        if value > most:
-            raise InvalidValueError(flag, f"at most {most}", value)
+        if minimum is not None and value < minimum:
+            raise InvalidValueError(flag, f"at least {minimum}", value)
+        if value > maximum:
+            raise InvalidValueError(flag, f"at most {maximum}", value)
         return value
 
     return parse
 
 
 def add_whole_number(
-    command: argparse.ArgumentParser,
+    parser: argparse.ArgumentParser,
     flag: str,
-    meaning: str,
+    help: str,
     default: int | None = None,
-    least: int | None = 1,
-    most: int = MOST,
+    minimum: int | None = 1,
+    maximum: int = MAX_COUNT,
 ) -> None:
-    """Adds a flag of a `whole_number`."""
-    command.add_argument(flag, type=whole_number(flag, least, most), default=default, help=meaning)
+    """Adds a flag of type `whole_number`."""
+    parser.add_argument(flag, type=whole_number(flag, minimum, maximum), default=default, help=help)
 
 
-def number(flag: str, least: float = 0.0, most: float = math.inf, above: bool = False) -> Callable[[str], float]:
-    """A finite number from `least` to `most`.
+def number(
+    flag: str, minimum: float = 0.0, maximum: float = math.inf, exclusive: bool = False
+) -> Callable[[str], float]:
+    """A finite number from `minimum` to `maximum`.
 
     Args:
-        above: `least` itself is too small.
+        exclusive: `minimum` itself is not allowed.
     """
 
     def parse(text: str) -> float:
@@ -58,19 +60,19 @@ def number(flag: str, least: float = 0.0, most: float = math.inf, above: bool = 
             value = float(text)
         except ValueError:
             raise InvalidValueError(flag, "a number", text) from None
-        if not value >= least or (above and value == least):
-            raise InvalidValueError(flag, f"a number {'above' if above else 'of at least'} {least:g}", value)
+        if not value >= minimum or (exclusive and value == minimum):
+            raise InvalidValueError(flag, f"a number {'above' if exclusive else 'of at least'} {minimum:g}", value)
         if not math.isfinite(value):
             raise InvalidValueError(flag, "a finite number", value)
-        if value > most:
-            raise InvalidValueError(flag, f"a number of at most {most:g}", value)
+        if value > maximum:
+            raise InvalidValueError(flag, f"a number of at most {maximum:g}", value)
         return value
 
     return parse
 
 
 def seed(flag: str = "--seed") -> Callable[[str], int]:
-    """A seed of everything that is drawn."""
+    """A seed of random generators."""
     return whole_number(flag, 0, LARGEST_SEED)
 
 

@@ -1,33 +1,33 @@
-"""The flags `--maps` and `--task` of every command that acts in scenarios."""
+"""The flags `--maps` and `--task` of commands that run scenarios."""
 
 import argparse
 
 from ..task import TABLE, PairTask
 
 
-def add_task_flag(command: argparse.ArgumentParser, given: bool = True) -> None:
-    """Adds `--task NAME`; without `given` its value is None where nobody gave it."""
-    default = TABLE if given else None
-    command.add_argument("--task", default=default, metavar="NAME", help=f"task that is installed (default: {TABLE})")
+def add_task_flag(parser: argparse.ArgumentParser, use_default: bool = True) -> None:
+    """Adds `--task NAME`; without `use_default` its value is None if the flag is missing."""
+    default = TABLE if use_default else None
+    parser.add_argument("--task", default=default, metavar="NAME", help=f"name of an installed task (default: {TABLE})")
 
 
-def set_name(task: PairTask, given: str | None, default: str) -> str:
-    """The value of `--maps`, or its default; the first set of a task that has none of that name."""
-    return given or (default if default in task.scenario_sets else next(iter(task.scenario_sets)))
+def map_set_name(task: PairTask, name: str | None, default: str) -> str:
+    """The value of `--maps`, else the default set, else the first set of a task without a set of that name."""
+    return name or (default if default in task.scenario_sets else next(iter(task.scenario_sets)))
 
 
-def add_maps_flag(command: argparse.ArgumentParser, default: str, dest: str = "maps", given: bool = True) -> None:
+def add_maps_flag(parser: argparse.ArgumentParser, default: str, dest: str = "maps", use_default: bool = True) -> None:
     """Adds `--maps NAME|FILE[#SPLIT]`, which `PairTask.scenario_set` reads.
 
     Args:
-        default: name of the set that the command takes where the flag is not given.
-        given: the flag's value is then this name; otherwise it is None and the command sees that nobody gave it.
+        default: name of the set that the command uses without the flag.
+        use_default: use `default` as the flag's value if it is missing; otherwise the value is None.
     """
-    command.add_argument(
+    parser.add_argument(
         "--maps",
         dest=dest,
-        default=default if given else None,
+        default=default if use_default else None,
         metavar="NAME|FILE[#SPLIT]",
-        help="set of maps of the task, such as training, holdout or unseen; a file of one's own maps "
-        f"(`copolicy-collect maps`), or one of its splits (default: {default})",
+        help="map set of the task, such as training, holdout or unseen; a map file (`copolicy-collect maps`), or one "
+        f"split of it (default: {default})",
     )

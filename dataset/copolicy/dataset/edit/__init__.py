@@ -1,1 +1,1 @@
-"""Editing data sets: select, split without leakage, withdraw a consent, amend and restore columns."""
+"""Edits data sets: select, split without leakage, withdraw a consent, amend and restore columns."""

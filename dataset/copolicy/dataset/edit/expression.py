@@ -1,4 +1,4 @@
-"""Conditions on episode columns, such as `duration_s < 20 and source == "human"`, parsed and never run as Python."""
+"""Parses conditions on episode columns, such as `duration_s < 20 and source == "human"`, without running Python."""
 
 import ast
 import operator
@@ -26,90 +26,91 @@ _LITERALS = (str, int, float, bool)
 
 
 def parse_condition(text: str, columns: Mapping[str, str], flag: str = "--where") -> Condition:
-    """The condition as a function of an episode's row.
+    """Parses a condition into a function of an episode's row.
 
-    Numbers are compared with numbers and texts with texts; `in` asks for one of several values
-    (`map_id in ("training-01", "training-02")`) or a part of a text (`"slow" in quality_flags`). A column of flags
-    stands for itself (`success and not discarded`). What is unknown (null, NaN) equals nothing and is in no order.
+    Numbers are compared with numbers and texts with texts. `in` tests for one of several values
+    (`map_id in ("training-01", "training-02")`) or for a substring (`"slow" in quality_flags`). A boolean column
+    needs no comparison (`success and not discarded`). Comparisons with unknown values (null, NaN) are false, except
+    `!=` and `not in`.
 
     Args:
-        columns: `str`, `int`, `float` or `bool` of each column that may be named.
+        columns: type of each allowed column: `str`, `int`, `float` or `bool`.
 
     Raises:
-        InvalidValueError: another form, or values of two types compared.
+        InvalidValueError: a syntax error, or values of different types compared.
         UnknownNameError: no such column.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval")
-        return _flag(tree.body, columns, text, flag)
+        return _parse_bool(tree.body, columns, text, flag)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InvalidValueError(flag, GRAMMAR, text) from None
 
 
-def _flag(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> Condition:
-    """A part of the expression that is true or false."""
+def _parse_bool(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> Condition:
+    """Parses a boolean part of the expression."""
     if isinstance(node, ast.BoolOp):
-        parts = [_flag(value, columns, text, flag) for value in node.values]
+        parts = [_parse_bool(value, columns, text, flag) for value in node.values]
         combine = all if isinstance(node.op, ast.And) else any
         return lambda row: combine(part(row) for part in parts)
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        inner = _flag(node.operand, columns, text, flag)
+        inner = _parse_bool(node.operand, columns, text, flag)
         return lambda row: not inner(row)
     if isinstance(node, ast.Compare):
-        return _comparison(node, columns, text, flag)
-    kind, value = _value(node, columns, text, flag)
-    if kind != "bool":
-        raise InvalidValueError(flag, "a comparison, or a column of flags such as success", ast.unparse(node))
+        return _parse_comparison(node, columns, text, flag)
+    value_type, value = _parse_value(node, columns, text, flag)
+    if value_type != "bool":
+        raise InvalidValueError(flag, "a comparison, or a boolean column such as success", ast.unparse(node))
     return lambda row: bool(value(row))
 
 
-def _comparison(node: ast.Compare, columns: Mapping[str, str], text: str, flag: str) -> Condition:
+def _parse_comparison(node: ast.Compare, columns: Mapping[str, str], text: str, flag: str) -> Condition:
     parts: list[Condition] = []
-    left = node.left
-    for comparison, right in zip(node.ops, node.comparators, strict=True):
+    left_node = node.left
+    for comparison, right_node in zip(node.ops, node.comparators, strict=True):
         compare = _COMPARISONS.get(type(comparison))
         if compare is None:
             raise InvalidValueError(flag, GRAMMAR, text)
-        kind, first = _value(left, columns, text, flag)
+        left_type, left_value = _parse_value(left_node, columns, text, flag)
         if isinstance(comparison, (ast.In, ast.NotIn)):
-            kinds, second = _values(right, columns, text, flag)
+            right_types, right_value = _parse_membership(right_node, columns, text, flag)
         else:
-            right_kind, second = _value(right, columns, text, flag)
-            kinds = {right_kind}
-        if not all(_comparable(kind, right_kind) for right_kind in kinds):
-            found = f"{kind} compared with {', '.join(sorted(kinds))} in {ast.unparse(node)}"
+            right_type, right_value = _parse_value(right_node, columns, text, flag)
+            right_types = {right_type}
+        if not all(_comparable(left_type, right_type) for right_type in right_types):
+            found = f"{left_type} compared with {', '.join(sorted(right_types))} in {ast.unparse(node)}"
             raise InvalidValueError(flag, "values of one type in a comparison", found)
-        unknown = isinstance(comparison, (ast.NotEq, ast.NotIn))
-        parts.append(_known(compare, first, second, unknown))
-        left = right
+        default = isinstance(comparison, (ast.NotEq, ast.NotIn))
+        parts.append(_compare_known(compare, left_value, right_value, default))
+        left_node = right_node
     return lambda row: all(part(row) for part in parts)
 
 
-def _known(compare: Callable[[Any, Any], bool], first: Condition, second: Condition, unknown: bool) -> Condition:
+def _compare_known(compare: Callable[[Any, Any], bool], a: Condition, b: Condition, default: bool) -> Condition:
     def compared(row: Row) -> bool:
-        a, b = first(row), second(row)
-        return unknown if a is None or b is None else compare(a, b)
+        left, right = a(row), b(row)
+        return default if left is None or right is None else compare(left, right)
 
     return compared
 
 
-def _values(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> tuple[set[str], Condition]:
-    """What may stand behind `in`: some values, or a text of which the left side is a part."""
+def _parse_membership(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> tuple[set[str], Condition]:
+    """Parses the right side of `in`: types and function of the values, or of a text to search."""
     if isinstance(node, (ast.Tuple, ast.List, ast.Set)):
-        kinds, values = set(), []
+        types, values = set(), []
         for element in node.elts:
-            kind, value = _value(element, {}, text, flag)
-            kinds.add(kind)
+            value_type, value = _parse_value(element, {}, text, flag)
+            types.add(value_type)
             values.append(value({}))
-        return kinds, lambda _: values
-    kind, value = _value(node, columns, text, flag)
-    if kind != "str":
+        return types, lambda _: values
+    value_type, value = _parse_value(node, columns, text, flag)
+    if value_type != "str":
         raise InvalidValueError(flag, 'values in brackets, such as ("a", "b"), or a text after in', ast.unparse(node))
-    return {kind}, value
+    return {value_type}, value
 
 
-def _value(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> tuple[str, Condition]:
-    """Type and value of a column, a number, a text or a flag."""
+def _parse_value(node: ast.expr, columns: Mapping[str, str], text: str, flag: str) -> tuple[str, Condition]:
+    """Parses a column, number, text or boolean; returns its type and a function of the row."""
     if isinstance(node, ast.Name):
         if node.id not in columns:
             raise UnknownNameError(f"column in {flag}", node.id, columns)

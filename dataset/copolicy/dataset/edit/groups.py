@@ -1,4 +1,4 @@
-"""Which episodes of a data set belong together: those of a pair and its partners, of a map, or copies alone."""
+"""Groups episodes that must stay in one part of a split: by pair and partners, by map, or only copies."""
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
@@ -9,41 +9,43 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..scenarios import base_name
-from .selection import Row, consents_of
+from .selection import Row, consent_ids
 
 By = Literal["pairs", "maps", "episodes"]
-"""What stays together: people who carried together or with the same partner; a map; nothing but copies."""
+"""Unit of a group: players who acted together or with the same partner; a map; a single episode and its copies."""
 
 
-def groups(rows: Sequence[Row], motions: Sequence[Hashable], by: By, same_consent: bool = False) -> list[list[int]]:
-    """The places of the episodes that must stay together, each group ascending, in the order of their first.
+def group_episodes(
+    rows: Sequence[Row], motions: Sequence[Hashable], by: By, same_consent: bool = False
+) -> list[list[int]]:
+    """Groups the indices of episodes that must stay together; indices ascend, groups are ordered by their first.
 
-    Episodes that are copies of each other (the same recording or motion) stay together in any case. `pairs`: a person
-    who carried with two partners joins both pairs; scripted agents are meant to be met again, so that simulated
-    episodes are joined by their pair alone; episodes of people who are not named stay together, as nobody can tell
-    them apart. `maps`: a map with its start orientations and displaced copies.
+    Copies (the same recording or motion) always stay together. `pairs`: a person with two partners joins both pairs;
+    simulated episodes are joined only by their pair, because scripted agents may occur in several parts; episodes of
+    unnamed people form one group, because they may be the same person. `maps`: a map with its start orientations and
+    displaced copies.
 
     Args:
-        motions: a digest of each episode's states and actions.
+        motions: digest of states and actions of each episode.
         same_consent: `pairs` only; a consent id in two pairs is the same person.
     """
     keys: dict[Hashable, int] = {}
     edges = [
-        (place, len(rows) + keys.setdefault(key, len(keys)))
-        for place, (row, motion) in enumerate(zip(rows, motions, strict=True))
-        for key in (("motion", motion), *_keys(row, by, same_consent))
+        (index, len(rows) + keys.setdefault(key, len(keys)))
+        for index, (row, motion) in enumerate(zip(rows, motions, strict=True))
+        for key in (("motion", motion), *_group_keys(row, by, same_consent))
     ]
     if not edges:
         return []
     nodes = len(rows) + len(keys)
     graph = coo_array((np.ones(len(edges)), tuple(zip(*edges, strict=True))), (nodes, nodes))
-    found: dict[int, list[int]] = defaultdict(list)
-    for place, component in enumerate(connected_components(graph, directed=False)[1][: len(rows)].tolist()):
-        found[component].append(place)
-    return list(found.values())
+    groups: dict[int, list[int]] = defaultdict(list)
+    for index, component in enumerate(connected_components(graph, directed=False)[1][: len(rows)].tolist()):
+        groups[component].append(index)
+    return list(groups.values())
 
 
-def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
+def _group_keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
     if row.get("source_sha256"):
         yield "recording", row["source_sha256"]
     if by == "maps":
@@ -58,9 +60,9 @@ def _keys(row: Row, by: By, same_consent: bool) -> Iterable[Hashable]:
         if pair or not names:
             yield "pair", pair
         if same_consent:
-            yield from (("consent", consent) for consent in consents_of(row))
+            yield from (("consent", consent) for consent in consent_ids(row))
 
 
 def base_map(row: Row) -> str:
-    """The map of an episode, whatever its start orientation."""
+    """The map of an episode without its start orientation."""
     return base_name(row.get("map_id") or "")

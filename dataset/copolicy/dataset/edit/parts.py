@@ -1,4 +1,4 @@
-"""The parts of a split, and how groups of episodes are dealt out to them so that no group is in two."""
+"""The parts of a split, and the assignment of groups of episodes to them; no group is in two parts."""
 
 import re
 from collections import Counter, defaultdict
@@ -13,16 +13,18 @@ from .groups import By, base_map
 from .selection import Row
 
 REST = "rest"
+Groups = Sequence[Sequence[int]]
+Assignment = dict[str, list[int]]
 _TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part as it was asked for.
+    """A requested part of a split.
 
     Attributes:
-        proportion: of the episodes that no part names; None for a part of named pairs or maps.
-        names: pairs or maps.
+        proportion: proportion of the episodes that no part names; None for a part of named pairs or maps.
+        names: names of pairs or maps.
     """
 
     name: str
@@ -31,7 +33,7 @@ class Part:
 
     @classmethod
     def parse(cls, text: str) -> "Part":
-        """Reads `NAME=0.8`, `NAME=ID,ID` or `NAME=rest`.
+        """Parses `NAME=0.8`, `NAME=ID,ID` or `NAME=rest`.
 
         Raises:
             InvalidValueError: another form, or a proportion outside (0, 1].
@@ -51,10 +53,11 @@ class Part:
 
 
 def parse_parts(texts: Sequence[str]) -> list[Part]:
-    """Reads the parts of a split.
+    """Parses the parts of a split.
 
     Raises:
-        InvalidValueError: fewer than two, one name twice, proportions that do not sum to 1, or rest beside them.
+        InvalidValueError: fewer than two parts, a repeated name, proportions that do not sum to 1, or both
+            proportions and rest.
     """
     parts = [Part.parse(text) for text in texts]
     if len(parts) < 2 or len({part.name for part in parts}) != len(parts):
@@ -62,145 +65,132 @@ def parse_parts(texts: Sequence[str]) -> list[Part]:
     proportions = [part.proportion for part in parts if part.proportion is not None]
     rests = sum(text.partition("=")[2] == REST for text in texts)
     if rests > 1 or (rests and len(proportions) > 1):
-        raise InvalidValueError("--parts", "rest once, and no proportion beside it", list(texts))
+        raise InvalidValueError("--parts", "rest at most once and without proportions", list(texts))
     if proportions and abs(sum(proportions) - 1) > _TOLERANCE:
         raise InvalidValueError("--parts", "proportions that sum to 1", list(texts))
     return parts
 
 
-def deal(
-    rows: Sequence[Row],
-    together: Sequence[Sequence[int]],
-    parts: Sequence[Part],
-    by: By,
-    seed: int,
-    flag: str = "--parts",
-) -> dict[str, list[int]]:
-    """The places of the episodes of each part, ascending.
+def assign_groups(
+    rows: Sequence[Row], groups: Groups, parts: Sequence[Part], by: By, seed: int, flag: str = "--parts"
+) -> Assignment:
+    """Assigns groups of episodes to parts; returns the ascending episode indices of each part.
 
-    Groups that a part names go there. The others are dealt out, the largest first, equal ones in an order drawn by
-    the seed, each to the part that lacks most of its proportion, within its kind of episodes (source and map set; for
-    single episodes also pair, map and success) and over all.
+    Groups that a part names go to it. The others are assigned from the largest to the smallest, groups of equal size
+    in random order, each to the part that is furthest below its proportion, within its stratum (source and map set;
+    for single episodes also pair, map and success) and overall.
 
     Raises:
-        RunError: a name that no episode has, one that is tied to a name of another part, or a part that stays empty.
+        RunError: a name that no episode has, two named parts that share a group, or a part that stays empty.
     """
-    dealt: dict[str, list[int]] = {part.name: [] for part in parts}
-    rest = _named(rows, together, parts, by, dealt)
+    assignment: Assignment = {part.name: [] for part in parts}
+    unassigned = _assign_named(rows, groups, parts, by, assignment)
     proportions = {part.name: part.proportion for part in parts if part.proportion is not None}
-    if not proportions and rest:
-        left = sum(len(group) for group in rest)
-        raise RunError(f"--parts: expected a part for every episode, found {left} in none; add NAME=rest")
+    if not proportions and unassigned:
+        count = sum(len(group) for group in unassigned)
+        raise RunError(f"--parts: expected a part for every episode, found {count} without one; add NAME=rest")
     if by == "episodes":
-        _spread(rows, rest, proportions, dealt, seed)
+        _assign_spread(rows, unassigned, proportions, assignment, seed)
     else:
-        _balance(rows, rest, proportions, dealt, seed)
-    _fill_empty(dealt, rest, proportions)
-    empty = [name for name, places in dealt.items() if not places]
+        _assign_balanced(rows, unassigned, proportions, assignment, seed)
+    _fill_empty(assignment, unassigned, proportions)
+    empty = [name for name, indices in assignment.items() if not indices]
     if empty:
-        what = {"pairs": "groups of people", "maps": "maps", "episodes": "episodes"}[by]
+        unit = {"pairs": "groups of people", "maps": "maps", "episodes": "episodes"}[by]
         raise RunError(
-            f"{flag}: expected at least one of the {what} for each part, found {len(together)} for {len(parts)} "
-            f"parts: none is left for {empty[0]}"
+            f"{flag}: expected at least one of the {unit} for each part, found {len(groups)} for {len(parts)} "
+            f"parts; {empty[0]} is empty"
         )
-    return {name: sorted(places) for name, places in dealt.items()}
+    return {name: sorted(indices) for name, indices in assignment.items()}
 
 
-def _named(
-    rows: Sequence[Row], together: Sequence[Sequence[int]], parts: Sequence[Part], by: By, dealt: dict[str, list[int]]
+def _assign_named(
+    rows: Sequence[Row], groups: Groups, parts: Sequence[Part], by: By, assignment: Assignment
 ) -> list[Sequence[int]]:
-    """Deals out the groups that are named; returns the others."""
+    """Assigns the groups that parts name; returns the other groups."""
     owner: dict[str, str] = {}
     for part in parts:
         for name in part.names:
             if owner.setdefault(name, part.name) != part.name:
                 raise InvalidValueError("--parts", "each name in one part", name)
     if owner and by == "episodes":
-        raise InvalidValueError("--parts", "--by pairs or --by maps beside names", sorted(owner)[0])
-    rest: list[Sequence[int]] = []
-    unseen = set(owner)
-    for group in together:
-        inside = {name for place in group for name in _names(rows[place], by)}
-        unseen -= inside
-        wanted = {owner[name]: name for name in sorted(inside) if name in owner}
-        if len(wanted) > 1:
-            (part_a, name_a), (part_b, name_b) = list(wanted.items())[:2]
+        raise InvalidValueError("--parts", "--by pairs or --by maps with names", sorted(owner)[0])
+    others: list[Sequence[int]] = []
+    unknown = set(owner)
+    for group in groups:
+        names = {name for index in group for name in _group_names(rows[index], by)}
+        unknown -= names
+        targets = {owner[name]: name for name in sorted(names) if name in owner}
+        if len(targets) > 1:
+            (part_a, name_a), (part_b, name_b) = list(targets.items())[:2]
             raise RunError(f"--parts: {name_a} ({part_a}) and {name_b} ({part_b}) share a person or a recording")
-        if wanted:
-            dealt[next(iter(wanted))] += group
+        if targets:
+            assignment[next(iter(targets))] += group
         else:
-            rest.append(group)
-    if unseen:
-        raise RunError(f"--parts: expected {by} that an episode has, found {sorted(unseen)[0]!r}, which none has")
-    return rest
+            others.append(group)
+    if unknown:
+        raise RunError(f"--parts: expected {by} of the data set, found {sorted(unknown)[0]!r}, which no episode has")
+    return others
 
 
-def _names(row: Row, by: By) -> set[str]:
+def _group_names(row: Row, by: By) -> set[str]:
     if by == "maps":
         return {base_map(row), row.get("map_id") or ""}
     return {row.get(column) or "" for column in ("pair_id", "player_0_id", "player_1_id")}
 
 
-def _balance(
-    rows: Sequence[Row],
-    rest: Sequence[Sequence[int]],
-    proportions: Mapping[str, float],
-    dealt: dict[str, list[int]],
-    seed: int,
+def _assign_balanced(
+    rows: Sequence[Row], groups: Groups, proportions: Mapping[str, float], assignment: Assignment, seed: int
 ) -> None:
-    order = np.random.default_rng(seed).permutation(len(rest))
-    ordered = sorted((rest[int(number)] for number in order), key=len, reverse=True)
-    totals = Counter(_kind(rows[place]) for group in rest for place in group)
-    have: dict[str, Counter] = defaultdict(Counter)
+    order = np.random.default_rng(seed).permutation(len(groups))
+    ordered = sorted((groups[int(number)] for number in order), key=len, reverse=True)
+    totals = Counter(_stratum(rows[index]) for group in groups for index in group)
+    assigned: dict[str, Counter] = defaultdict(Counter)
     for group in ordered:
-        kinds = Counter(_kind(rows[place]) for place in group)
+        strata = Counter(_stratum(rows[index]) for index in group)
 
-        def lack(name: str, kinds: Counter = kinds) -> float:
-            inside = sum(count * (proportions[name] - have[name][kind] / totals[kind]) for kind, count in kinds.items())
-            return inside / kinds.total() + proportions[name] - have[name].total() / totals.total()
+        def shortfall(name: str, strata: Counter = strata) -> float:
+            within = sum(n * (proportions[name] - assigned[name][key] / totals[key]) for key, n in strata.items())
+            return within / strata.total() + proportions[name] - assigned[name].total() / totals.total()
 
-        best = max(proportions, key=lack)
-        have[best].update(kinds)
-        dealt[best] += group
+        best = max(proportions, key=shortfall)
+        assigned[best].update(strata)
+        assignment[best] += group
 
 
-def _spread(
-    rows: Sequence[Row],
-    rest: Sequence[Sequence[int]],
-    proportions: Mapping[str, float],
-    dealt: dict[str, list[int]],
-    seed: int,
+def _assign_spread(
+    rows: Sequence[Row], groups: Groups, proportions: Mapping[str, float], assignment: Assignment, seed: int
 ) -> None:
-    """Goes through the episodes, kind after kind, and keeps every part near its proportion all the way."""
+    """Assigns episodes in the order of their strata, so that each part has its proportion of every stratum."""
     draw = np.random.default_rng(seed)
-    chance = draw.permutation(len(rest))
-    kinds = [(*_kind(rows[group[0]]), *_detail(rows[group[0]])) for group in rest]
-    ordered = sorted(range(len(rest)), key=lambda number: (kinds[number], chance[number]))
-    have = Counter()
+    random_order = draw.permutation(len(groups))
+    strata = [(*_stratum(rows[group[0]]), *_sub_stratum(rows[group[0]])) for group in groups]
+    ordered = sorted(range(len(groups)), key=lambda number: (strata[number], random_order[number]))
+    assigned = Counter()
     for number in ordered:
-        total = have.total() + len(rest[number])
-        best = max(proportions, key=lambda name: proportions[name] * total - have[name])
-        have[best] += len(rest[number])
-        dealt[best] += rest[number]
+        total = assigned.total() + len(groups[number])
+        best = max(proportions, key=lambda name: proportions[name] * total - assigned[name])
+        assigned[best] += len(groups[number])
+        assignment[best] += groups[number]
 
 
-def _fill_empty(dealt: dict[str, list[int]], rest: Sequence[Sequence[int]], proportions: Mapping[str, float]) -> None:
-    """A part that asks for little gets the smallest group of a part that has several."""
+def _fill_empty(assignment: Assignment, groups: Groups, proportions: Mapping[str, float]) -> None:
+    """Moves to each empty part the smallest group of a part with several groups."""
     for name in proportions:
-        if dealt[name]:
+        if assignment[name]:
             continue
-        owned = {part: [group for group in rest if group[0] in set(dealt[part])] for part in proportions}
-        donors = [(min(groups, key=len), part) for part, groups in owned.items() if len(groups) > 1]
+        owned = {part: [group for group in groups if group[0] in set(assignment[part])] for part in proportions}
+        donors = [(min(own, key=len), part) for part, own in owned.items() if len(own) > 1]
         if donors:
             group, donor = min(donors, key=lambda entry: len(entry[0]))
-            gone = set(group)
-            dealt[donor] = [place for place in dealt[donor] if place not in gone]
-            dealt[name] = list(group)
+            moved = set(group)
+            assignment[donor] = [index for index in assignment[donor] if index not in moved]
+            assignment[name] = list(group)
 
 
-def _kind(row: Row) -> tuple[str, ...]:
+def _stratum(row: Row) -> tuple[str, ...]:
     return row.get("source") or "", row.get("map_set") or ""
 
 
-def _detail(row: Row) -> tuple[Any, ...]:
+def _sub_stratum(row: Row) -> tuple[Any, ...]:
     return row.get("pair_id") or "", bool(row.get("success")), base_map(row)

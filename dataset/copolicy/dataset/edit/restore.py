@@ -1,7 +1,7 @@
-"""`amend --restore-from`: episode columns that other tools left out, from recordings or an earlier version.
+"""`amend --restore-from`: restores episode columns from recordings or an earlier version of a data set.
 
-LeRobot's delete and split write meta/episodes without them. Episodes are told by their motion: states and actions of
-every frame, bit for bit as a data set stores them.
+LeRobot's delete and split write meta/episodes without them. Episodes are matched by their motion: states and actions
+of every frame, bit for bit as a data set stores them.
 """
 
 import hashlib
@@ -13,10 +13,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ..checks.episode_table import EpisodeTable
+from ..checks.episode_data import EpisodeData
 from ..checks.leakage import motion_digests
 from ..checks.read_lerobot import read_lerobot
-from ..clock import Hold, frame_actions, frame_states
+from ..clock import Downsampling, frame_actions, frame_states
 from ..command_line.commands import progress
 from ..episode import EPISODE_COLUMNS, Episode
 from ..exceptions import CopolicyError, FileFormatError, RunError
@@ -26,21 +26,21 @@ from ..files.meta_files import RECORD_FILE
 from ..files.replace_folder import finish_interrupted
 from ..lerobot_folder.episode_rows import episode_tables, with_column, write_tables
 from ..lerobot_folder.info import read_info
-from ..recording.log import read_episode
+from ..recording.reader import read_episode
 from .amend import today
 from .subset.stored_set import record_text, stored_record
 
-_SHOWN = 5
+_MAX_SHOWN = 5
 
 
 @dataclass
 class Originals:
-    """Episodes whose columns are known.
+    """Episodes with complete columns.
 
     Attributes:
-        kind: what they were read from.
-        rows: the episode columns by the digest of the motion; several where episodes have the same one.
-        unread: recordings that cannot be read.
+        kind: what they were read from, `data set` or `recordings`.
+        rows: episode columns by digest of the motion; several rows if episodes have the same motion.
+        unread: errors of recordings that cannot be read.
         record: `meta/copolicy.json` of a data set.
     """
 
@@ -51,38 +51,38 @@ class Originals:
 
 
 def restore(root: Path, originals: Path) -> dict[str, Any]:
-    """Fills in the episode columns of every episode at `root` that has no `episode_uuid`.
+    """Restores the episode columns of every episode at `root` without an `episode_uuid`.
 
     Args:
-        originals: a data set that has the columns, or a folder of recordings.
+        originals: a data set with the columns, or a folder of recordings.
 
     Returns:
         Summary.
 
     Raises:
-        FileFormatError: a folder is not what it should be.
-        RunError: there is nothing to restore, or an episode has none or several originals; nothing was changed.
+        FileFormatError: `root` or `originals` has another format.
+        RunError: there is nothing to restore, or an episode has no or several originals; nothing was changed.
     """
     finish_interrupted(root)
     tables = episode_tables(root, ("episode_index", "length"))
-    lacking = _lacking(tables.values())
-    if not lacking:
-        raise RunError(f"{root}: expected an episode without the episode columns, found that each has an episode_uuid")
-    motions = _motions(read_lerobot(root), root)
-    known = _of_data_set(originals, root) if (originals / "meta").is_dir() else _of_recordings(originals, root)
-    restored = _matched(root, originals, known, {number: motions[number] for number in lacking})
+    stripped = _episodes_without_columns(tables.values())
+    if not stripped:
+        raise RunError(f"{root}: expected an episode without the episode columns, found an episode_uuid in each")
+    motions = _motion_digests(read_lerobot(root), root)
+    candidates = _read_data_set(originals, root) if (originals / "meta").is_dir() else _read_recordings(originals, root)
+    restored = _match(root, originals, candidates, {number: motions[number] for number in stripped})
     names = {name: None for row in restored.values() for name in row}
     for path, table in tables.items():
         numbers = table.column("episode_index").to_pylist()
         for name in names:
-            there = name in table.column_names
-            before = table.column(name).to_pylist() if there else [None] * len(numbers)
-            pairs = zip(numbers, before, strict=True)
+            exists = name in table.column_names
+            old_values = table.column(name).to_pylist() if exists else [None] * len(numbers)
+            pairs = zip(numbers, old_values, strict=True)
             values = [restored[number].get(name) if number in restored else value for number, value in pairs]
             table = with_column(table, name, values, EPISODE_COLUMNS[name])
         tables[path] = table
-    record = stored_record(root) or _record(known, restored)
-    note = {"date": today(), "episodes": len(restored), "from": known.kind}
+    record = stored_record(root) or _restored_record(candidates, restored)
+    note = {"date": today(), "episodes": len(restored), "from": candidates.kind}
     text = record_text({**record, "restored": [*record.get("restored", []), note]})
     write_tables(tables, {root / RECORD_FILE: text})
     unlicensed = not all(row.get("license") for row in restored.values())
@@ -90,26 +90,26 @@ def restore(root: Path, originals: Path) -> dict[str, Any]:
     return {
         "root": str(root),
         "restored": len(restored),
-        "from": f"{known.kind} {originals}",
-        **({"not_measured": "replay_drift_px, which conversion measures"} if known.kind == "recordings" else {}),
-        **({"unread": known.unread} if known.unread else {}),
+        "from": f"{candidates.kind} {originals}",
+        **({"not_measured": "replay_drift_px, which conversion measures"} if candidates.kind == "recordings" else {}),
+        **({"unread": candidates.unread} if candidates.unread else {}),
         "next": f"{licence}copolicy-dataset check {root}",
     }
 
 
-def _lacking(tables: Any) -> list[int]:
+def _episodes_without_columns(tables: Any) -> list[int]:
     """Numbers of the episodes without an `episode_uuid`."""
     numbers = []
     for table in tables:
-        there = "episode_uuid" in table.column_names
-        uuids = table.column("episode_uuid").to_pylist() if there else [None] * table.num_rows
+        present = "episode_uuid" in table.column_names
+        uuids = table.column("episode_uuid").to_pylist() if present else [None] * table.num_rows
         rows = zip(table.column("episode_index").to_pylist(), uuids, strict=True)
         numbers += [number for number, uuid in rows if not uuid]
     return numbers
 
 
-def _motions(table: EpisodeTable, root: Path) -> dict[int, str]:
-    """The digest of each episode's motion by its number."""
+def _motion_digests(table: EpisodeData, root: Path) -> dict[int, str]:
+    """Digest of the motion of each episode by episode number."""
     if len(table.framed) != len(table.labels):
         missing = next(iter(set(range(len(table.labels))) - set(table.framed.tolist())))
         raise FileFormatError(root, "every frame of each episode", f"others in episode {table.labels[missing]}")
@@ -117,15 +117,15 @@ def _motions(table: EpisodeTable, root: Path) -> dict[int, str]:
         digests = motion_digests(table)
     except KeyError as error:
         raise FileFormatError(root, "states and actions in every frame", f"no usable column {error}") from None
-    return {int(table.labels[place]): digest for place, digest in zip(table.framed, digests, strict=True)}
+    return {int(table.labels[index]): digest for index, digest in zip(table.framed, digests, strict=True)}
 
 
-def _of_data_set(path: Path, root: Path) -> Originals:
-    info, wanted = read_info(path), read_info(root)
-    if info.get("fps") != wanted.get("fps"):
-        raise FileFormatError(path, f"a data set at {wanted.get('fps')} Hz, as {root}", f"{info.get('fps')} Hz")
+def _read_data_set(path: Path, root: Path) -> Originals:
+    info, target_info = read_info(path), read_info(root)
+    if info.get("fps") != target_info.get("fps"):
+        raise FileFormatError(path, f"a data set at {target_info.get('fps')} Hz, as {root}", f"{info.get('fps')} Hz")
     originals = Originals("data set", record=stored_record(path))
-    motions = _motions(read_lerobot(path), path)
+    motions = _motion_digests(read_lerobot(path), path)
     for table in episode_tables(path, ("episode_index", "episode_uuid")).values():
         names = [name for name in table.column_names if name in EPISODE_COLUMNS]
         for row in table.select(["episode_index", *names]).to_pylist():
@@ -135,17 +135,19 @@ def _of_data_set(path: Path, root: Path) -> Originals:
     return originals
 
 
-def _of_recordings(path: Path, root: Path) -> Originals:
+def _read_recordings(path: Path, root: Path) -> Originals:
     files = visible_files(path, "*.mcap") if path.is_dir() else [path]
     if not files or not files[0].is_file():
         raise FileFormatError(path, "a data set or a folder of recordings (*.mcap)", "neither")
     info = read_info(root)
     try:
-        fps, hold = int(info["fps"]), info["features"][ACTION]["hold"]
+        fps, downsampling = int(info["fps"]), info["features"][ACTION]["hold"]
     except (KeyError, TypeError, ValueError):
-        raise FileFormatError(root, "fps and the hold of the feature action in meta/info.json", "none") from None
-    if hold not in get_args(Hold):
-        raise FileFormatError(root, f"a hold of {' or '.join(get_args(Hold))} in meta/info.json", str(hold))
+        raise FileFormatError(root, "fps and hold of the feature action in meta/info.json", "none") from None
+    if downsampling not in get_args(Downsampling):
+        raise FileFormatError(
+            root, f"a hold of {' or '.join(get_args(Downsampling))} in meta/info.json", str(downsampling)
+        )
     originals = Originals("recordings")
     for file in progress(files, len(files), "reading"):
         try:
@@ -153,30 +155,30 @@ def _of_recordings(path: Path, root: Path) -> Originals:
         except CopolicyError as error:
             originals.unread.append(str(error))
             continue
-        originals.rows[_motion(episode, fps, hold)].append(asdict(episode.meta))
+        originals.rows[_recording_digest(episode, fps, downsampling)].append(asdict(episode.meta))
     return originals
 
 
-def _motion(episode: Episode, fps: int, hold: Hold) -> str:
-    """The digest that the frames of a recording have in a data set (`checks.leakage.motion_digests`)."""
-    columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, hold)
+def _recording_digest(episode: Episode, fps: int, downsampling: Downsampling) -> str:
+    """Digest of a recording's frames as a data set would store them (`checks.leakage.motion_digests`)."""
+    columns = frame_states(episode.states, fps), frame_actions(episode.actions, fps, downsampling)
     rows = np.hstack([column.astype(np.float32) for column in columns])
     return hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest()
 
 
-def _matched(root: Path, originals: Path, known: Originals, lacking: Mapping[int, str]) -> dict[int, dict[str, Any]]:
-    """The columns of each episode, whose original must be one alone."""
+def _match(root: Path, originals: Path, candidates: Originals, motions: Mapping[int, str]) -> dict[int, dict[str, Any]]:
+    """Returns the columns of the single original of each episode."""
     restored: dict[int, dict[str, Any]] = {}
     wrong: dict[str, list[int]] = {"none": [], "several": []}
-    for number, digest in lacking.items():
-        rows = {row["episode_uuid"]: row for row in known.rows.get(digest, [])}
+    for number, digest in motions.items():
+        rows = {row["episode_uuid"]: row for row in candidates.rows.get(digest, [])}
         if len(rows) == 1:
             restored[number] = next(iter(rows.values()))
         else:
             wrong["several" if rows else "none"].append(number)
     if any(wrong.values()):
-        found = "; ".join(f"{what} for episode {_listed(numbers)}" for what, numbers in wrong.items() if numbers)
-        unread = f" ({len(known.unread)} recordings cannot be read)" if known.unread else ""
+        found = "; ".join(f"{problem} for episode {_join(numbers)}" for problem, numbers in wrong.items() if numbers)
+        unread = f" ({len(candidates.unread)} recordings cannot be read)" if candidates.unread else ""
         raise RunError(
             f"{originals}: expected one episode with the motion of each of {root}, found {found}{unread}; nothing was "
             "changed"
@@ -184,19 +186,19 @@ def _matched(root: Path, originals: Path, known: Originals, lacking: Mapping[int
     by_uuid: dict[str, list[int]] = defaultdict(list)
     for number, row in restored.items():
         by_uuid[row["episode_uuid"]].append(number)
-    twice = [numbers for numbers in by_uuid.values() if len(numbers) > 1]
-    if twice:
-        raise RunError(f"{root}: expected each episode once, found the same motion in episodes {_listed(twice[0])}")
+    repeated = [numbers for numbers in by_uuid.values() if len(numbers) > 1]
+    if repeated:
+        raise RunError(f"{root}: expected each episode once, found the same motion in episodes {_join(repeated[0])}")
     return restored
 
 
-def _listed(numbers: Sequence[int]) -> str:
-    return ", ".join(map(str, numbers[:_SHOWN])) + (", ..." if len(numbers) > _SHOWN else "")
+def _join(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:_MAX_SHOWN])) + (", ..." if len(numbers) > _MAX_SHOWN else "")
 
 
-def _record(known: Originals, restored: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
-    """The record of the conversion, which goes with the columns, with the notes on these episodes alone."""
-    record = dict(known.record)
+def _restored_record(originals: Originals, restored: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
+    """The conversion record of the originals, with the notes on the restored episodes only."""
+    record = dict(originals.record)
     if isinstance(record.get("notes"), dict):
         uuids = {row["episode_uuid"] for row in restored.values()}
         record["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid in uuids}

@@ -1,12 +1,12 @@
-"""Which episodes are meant: by number, person, consent, map, result, source or a condition on their columns."""
+"""Selects episodes by number, person, consent, map, result, source or a condition on their columns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, get_args
 
-from ..episode import OTHER_REASONS, Source
+from ..episode import GENERIC_REASONS, Source
 from ..exceptions import InvalidValueError, RunError
-from ..lerobot_folder.episode_rows import chosen_episodes
+from ..lerobot_folder.episode_rows import select_episodes
 from ..task import get_task, installed_tasks
 from .expression import parse_condition
 
@@ -15,16 +15,16 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Selection:
-    """Several values of one field: any of them. Several fields: all of them. An empty field asks for nothing.
+    """Criteria that an episode must meet: one of the values of each field that is not empty.
 
     Attributes:
         episodes: numbers, ranges such as `3-5`, or `episode_uuid`s.
         pairs, map_sets, map_ids, sources: values of the episode columns.
-        players: at either seat.
-        consents: one of the ids in `consent_id`, which may hold several.
-        results: `success`, `failure`, or how exactly an episode ended.
+        players: player ids at either seat.
+        consents: ids in `consent_id`, which may have several.
+        results: `success`, `failure`, or termination reasons.
         where: a condition (`expression.parse_condition`).
-        drop_excluded: without what is discarded or excluded.
+        drop_excluded: leave out discarded and excluded episodes.
     """
 
     episodes: tuple[str, ...] = ()
@@ -38,9 +38,9 @@ class Selection:
     where: str = ""
     drop_excluded: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         reasons = (reason for name in installed_tasks() for reason in get_task(name).spec.reasons)
-        results = ("success", "failure", *dict.fromkeys(reasons), *OTHER_REASONS) if self.results else ()
+        results = ("success", "failure", *dict.fromkeys(reasons), *GENERIC_REASONS) if self.results else ()
         for name, values, choices in (
             ("--results", self.results, results),
             ("--sources", self.sources, get_args(Source)),
@@ -49,51 +49,51 @@ class Selection:
                 if value not in choices:
                     raise InvalidValueError(name, f"one of {', '.join(choices)}", value)
 
-    def asked(self) -> dict[str, Any]:
-        """The fields that ask for something, JSON-able."""
+    def criteria(self) -> dict[str, Any]:
+        """The fields that are not empty, as JSON values."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items() if value}
 
     def numbers(self, rows: Sequence[Row], types: Mapping[str, str]) -> list[int]:
-        """The numbers of the episodes that are meant, ascending.
+        """The ascending numbers of the selected episodes.
 
         Args:
             rows: the episode columns of every episode, in order.
-            types: `str`, `int`, `float` or `bool` of each column that a condition may name.
+            types: type of each column that a condition may use: `str`, `int`, `float` or `bool`.
 
         Raises:
-            InvalidValueError, UnknownNameError: an episode that is not there, or a condition of another form.
+            InvalidValueError, UnknownNameError: no such episode, or an invalid condition.
             RunError: a value that no episode has.
         """
-        names = {row["episode_uuid"]: row["episode_index"] for row in rows if row.get("episode_uuid")}
-        listed = chosen_episodes(self.episodes, (row["episode_index"] for row in rows), names)
-        holds = parse_condition(self.where, types) if self.where else lambda _: True
-        wanted = {
+        numbers_by_uuid = {row["episode_uuid"]: row["episode_index"] for row in rows if row.get("episode_uuid")}
+        selected = select_episodes(self.episodes, (row["episode_index"] for row in rows), numbers_by_uuid)
+        condition = parse_condition(self.where, types) if self.where else lambda _: True
+        filters = {
             "--pair-ids": (self.pairs, lambda row: {row.get("pair_id")}),
             "--player-ids": (self.players, lambda row: {row.get("player_0_id"), row.get("player_1_id")}),
-            "--consent-ids": (self.consents, consents_of),
+            "--consent-ids": (self.consents, consent_ids),
             "--map-sets": (self.map_sets, lambda row: {row.get("map_set")}),
             "--map-ids": (self.map_ids, lambda row: {row.get("map_id")}),
             "--results": (self.results, _results),
             "--sources": (self.sources, lambda row: {row.get("source")}),
         }
-        for flag, (values, of) in wanted.items():
-            there = {value for row in rows for value in of(row)} if values else set()
+        for flag, (values, values_of) in filters.items():
+            present = {value for row in rows for value in values_of(row)} if values else set()
             for value in values:
-                if value not in there and flag not in ("--results", "--sources"):
-                    raise RunError(f"{flag}: expected a value that an episode has, found {value!r}, which none has")
+                if value not in present and flag not in ("--results", "--sources"):
+                    raise RunError(f"{flag}: expected a value of the data set, found {value!r}, which no episode has")
         return [
             row["episode_index"]
             for row in rows
-            if (not self.episodes or row["episode_index"] in listed)
-            and all(not values or not of(row).isdisjoint(values) for values, of in wanted.values())
+            if (not self.episodes or row["episode_index"] in selected)
+            and all(not values or not values_of(row).isdisjoint(values) for values, values_of in filters.values())
             and not (self.drop_excluded and row.get("discarded"))
-            and holds(row)
+            and condition(row)
         ]
 
 
-def consents_of(row: Row) -> set[str]:
-    """The consent ids of an episode: `consent_id` holds one for each person, separated by commas."""
+def consent_ids(row: Row) -> set[str]:
+    """The consent ids of an episode; `consent_id` lists them separated by commas."""
     return {text.strip() for text in (row.get("consent_id") or "").split(",")} - {""}
 
 

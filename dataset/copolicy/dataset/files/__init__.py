@@ -1,1 +1,1 @@
-"""Files and folders: which there are, what they are, and writing them whole or not at all."""
+"""Lists, identifies, reads and locks files and folders, and writes them atomically."""

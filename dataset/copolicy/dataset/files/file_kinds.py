@@ -1,4 +1,4 @@
-"""What a file or folder is that a command did not expect, in words, with the command that takes it."""
+"""Describes unexpected files and folders in error messages, with the command that reads them."""
 
 import stat
 import zipfile
@@ -8,7 +8,7 @@ from ..exceptions import CopolicyError
 from .listing import visible_files
 from .meta_files import INFO_FILE
 
-_HEAD = 512  # bytes that tell what a file is
+_HEAD = 512  # bytes read to identify a file
 _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"\x89MCAP0\r\n", "an MCAP file"),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
@@ -20,18 +20,18 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"RRF", "a Rerun recording"),
     (b"\x1f\x8b", "a gzip archive"),
     (b"\x28\xb5\x2f\xfd", "a zstd archive"),
-    (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
-    (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"GIF8", "a GIF picture"),
+    (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"GIF8", "a GIF image"),
     (b"%PDF", "a PDF document"),
-    (b"version https://git-lfs", "a pointer of Git LFS in place of the file (git lfs pull fetches it)"),
+    (b"version https://git-lfs", "a Git LFS pointer (git lfs pull fetches the file)"),
 )
 
 
-def kind_of(path: Path) -> str:
-    """What lies at a path, as a noun with its article: `an HDF5 file`, `a folder of recordings (...)`, `nothing there`.
+def describe_path(path: Path) -> str:
+    """Describes what is at a path: `an HDF5 file`, `a folder of recordings (...)`, `no such file or folder`.
 
-    Looks at names and at the first bytes, never at more, and never fails.
+    Reads only file names and the first bytes of a file, and never raises.
     """
     try:
         mode = path.stat().st_mode
@@ -41,11 +41,11 @@ def kind_of(path: Path) -> str:
             return "a pipe, socket or device"
         return _file_kind(path)
     except FileNotFoundError:
-        return "nothing there"
-    except CopolicyError:  # a folder inside it
-        return "a folder with folders that cannot be read"
+        return "no such file or folder"
+    except CopolicyError:  # raised by visible_files for a sub-folder
+        return "a folder with unreadable sub-folders"
     except OSError as error:
-        return f"what cannot be read ({error.strerror or error})"
+        return f"an unreadable path ({error.strerror or error})"
 
 
 def _file_kind(path: Path) -> str:
@@ -53,9 +53,9 @@ def _file_kind(path: Path) -> str:
         head = file.read(_HEAD)
     if not head:
         return "an empty file"
-    for magic, kind in _MAGIC:
+    for magic, description in _MAGIC:
         if head.startswith(magic):
-            return kind
+            return description
     if head[4:8] == b"ftyp":
         return "an MP4 video"
     if head.startswith(b"PK"):
@@ -63,7 +63,7 @@ def _file_kind(path: Path) -> str:
     if head[:1] == b"\x80" and head[1:2] <= b"\x05":
         return "a pickle"
     if not any(head):
-        return "zeros"
+        return "a file of zeros"
     return _text_kind(head)
 
 
@@ -78,7 +78,7 @@ def _zip_kind(path: Path) -> str:
     if any(name.endswith(("/data.pkl", "/version")) for name in names):
         return "a PyTorch file"
     if any(name.rpartition("/")[2] in (".zarray", ".zgroup", "zarr.json") for name in names):
-        return "a zipped Zarr store (copolicy-convert upstream takes the original program's)"
+        return "a zipped Zarr store (copolicy-convert upstream reads the original program's)"
     return "a zip archive"
 
 
@@ -86,32 +86,32 @@ def _text_kind(head: bytes) -> str:
     try:
         text = head.decode("utf-8")
     except UnicodeDecodeError as error:
-        if error.start < len(head) - 3:  # else a letter that the first bytes cut in two
-            return "a file of another kind"
+        if error.start < len(head) - 3:  # later errors may come from a character cut at the end of head
+            return "a file of unknown format"
         text = head[: error.start].decode("utf-8")
-    if any(letter < " " and letter not in "\t\r\n\f" for letter in text):
-        return "a file of another kind"
+    if any(character < " " and character not in "\t\r\n\f" for character in text):
+        return "a file of unknown format"
     return "a JSON file" if text.lstrip().startswith(("{", "[")) else "a text file"
 
 
 def _folder_kind(path: Path) -> str:
     if (path / INFO_FILE).is_file():
-        return "a LeRobot data set (copolicy-dataset check and copolicy-convert export take it)"
+        return "a LeRobot data set (copolicy-dataset check and copolicy-convert export read it)"
     if any((path / name).is_file() for name in (".zgroup", ".zarray", "zarr.json")):
-        return "a Zarr store (copolicy-convert upstream takes the original program's)"
+        return "a Zarr store (copolicy-convert upstream reads the original program's)"
     if (path / "config.json").is_file() and (path / "model.safetensors").is_file():
-        return "a checkpoint of a policy (copolicy-eval and copolicy-cards take it)"
+        return "a policy checkpoint (copolicy-eval and copolicy-cards read it)"
     if next(path.iterdir(), None) is None:
         return "an empty folder"
     files = visible_files(path, "*.mcap", "*.mcap.part", "*.pkl", "*.npz", "*.hdf5", "*.h5", "*.db3", "info.json")
     names = [file.name for file in files]
     if any(name.endswith(".mcap") for name in names):
-        return "a folder of recordings (copolicy-convert mcap takes it)"
+        return "a folder of recordings (copolicy-convert mcap reads it)"
     if any(name.endswith(".part") for name in names):
-        return "a folder of recordings that broke off (copolicy-collect recover takes it)"
+        return "a folder of unfinished recordings (copolicy-collect recover reads it)"
     if any(file.match("trajectories/*.pkl") or file.stem == file.parent.name for file in files):
-        return "a folder of the original program's files (copolicy-convert upstream takes it)"
+        return "a folder of the original program's files (copolicy-convert upstream reads it)"
     if any(file.match(INFO_FILE) for file in files):
-        return "a folder with LeRobot data sets in it (name one of them)"
-    endings = sorted({file.suffix for file in files})
-    return f"a folder of other files ({', '.join(endings)})" if endings else "a folder of other files"
+        return "a folder that contains LeRobot data sets (name one of them)"
+    suffixes = sorted({file.suffix for file in files})
+    return f"a folder of other files ({', '.join(suffixes)})" if suffixes else "a folder of other files"

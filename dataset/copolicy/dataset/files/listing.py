@@ -1,4 +1,4 @@
-"""Which files a folder holds: links entered, hidden files passed over, alike in every command."""
+"""Lists the files of a folder for every command: follows links and skips hidden files."""
 
 import os
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -6,59 +6,59 @@ from pathlib import Path
 
 from ..exceptions import FileFormatError
 
-_SIDE_FILES = {"thumbs.db", "ehthumbs.db", "desktop.ini", "__macosx"}
-"""What Windows and macOS leave beside files under names that are not hidden, in lower case."""
+_SYSTEM_FILES = {"thumbs.db", "ehthumbs.db", "desktop.ini", "__macosx"}
+"""Names, in lower case, of files that Windows and macOS create without hiding them."""
 
-_Identity = tuple[int, int]
+_FileId = tuple[int, int]
 
 
 def is_hidden(name: str) -> bool:
-    """Whether a file or folder of this name is no part of any data.
+    """Whether a file or folder of this name is hidden or created by the operating system.
 
-    macOS leaves a `._NAME` beside each file that it copies to a foreign disk.
+    macOS writes a `._NAME` beside each file that it copies to a disk without its own file system.
     """
-    return name.startswith(".") or name.lower() in _SIDE_FILES
+    return name.startswith(".") or name.lower() in _SYSTEM_FILES
 
 
 def visible_files(folder: Path, *patterns: str) -> list[Path]:
-    """The files below a folder whose name matches one of the patterns, sorted by path.
+    """Lists the files below a folder whose name matches one of the patterns, sorted by path.
 
-    Linked folders are entered, but for links that lead back to where they came from. Whatever is hidden is passed
-    over. A link that leads nowhere counts as a file, so that whoever opens it says so.
+    Follows links to folders, except links back to an ancestor, and skips hidden files and folders. A broken link is
+    listed as a file, so that opening it reports the error.
 
     Args:
-        patterns: of the file's name, as in `Path.match`, for example `*.mcap`.
+        patterns: patterns of `Path.match`, for example `*.mcap`.
 
     Raises:
         FileFormatError: a folder that cannot be read.
     """
-    return sorted(path for path in _every_path(folder, _ancestors(folder)) if _matches(path, patterns))
+    return sorted(path for path in _walk(folder, _ancestors(folder)) if _matches(path, patterns))
 
 
 def distinct_files(folder: Path, *patterns: str) -> list[Path]:
-    """The same with each file once, whatever links lead to it: by its own path if that is below the folder, too.
+    """Lists files like `visible_files`, but each file once, by its own path where that is below the folder.
 
     Raises:
         FileFormatError: a folder that cannot be read.
     """
-    entered = set(_ancestors(folder))
+    visited = set(_ancestors(folder))
     links: list[Path] = []
-    files = list(_without_links(folder, entered, links))
-    for link in links:  # grows meanwhile; links wait until all is seen that needs none
-        files += _without_links(link, entered, links) if link.is_dir() else [link]
-    return sorted(distinct(path for path in files if _matches(path, patterns)))
+    files = list(_walk_without_links(folder, visited, links))
+    for link in links:  # the loop appends to `links`; files reached without a link come first
+        files += _walk_without_links(link, visited, links) if link.is_dir() else [link]
+    return sorted(without_duplicates(path for path in files if _matches(path, patterns)))
 
 
-def distinct(paths: Iterable[Path]) -> list[Path]:
-    """The paths in their order without those that lead to a file which one before them names."""
+def without_duplicates(paths: Iterable[Path]) -> list[Path]:
+    """Removes paths that lead to the same file as an earlier path; keeps the order."""
     by_file: dict[object, Path] = {}
     for path in paths:
-        by_file.setdefault(_identity(path) or os.path.realpath(path), path)
+        by_file.setdefault(_file_id(path) or os.path.realpath(path), path)
     return list(by_file.values())
 
 
 def broken_links(folder: Path) -> list[Path]:
-    """The visible links below a folder that lead nowhere, sorted: each may have been a session or a recording.
+    """Lists the broken links below a folder, sorted; each may stand for a missing session or recording.
 
     Raises:
         FileFormatError: a folder that cannot be read.
@@ -67,17 +67,17 @@ def broken_links(folder: Path) -> list[Path]:
 
 
 class VisibleFolder(type(Path())):
-    """A folder for foreign code that looks for its files with `glob`: hidden ones are not among them."""
+    """A path for code of other libraries: its `glob` skips hidden files."""
 
     def glob(self, *arguments, **options) -> Generator[Path, None, None]:
-        """`Path.glob` without what is hidden below this folder."""
+        """`Path.glob` without the hidden files below this folder."""
         for path in super().glob(*arguments, **options):
             if not any(is_hidden(name) for name in path.relative_to(self).parts):
                 yield Path(path)
 
 
-def on_visible_files(load: Callable) -> Callable:
-    """A foreign function whose first argument is a folder, kept from finding the hidden files in it."""
+def skipping_hidden_files(load: Callable) -> Callable:
+    """Wraps a library function whose first argument is a folder so that it skips the hidden files in it."""
 
     def load_visible(folder, *arguments, **options):
         return load(VisibleFolder(folder), *arguments, **options)
@@ -85,32 +85,32 @@ def on_visible_files(load: Callable) -> Callable:
     return load_visible
 
 
-def _every_path(folder: Path, above: frozenset[_Identity]) -> Iterator[Path]:
-    """The visible files below a folder; `above` are the folders that led here, which a link may lead back to."""
-    identity = _identity(folder)
-    if identity is not None:
-        above = above | {identity}
+def _walk(folder: Path, ancestors: frozenset[_FileId]) -> Iterator[Path]:
+    """Yields the visible files below a folder; links to one of `ancestors` are not followed."""
+    file_id = _file_id(folder)
+    if file_id is not None:
+        ancestors = ancestors | {file_id}
     for entry in _entries(folder):
         path = folder / entry.name
         if not _is_folder(entry):
             yield path
-        elif not entry.is_symlink() or _identity(path) not in above:
-            yield from _every_path(path, above)
+        elif not entry.is_symlink() or _file_id(path) not in ancestors:
+            yield from _walk(path, ancestors)
 
 
-def _without_links(folder: Path, entered: set[_Identity], links: list[Path]) -> Iterator[Path]:
-    """The visible files below a folder that is entered the first time; links are put aside."""
-    identity = _identity(folder)
-    if identity in entered:
+def _walk_without_links(folder: Path, visited: set[_FileId], links: list[Path]) -> Iterator[Path]:
+    """Yields the visible files below a folder not yet in `visited`; appends links to `links` instead."""
+    file_id = _file_id(folder)
+    if file_id in visited:
         return
-    if identity is not None:
-        entered.add(identity)
+    if file_id is not None:
+        visited.add(file_id)
     for entry in _entries(folder):
         path = folder / entry.name
         if entry.is_symlink():
             links.append(path)
         elif _is_folder(entry):
-            yield from _without_links(path, entered, links)
+            yield from _walk_without_links(path, visited, links)
         else:
             yield path
 
@@ -128,7 +128,7 @@ def _entries(folder: Path) -> list[os.DirEntry]:
 def _is_folder(entry: os.DirEntry) -> bool:
     try:
         return entry.is_dir()
-    except OSError:  # links in a circle
+    except OSError:  # circular links
         return False
 
 
@@ -136,8 +136,8 @@ def _matches(path: Path, patterns: tuple[str, ...]) -> bool:
     return any(path.match(pattern) for pattern in patterns)
 
 
-def _identity(path: Path) -> _Identity | None:
-    """What tells a file from all others; None where it is not there, or its file system has no such number."""
+def _file_id(path: Path) -> _FileId | None:
+    """Device and inode of a file; None if it does not exist or the file system has no inode numbers."""
     try:
         status = path.stat()
     except OSError:
@@ -145,6 +145,6 @@ def _identity(path: Path) -> _Identity | None:
     return (status.st_dev, status.st_ino) if status.st_ino else None
 
 
-def _ancestors(folder: Path) -> frozenset[_Identity]:
-    above = (_identity(parent) for parent in Path(os.path.realpath(folder)).parents)
-    return frozenset(identity for identity in above if identity is not None)
+def _ancestors(folder: Path) -> frozenset[_FileId]:
+    parent_ids = (_file_id(parent) for parent in Path(os.path.realpath(folder)).parents)
+    return frozenset(file_id for file_id in parent_ids if file_id is not None)

@@ -1,4 +1,4 @@
-"""Marks a file or folder as one that a living process works on, on every system."""
+"""Locks a file or folder while a process works on it, on every operating system."""
 
 import os
 from pathlib import Path
@@ -10,18 +10,18 @@ from ..exceptions import RunError
 
 
 def lock(file: BinaryIO, wait: bool = False) -> bool:
-    """Takes the lock of an open file; the system lets go of it when the file is closed or its process ends, however.
+    """Locks an open file; the system releases the lock when the file is closed or the process ends or crashes.
 
-    Other processes may read a locked file, on Windows all but its first byte: the lock only tells a living process
-    apart from what a crash left behind.
+    Other processes may still read the file (on Windows all but its first byte): the lock only shows that its process
+    is alive, which tells a running recording from an unfinished one.
 
     Args:
-        file: open for writing, which a network file system asks for.
-        wait: until another process lets go.
+        file: open for writing, which network file systems require.
+        wait: wait until another process releases the lock.
 
     Returns:
-        False where another process holds it. True where it was taken, and where the file system knows no locks (some
-        network folders), so that nothing can be told.
+        False if another process has the lock. True if the lock was taken, and also where the file system does not
+        support locks (some network folders).
     """
     try:
         return lock_descriptor(file.fileno(), blocking=wait)
@@ -29,34 +29,34 @@ def lock(file: BinaryIO, wait: bool = False) -> bool:
         return True
 
 
-def let_others_read(file: BinaryIO) -> None:
-    """Gives a lock back on Windows, where it keeps this process, too, from reading the file by another handle."""
+def unlock_on_windows(file: BinaryIO) -> None:
+    """Releases a lock on Windows, where it also stops this process from reading the file by another handle."""
     if os.name == "nt":
         unlock_descriptor(file.fileno())
 
 
 class FolderLock:
-    """Held by a lock file while a tool works in a folder; the system lets go when the process ends, however it ends."""
+    """A lock file in a folder, locked while a command works there; released when the process ends or crashes."""
 
-    def __init__(self, path: Path, refusal: str):
-        """Makes the folder where it is missing.
+    def __init__(self, path: Path, locked_message: str):
+        """Creates the folder if it does not exist and takes the lock.
 
         Args:
-            path: of the lock file in it.
-            refusal: what to say where another process holds the lock; names the folder.
+            path: the lock file.
+            locked_message: message of the error if another process has the lock; names the folder.
 
         Raises:
-            RunError: another process holds it.
-            OSError: the folder cannot be made or written to.
+            RunError: another process has the lock.
+            OSError: the folder cannot be created or written to.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("ab")
         if not lock(self._file):
             self._file.close()
-            raise RunError(refusal)
+            raise RunError(locked_message)
 
     def close(self) -> None:
-        """Lets go."""
+        """Releases the lock."""
         self._file.close()
 
     def __enter__(self) -> "FolderLock":

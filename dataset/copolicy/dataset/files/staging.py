@@ -1,4 +1,4 @@
-"""A folder or file that appears complete or not at all, also where the power fails."""
+"""Writes folders and files atomically: each appears complete or not at all, even after a power failure."""
 
 import errno
 import json
@@ -12,15 +12,15 @@ from typing import Any
 
 from ..exceptions import OutputExistsError
 
-_REFUSALS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
-_FILE = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only what is open for writing
+_DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
+_SYNC_FLAGS = os.O_RDWR if os.name == "nt" else os.O_RDONLY  # Windows flushes only files open for writing
 
 
 def require_new(*paths: Path, overwrite: bool = False) -> None:
-    """Checks that nothing would be overwritten that should not be.
+    """Checks that no path exists, unless `overwrite` is set.
 
     Raises:
-        OutputExistsError: there is something at one of the paths, be it a broken link, and `overwrite` is off.
+        OutputExistsError: one of the paths exists, if only as a broken link.
     """
     for path in paths:
         if os.path.lexists(path) and not overwrite:
@@ -29,35 +29,35 @@ def require_new(*paths: Path, overwrite: bool = False) -> None:
 
 @contextmanager
 def new_folder(path: Path, suffix: str | None = None) -> Iterator[Path]:
-    """A path beside `path` to build a folder at, renamed to `path` at the end of the block and removed on any error.
+    """Yields a temporary path for a new folder, renamed to `path` at the end of the block and removed on any error.
 
     Args:
-        suffix: of its name, where only one process builds this folder: what a killed one left under the same name goes
-            first. By default a name of its own, which no other process uses.
+        suffix: suffix of the temporary name, for a folder that only one process builds; a folder that a killed
+            process left under this name is deleted first. By default the name is random.
 
     Raises:
-        OutputExistsError: there is something at `path`, before the block or after it.
-        OSError: the disk refuses; it names `path` or a file in it.
+        OutputExistsError: `path` exists before the block or at its end.
+        OSError: the disk is full or not writable; the error names `path` or a file in it.
     """
     require_new(path)
-    with about(path):
+    with named_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.parent / f".{path.name}.{suffix or _unique()}"
     shutil.rmtree(partial, ignore_errors=True)
     try:
-        with about(path, partial):
+        with named_errors(path, partial):
             yield partial
-            take_name(partial, path)
+            rename_complete(partial, path)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
 
 
-def take_name(partial: Path, path: Path) -> None:
-    """Renames a finished folder once all of it is on the disk.
+def rename_complete(partial: Path, path: Path) -> None:
+    """Renames a complete folder to `path` after syncing it to disk.
 
     Raises:
-        OutputExistsError: there is something at `path`.
+        OutputExistsError: `path` exists.
     """
     sync_tree(partial)
     require_new(path)
@@ -67,7 +67,7 @@ def take_name(partial: Path, path: Path) -> None:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """The same for one file."""
+    """Yields a temporary path for a new file, like `new_folder`."""
     require_new(path)
     with replacement(path, new=True) as partial:
         yield partial
@@ -75,10 +75,10 @@ def new_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def replacement(path: Path, new: bool = False) -> Iterator[Path]:
-    """The same for a file that may be there already: the old one stays until the new one takes its place.
+    """Yields a temporary path for a file that replaces `path` at the end of the block.
 
     Args:
-        new: nothing may be there when the block ends.
+        new: raise OutputExistsError if `path` exists at the end of the block.
     """
     with replacements([path]) as (partial,):
         yield partial
@@ -88,21 +88,21 @@ def replacement(path: Path, new: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def replacements(paths: Sequence[Path]) -> Iterator[list[Path]]:
-    """The same for several files: all are on the disk before the first takes its place, in the order of `paths`."""
+    """Like `replacement` for several files: all are synced to disk, then renamed in the order of `paths`."""
     partials: list[Path] = []
     try:
         for path in paths:
-            with about(path):
+            with named_errors(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
             partials.append(path.parent / f".{path.name}.{_unique()}")
-        places = dict(zip(partials, paths, strict=True))
-        with about(Path(os.path.commonpath(paths)) if paths else None, places=places):
+        targets = dict(zip(partials, paths, strict=True))
+        with named_errors(Path(os.path.commonpath(paths)) if paths else None, targets=targets):
             yield list(partials)
-        for partial, path in places.items():
-            with about(path, partial):
-                _sync(partial, _FILE)
-        for partial, path in places.items():
-            with about(path, partial):
+        for partial, path in targets.items():
+            with named_errors(path, partial):
+                _sync(partial, _SYNC_FLAGS)
+        for partial, path in targets.items():
+            with named_errors(path, partial):
                 os.replace(partial, path)
         for folder in dict.fromkeys(path.parent for path in paths):
             sync_folder(folder)
@@ -113,106 +113,107 @@ def replacements(paths: Sequence[Path]) -> Iterator[list[Path]]:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Writes a text file in UTF-8, whole or not at all."""
+    """Writes a UTF-8 text file atomically."""
     with replacement(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
 def replace_json(path: Path, value: Any, indent: int = 2, allow_nan: bool = True) -> None:
-    """The same for a value as JSON."""
+    """Writes a JSON file atomically."""
     replace_text(path, json.dumps(value, indent=indent, allow_nan=allow_nan) + "\n")
 
 
-def write_as_lerobot(path: Path, value: Any) -> None:
-    """Writes JSON into a folder in the making in the form that LeRobot gives its own."""
+def write_lerobot_json(path: Path, value: Any) -> None:
+    """Writes JSON formatted as LeRobot does, into a folder that is not yet published."""
     path.write_text(json.dumps(value, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 @contextmanager
-def about(path: Path | None, partial: Path | None = None, places: Mapping[Path, Path] | None = None) -> Iterator[None]:
-    """Gives an error of the system the name of the file that a user knows.
+def named_errors(
+    path: Path | None, partial: Path | None = None, targets: Mapping[Path, Path] | None = None
+) -> Iterator[None]:
+    """Makes system errors in the block name the file that the user asked for.
 
-    Libraries leave the name out, or name the hidden file that was in the making; nobody finds that one when they read
-    the message.
+    Libraries leave the name out, or give that of a temporary file, which no longer exists when the message is read.
 
     Args:
-        path: what is being written; named where the error names nothing.
-        partial: where it is being written, a file or a folder.
-        places: the same for several files.
+        path: the output; used where the error names no file.
+        partial: temporary file or folder that becomes `path`.
+        targets: final path by temporary path, for several files.
     """
-    places = dict(places or {})
+    targets = dict(targets or {})
     if path is not None and partial is not None:
-        places[partial] = path
+        targets[partial] = path
     try:
         yield
     except OSError as error:
         if error.errno is None and type(error) is not OSError:
-            raise  # of a network library, with a text of its own
+            raise  # a network library's error, which has its own message
         if error.errno is None:
-            # Of h5py or pyarrow: a path beside a text without a number would take the place of the text.
-            error.errno, error.strerror = refusal(error) or errno.EIO, " ".join(str(error).split())
+            # From h5py or pyarrow: with a file name but no number, str(error) would lose the message.
+            error.errno, error.strerror = disk_error_number(error) or errno.EIO, " ".join(str(error).split())
         name = error.filename
-        for hidden, known in places.items():
-            if isinstance(name, (str, os.PathLike)) and Path(name).is_relative_to(hidden):
-                name = str(known / Path(name).relative_to(hidden))
+        for temporary, target in targets.items():
+            if isinstance(name, (str, os.PathLike)) and Path(name).is_relative_to(temporary):
+                name = str(target / Path(name).relative_to(temporary))
         if name is None and path is not None:
             name = str(path)
         if name == error.filename:
             raise
         try:
             error.filename = name
-        except AttributeError:  # of PyAV, whose errors keep the name that they were made with
+        except AttributeError:  # PyAV's errors have a read-only file name
             raise OSError(error.errno, error.strerror, name) from error
         raise
     except Exception as error:
-        number = refusal(error)
+        number = disk_error_number(error)
         if number is None or path is None:
             raise
-        # An error of safetensors or torch says it in its text alone.
+        # safetensors and torch give the system's error only in their message.
         raise OSError(number, os.strerror(number), str(path)) from error
 
 
-def refusal(error: BaseException) -> int | None:
-    """Number of the system's error where the disk is full or takes no more, whatever the error is called.
+def disk_error_number(error: BaseException) -> int | None:
+    """The errno of an error caused by a full, limited or read-only disk, else None.
 
-    What an error was raised from, or while, counts too: libraries put errors of their own around it.
+    The causes and contexts of the error count too, because libraries wrap system errors in their own.
     """
-    for cause in causes(error):
+    for cause in error_chain(error):
         number = getattr(cause, "errno", None)
-        if number in _REFUSALS:
+        if number in _DISK_ERRORS:
             return number
         if isinstance(cause, OSError) and number is not None:
             return None
-        found = next((number for number in _REFUSALS if os.strerror(number) in str(cause)), None)
-        if found is not None:
-            return found
+        number = next((number for number in _DISK_ERRORS if os.strerror(number) in str(cause)), None)
+        if number is not None:
+            return number
     return None
 
 
-def causes(error: BaseException) -> Iterator[BaseException]:
-    """An error, what it was raised from, what that was raised from, and so on."""
-    seen: list[BaseException] = []
+def error_chain(error: BaseException) -> Iterator[BaseException]:
+    """Yields an error, then its cause or context, and so on."""
+    chain: list[BaseException] = []
     cause: BaseException | None = error
-    while cause is not None and not any(cause is earlier for earlier in seen):
-        seen.append(cause)
+    while cause is not None and not any(cause is link for link in chain):
+        chain.append(cause)
         yield cause
         cause = cause.__cause__ or cause.__context__
 
 
 def sync_tree(folder: Path) -> None:
-    """Waits until every file and folder below `folder`, and itself, are on the disk.
+    """Syncs a folder and every file and folder below it to disk.
 
-    What was written back already, such as a file that two data sets share by a hard link, costs next to nothing.
+    Files that are already on disk, such as hard links shared by two data sets, cost little.
     """
-    for inside, _, names in os.walk(folder, topdown=False):
+    for parent, _, names in os.walk(folder, topdown=False):
         for name in names:
-            if not Path(inside, name).is_symlink():
-                _sync(Path(inside, name), _FILE)
-        sync_folder(Path(inside))
+            if not Path(parent, name).is_symlink():
+                _sync(Path(parent, name), _SYNC_FLAGS)
+        sync_folder(Path(parent))
 
 
 def sync_folder(folder: Path) -> None:
-    """Waits until the names in a folder are on the disk, where the system can (Windows cannot open a folder)."""
+    """Syncs the entries of a folder to disk, where the system supports it (Windows cannot open a folder)."""
     if hasattr(os, "O_DIRECTORY"):
         _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
 

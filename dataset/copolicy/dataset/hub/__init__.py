@@ -1,1 +1,1 @@
-"""The Hub as a client sees it: repositories, revisions, downloads, and what its errors mean."""
+"""Hugging Face Hub client: repositories, revisions, downloads, and one-line error messages."""

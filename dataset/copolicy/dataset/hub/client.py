@@ -1,24 +1,21 @@
-"""The Hub's client, and what its errors mean in one line."""
+"""The Hub's client and one-line messages for its errors."""
 
 import contextlib
 import logging
 from collections.abc import Iterator
 
-from ..exceptions import CopolicyError, MissingExtraError, RunError
-from ..files.staging import causes, refusal
+import httpx
+from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi, get_token, snapshot_download
+from huggingface_hub.errors import (
+    HfHubHTTPError,
+    LocalTokenNotFoundError,
+    OfflineModeIsEnabled,
+    RemoteEntryNotFoundError,
+    RepositoryNotFoundError,
+)
 
-try:
-    import httpx
-    from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi, get_token, snapshot_download
-    from huggingface_hub.errors import (
-        HfHubHTTPError,
-        LocalTokenNotFoundError,
-        OfflineModeIsEnabled,
-        RemoteEntryNotFoundError,
-        RepositoryNotFoundError,
-    )
-except ModuleNotFoundError as error:
-    raise MissingExtraError((error.name or "huggingface_hub").split(".")[0]) from None
+from ..exceptions import CopolicyError, RunError
+from ..files.staging import disk_error_number, error_chain
 
 __all__ = [
     "CommitOperationAdd",
@@ -32,69 +29,69 @@ __all__ = [
     "snapshot_download",
 ]
 
-# The client tells of every request at the level that our commands show.
+# httpx logs every request at INFO, the level that the commands show.
 logging.getLogger("httpx").setLevel(logging.WARNING)
-# It warns where it cannot keep a list that only speeds up the next download; a full disk says so itself.
+# A failed write of this cache only slows the next download; a full disk raises its own error.
 logging.getLogger("huggingface_hub._tree_cache").setLevel(logging.ERROR)
 
-_MEANINGS = {
-    401: "the Hub does not accept the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`",
-    403: "the token may not do this; it needs the right to write to the repository",
-    404: "no such data set on the Hub, or a private one that the token may not see",
-    409: "somebody else committed meanwhile; look at what changed there and run the command again",
-    412: "somebody else committed meanwhile; look at what changed there and run the command again",
-    413: "the Hub finds the request too large",
-    429: "the Hub asks to wait; run the command again later",
+_STATUS_MESSAGES = {
+    401: "the Hub rejected the token, or a private data set needs one; set HF_TOKEN or run `hf auth login`",
+    403: "the token has no write access to the repository",
+    404: "no such data set on the Hub, or a private one that the token cannot read",
+    409: "the repository was changed by another commit; check the changes and run the command again",
+    412: "the repository was changed by another commit; check the changes and run the command again",
+    413: "the request is too large for the Hub",
+    429: "too many requests to the Hub; run the command again later",
 }
 
 
 class HubError(RunError):
-    """The Hub did not do what was asked."""
+    """A request to the Hub failed."""
 
 
 def hub_api() -> HfApi:
-    """A client with the token of the environment (`HF_TOKEN`, or what `hf auth login` stored)."""
+    """A client with the user's token (`HF_TOKEN`, or the one that `hf auth login` stored)."""
     return HfApi(library_name="copolicy")
 
 
 @contextlib.contextmanager
-def hub_errors(repo_id: str, doing: str) -> Iterator[None]:
-    """Turns an error of the client into a `HubError` of one line that never holds the token.
+def hub_errors(repo_id: str, action: str) -> Iterator[None]:
+    """Turns an error of the client into a one-line `HubError` that never contains the token.
 
-    An error of a disk that is full or takes no more passes through: it is not the Hub's.
+    Errors of a full or read-only disk pass through unchanged.
 
     Args:
-        doing: what is going on, such as `uploading`.
+        action: what the block does, such as `uploading`.
     """
     try:
         yield
     except CopolicyError:
         raise
     except (OSError, ValueError, RuntimeError, httpx.HTTPError) as error:
-        if refusal(error) is not None:
+        if disk_error_number(error) is not None:
             raise
-        raise HubError(_without_token(f"{repo_id}: {doing}: {_meaning(error)}")) from None
+        raise HubError(_without_token(f"{repo_id}: {action}: {_error_message(error)}")) from None
 
 
-def _meaning(error: BaseException) -> str:
-    """The innermost cause that says something; the client wraps errors of uploads and downloads in others."""
-    chain = list(causes(error))
+def _error_message(error: BaseException) -> str:
+    """The message of the first error in the chain with a known cause; the client wraps transfer errors in others."""
+    chain = list(error_chain(error))
     for cause in chain:
         if isinstance(cause, OfflineModeIsEnabled):
             return "the Hub's client is offline (HF_HUB_OFFLINE is set)"
         if isinstance(cause, LocalTokenNotFoundError):
-            return _MEANINGS[401]
+            return _STATUS_MESSAGES[401]
         if isinstance(cause, HfHubHTTPError):
             status = cause.response.status_code
             if cause.response.headers.get("X-Error-Code") == "RevisionNotFound":
                 return "no such revision"
             if status >= 500:
-                return f"the Hub has trouble (HTTP {status}); run the command again, it goes on where it stopped"
-            return _MEANINGS.get(status) or f"HTTP {status}: {cause.server_message or _first_line(cause)}"
+                return f"the Hub failed (HTTP {status}); run the command again to continue"
+            return _STATUS_MESSAGES.get(status) or f"HTTP {status}: {cause.server_message or _first_line(cause)}"
     for cause in chain:
         if isinstance(cause, httpx.TransportError):
             reason = _first_line(cause) or type(cause).__name__
-            return f"the connection broke off ({reason}); run the command again, it goes on where it stopped"
+            return f"the connection was lost ({reason}); run the command again to continue"
     return _first_line(error) or type(error).__name__
 
 

@@ -1,4 +1,4 @@
-"""What the Hub holds of one data set repository: its head, its tags, and the files of a revision."""
+"""A data set repository on the Hub: its head, tags, and the files of a revision."""
 
 import shutil
 import tempfile
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..exceptions import RunError
-from ..publication.data_version import newest
+from ..publication.data_version import newest_version
 from ..publication.repo_id import checked_repo_id
 from .client import HfApi, RemoteEntryNotFoundError, RepositoryNotFoundError, hub_api, hub_errors, snapshot_download
 
@@ -15,7 +15,7 @@ BRANCH = "main"
 
 @dataclass(frozen=True)
 class Repository:
-    """A data set repository as it was when asked.
+    """State of a data set repository at the time of the request.
 
     Attributes:
         head: commit of `main`.
@@ -29,12 +29,12 @@ class Repository:
 
 
 def read_repository(api: HfApi, repo_id: str) -> Repository | None:
-    """Head and tags, or `None` where the Hub has no such data set that the token may see.
+    """Reads head and tags; `None` if the Hub has no such data set, or the token cannot read it.
 
     Raises:
-        HubError: the Hub does not answer, or does not accept the token.
+        HubError: the Hub does not answer, or rejects the token.
     """
-    with hub_errors(repo_id, "asking the Hub"):
+    with hub_errors(repo_id, "querying the Hub"):
         try:
             info = api.dataset_info(repo_id)
             refs = api.list_repo_refs(repo_id, repo_type="dataset")
@@ -52,34 +52,34 @@ def read_repository(api: HfApi, repo_id: str) -> Repository | None:
 
 
 def read_file(api: HfApi, repo_id: str, commit: str, path: str) -> bytes | None:
-    """A small file at a commit, or `None` where it holds none.
+    """Reads a small file at a commit; `None` if the commit has no such file.
 
     Raises:
         HubError: the Hub does not answer.
     """
     with hub_errors(repo_id, f"reading {path}"), tempfile.TemporaryDirectory() as folder:
         try:
-            local = api.hf_hub_download(repo_id, path, repo_type="dataset", revision=commit, local_dir=folder)
+            downloaded = api.hf_hub_download(repo_id, path, repo_type="dataset", revision=commit, local_dir=folder)
         except RemoteEntryNotFoundError:
             return None
-        return Path(local).read_bytes()
+        return Path(downloaded).read_bytes()
 
 
 def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
-    """Name and commit of a revision; the newest data version where none is asked for.
+    """Resolves a revision to its name and commit; None stands for the newest data version.
 
     Raises:
-        InvalidValueError: `repo_id` is no name.
+        InvalidValueError: `repo_id` is not a valid name.
         HubError: the Hub does not answer, or has no such data set or revision.
-        RunError: no data set of that name, or none of its versions is tagged.
+        RunError: no data set of that name, or it has no tag of a data version.
     """
     checked_repo_id(repo_id, "data set on the Hub")
     api = hub_api()
     repository = read_repository(api, repo_id)
     if repository is None:
-        raise RunError(f"{repo_id}: no such data set on the Hub, or a private one that the token may not see")
+        raise RunError(f"{repo_id}: no such data set on the Hub, or a private one that the token cannot read")
     if revision is None:
-        version = newest(list(repository.tags))
+        version = newest_version(list(repository.tags))
         if version is None:
             raise RunError(
                 f"{repo_id}: expected a tag data-x.y.z on the Hub, found {sorted(repository.tags) or 'none'}"
@@ -87,18 +87,18 @@ def resolve(repo_id: str, revision: str | None) -> tuple[str, str]:
         revision = version.tag
     if revision in repository.tags:
         return revision, repository.tags[revision]
-    with hub_errors(f"{repo_id}@{revision}", "asking the Hub"):
+    with hub_errors(f"{repo_id}@{revision}", "querying the Hub"):
         return revision, api.dataset_info(repo_id, revision=revision).sha or ""
 
 
 def download(repo_id: str, folder: Path, commit: str, skip: str | None = None) -> None:
-    """Downloads the files of a commit into `folder`, going on with what an earlier call left there.
+    """Downloads the files of a commit into `folder`, or resumes an earlier download there.
 
     Args:
-        skip: pattern of files that are not wanted.
+        skip: pattern of files to leave out.
 
     Raises:
-        HubError: the Hub does not answer; what arrived stays in `folder`.
+        HubError: the Hub does not answer; files already downloaded stay in `folder`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with hub_errors(repo_id, "downloading"):
@@ -113,6 +113,6 @@ def download(repo_id: str, folder: Path, commit: str, skip: str | None = None) -
         )
 
 
-def forget_progress(folder: Path) -> None:
-    """Removes what the client keeps beside the files to go on with a download."""
+def remove_download_state(folder: Path) -> None:
+    """Removes the files that the client keeps to resume a download."""
     shutil.rmtree(folder / ".cache", ignore_errors=True)

@@ -1,1 +1,1 @@
-"""Reads LeRobot v3 data set folders. This file imports nothing, which keeps the start of other commands fast."""
+"""Reads LeRobot v3 data set folders. This file imports nothing, so that other commands start fast."""

@@ -1,4 +1,4 @@
-"""Types of the JSON documents that commands leave in the `meta/` folder of a data set."""
+"""Types of the JSON documents that commands write to the `meta/` folder of a data set."""
 
 from typing import Any, NotRequired, TypedDict
 
@@ -19,7 +19,7 @@ class _Routes(TypedDict, total=False):
 
 
 class Configuration(TypedDict):
-    """What a statistic says of one configuration; `counts` are those of routes."""
+    """Values of a statistic for one configuration; `counts` are the episodes of each route."""
 
     episodes: int
     counts: NotRequired[dict[str, int]]
@@ -30,7 +30,7 @@ class Configuration(TypedDict):
 
 
 class EstimateDetails(TypedDict, total=False):
-    """The parts of an estimate that cards and the report show; others are passed on."""
+    """The parts of an estimate that cards and the report show; other keys are kept."""
 
     configurations: dict[str, Configuration]
     effective_modes: Number
@@ -72,7 +72,7 @@ class StatisticsDocument(TypedDict):
 
 
 class FindingDocument(TypedDict):
-    """One finding."""
+    """One finding of a check."""
 
     rule: str
     severity: str
@@ -93,7 +93,7 @@ class CheckDocument(TypedDict):
 
 
 class ReleaseDocument(TypedDict):
-    """What cards read of `meta/copolicy_release.json`, the record of a release."""
+    """The keys of `meta/copolicy_release.json`, the record of a release, that cards read."""
 
     version: str
     date: str

@@ -1,4 +1,4 @@
-"""The rows of meta/episodes as tables: read, chosen by number or name, and written back whole."""
+"""Reads, selects and atomically rewrites the rows of meta/episodes as tables."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,19 +15,18 @@ if TYPE_CHECKING:
 
 
 def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Table]":
-    """The files of meta/episodes, each as a table, in the order of their paths.
+    """Reads the files of meta/episodes as tables, in the order of their paths.
 
     Args:
         needed: columns that each file must have.
 
     Raises:
-        FileFormatError: no LeRobot data set, a damaged file, or one that lacks a needed column.
-        MissingExtraError: pyarrow is not installed.
+        FileFormatError: no LeRobot data set, a damaged file, or a missing column.
     """
     from .folder import LeRobotFolder
     from .tables import read_parquet
 
-    # The types of all columns, before any of them is rewritten.
+    # Checks the types of all columns before any of them is rewritten.
     folder = LeRobotFolder.open(root)
     folder.rows([name for name in needed if name in EPISODE_COLUMNS])
     tables = {}
@@ -40,15 +39,15 @@ def episode_tables(root: Path, needed: Sequence[str] = ()) -> "dict[Path, pa.Tab
     return tables
 
 
-def chosen_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping[str, int]) -> set[int]:
-    """The episodes that `12`, `3-5` or an `episode_uuid` stand for.
+def select_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping[str, int]) -> set[int]:
+    """Resolves texts such as `12`, `3-5` or an `episode_uuid` to episode numbers.
 
     Args:
-        numbers: of all episodes.
-        names: number of each `episode_uuid`.
+        numbers: numbers of all episodes.
+        names: episode number by `episode_uuid`.
 
     Raises:
-        InvalidValueError: an episode that is not there, or a text of another form.
+        InvalidValueError: no such episode, or a text of another form.
     """
     numbers = set(numbers)
     chosen: set[int] = set()
@@ -57,37 +56,37 @@ def chosen_episodes(texts: Iterable[str], numbers: Iterable[int], names: Mapping
             chosen.add(names[text])
             continue
         match = re.fullmatch(r"(\d+)(?:-(\d+))?", text)
-        # The end is cut first: a range may name more numbers than fit into memory.
+        # The range is limited first: it may have more numbers than fit into memory.
         first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, -1)
-        wanted = set(range(first, min(last, first + len(numbers)) + 1))
-        if not wanted or not wanted <= numbers:
-            span = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or episode_uuids of the data set"
-            raise InvalidValueError("--episode-ids", span, text)
-        chosen |= wanted
+        requested = set(range(first, min(last, first + len(numbers)) + 1))
+        if not requested or not requested <= numbers:
+            expected = f"numbers from 0 to {max(numbers, default=0)}, ranges such as 3-5, or existing episode_uuids"
+            raise InvalidValueError("--episode-ids", expected, text)
+        chosen |= requested
     return chosen
 
 
-def with_column(table: "pa.Table", name: str, values: Sequence[Any], kind: str) -> "pa.Table":
-    """The table with other values in an episode column.
+def with_column(table: "pa.Table", name: str, values: Sequence[Any], type_name: str) -> "pa.Table":
+    """Returns the table with new values in an episode column, which is added if missing.
 
     Args:
-        kind: `str`, `int`, `float` or `bool`. A column of nulls alone has no type yet, as after a merge with a set
-            that lacks it.
+        type_name: `str`, `int`, `float` or `bool`; needed because a column of nulls, as after a merge with a data set
+            without it, has no type.
     """
     import pyarrow as pa
 
-    arrow = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}[kind]
+    arrow_type = {"str": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}[type_name]
     position = table.schema.get_field_index(name)
-    field = pa.field(name, arrow)
-    array = pa.array(values, arrow)
+    field = pa.field(name, arrow_type)
+    array = pa.array(values, arrow_type)
     return table.append_column(field, array) if position < 0 else table.set_column(position, field, array)
 
 
 def write_tables(tables: "Mapping[Path, pa.Table]", texts: Mapping[Path, str] | None = None) -> None:
-    """Puts tables in the place of the files of meta/episodes, and texts in that of others.
+    """Replaces files of meta/episodes by tables and other files by texts.
 
-    All new files are complete on the disk before the first takes its place, each in one step: a crash leaves old or
-    new files, never half of one, and the same call again completes what it began.
+    All new files are synced to disk before the first is renamed: a crash leaves old or new files, never a partial
+    one, and repeating the call completes it.
     """
     import pyarrow.parquet as pq
 

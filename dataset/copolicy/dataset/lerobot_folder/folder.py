@@ -1,4 +1,4 @@
-"""A LeRobot v3 data set folder: the first step of every reader."""
+"""A LeRobot v3 data set folder with checked metadata, used by every reader."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..episode import EPISODE_COLUMNS, LATER_COLUMNS, UNKNOWN_VALUES
 from ..exceptions import FileFormatError
 from ..features import ACTION, STATE, VECTORS, features_of
@@ -18,15 +19,15 @@ from .info import episode_files, read_info, require_episodes, split_range, strip
 from .tables import column_types, damaged, episode_values, feature_values, pa, read_parquet
 
 POSITIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
-"""The columns of meta/episodes that say which rows of the frames an episode has."""
+"""The columns of meta/episodes that locate the frames of an episode."""
 
 
 @dataclass(frozen=True)
 class LeRobotFolder:
-    """The metadata of a data set, checked for types and for consistent episode numbers and lengths.
+    """The metadata of a data set, with checked types and consistent episode numbers and lengths.
 
     Attributes:
-        info: `meta/info.json`, the types of its entries checked.
+        info: `meta/info.json` with checked types.
         episodes: the rows of meta/episodes in the order of `episode_index`, without statistics.
     """
 
@@ -39,8 +40,8 @@ class LeRobotFolder:
         """Reads the metadata.
 
         Raises:
-            FileFormatError: no LeRobot v3 data set, or one whose episodes cannot be told apart: no or a broken table
-                of episodes, or an `episode_index` or `length` that is none.
+            FileFormatError: no LeRobot v3 data set, a missing or damaged table of episodes, or an invalid
+                `episode_index` or `length`.
         """
         info = read_info(root)
         require_episodes(root, info)
@@ -56,16 +57,16 @@ class LeRobotFolder:
         table = table.sort_by("episode_index")
         numbers, lengths = (table.column(name).to_numpy() for name in POSITIONS[:2])
         if not np.array_equal(numbers, np.arange(len(numbers))):
-            raise FileFormatError(path, f"episodes 0 to {len(numbers) - 1}, each once", _wrong_numbers(numbers))
+            raise FileFormatError(path, f"episodes 0 to {len(numbers) - 1}, each once", _numbering_error(numbers))
         if (lengths < 1).any():
-            raise FileFormatError(path, "episodes of at least one frame", f"episode {int(np.argmin(lengths))} of none")
+            raise FileFormatError(path, "at least one frame per episode", f"none in episode {int(np.argmin(lengths))}")
         if lengths.sum(dtype=float) > 2**40:
-            raise FileFormatError(path, "lengths that add up to a data set", f"{lengths.max()} frames in an episode")
+            raise FileFormatError(path, "plausible episode lengths", f"{lengths.max()} frames in an episode")
         return cls(root, info, table)
 
     @property
     def task(self) -> PairTask:
-        """The task of the data set, as `task_of`."""
+        """The task of the data set, see `task_of`."""
         return task_of(self.info)
 
     @property
@@ -75,12 +76,12 @@ class LeRobotFolder:
         Raises:
             FileFormatError: a split of another form.
         """
-        found: dict[str, range] = {}
+        splits: dict[str, range] = {}
         for name, text in (self.info.get("splits") or {}).items():
-            if (span := split_range(text)) is None:
+            if (episodes := split_range(text)) is None:
                 raise FileFormatError(self.root / INFO_FILE, "splits as FIRST:END", repr(text))
-            found[name] = span
-        return found
+            splits[name] = episodes
+        return splits
 
     @property
     def lengths(self) -> list[int]:
@@ -92,7 +93,7 @@ class LeRobotFolder:
         """The files of frames, in the order of their paths.
 
         Raises:
-            FileFormatError: there is none.
+            FileFormatError: there are none.
         """
         files = data_files(self.root)
         if not files:
@@ -100,11 +101,10 @@ class LeRobotFolder:
         return files
 
     def rows(self, columns: Sequence[str] = tuple(EPISODE_COLUMNS)) -> list[dict[str, Any]]:
-        """`episode_index`, `length` and some episode columns of each episode; an empty entry is the one of
-        `UNKNOWN_VALUES`.
+        """`episode_index`, `length` and some episode columns of each episode; nulls become `UNKNOWN_VALUES`.
 
         Raises:
-            FileFormatError: a column is missing or holds something else.
+            FileFormatError: a column is missing or has another type.
         """
         path = self.root / EPISODES_FOLDER
         missing = [name for name in columns if name not in self.episodes.column_names and name not in LATER_COLUMNS]
@@ -114,39 +114,39 @@ class LeRobotFolder:
         values: dict[str, list[Any]] = {name: self.episodes.column(name).to_pylist() for name in POSITIONS[:2]}
         for name in columns:
             if name in self.episodes.column_names:
-                kind, unknown = EPISODE_COLUMNS[name], UNKNOWN_VALUES[name]
-                values[name] = episode_values(self.episodes, name, kind, path, unknown).tolist()
+                column_type, unknown = EPISODE_COLUMNS[name], UNKNOWN_VALUES[name]
+                values[name] = episode_values(self.episodes, name, column_type, path, unknown).tolist()
             else:
                 values[name] = [UNKNOWN_VALUES[name]] * self.episodes.num_rows
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
-    def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-        """Number and columns of each episode in order, `(T, n)` or `(T,)` each; one file is in memory at a time.
+    def frames(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, dict[str, Array]]]:
+        """Yields number and columns of each episode in order, `(T, n)` or `(T,)` each; reads one file at a time.
 
-        Rows are taken in the order of their `index`, whatever the order in a file and of the files.
+        Rows are sorted by their `index`, whatever their order in the files.
 
         Args:
-            shapes: of the columns, by name.
+            shapes: shape of each column.
 
         Raises:
-            FileFormatError: a data file is missing, damaged, without a column, with a number that is not finite, or
-                holds other episodes than meta/episodes says.
+            FileFormatError: a data file is missing, damaged, lacks a column, has a number that is not finite, or
+                disagrees with meta/episodes.
         """
-        expected = iter(enumerate(self.lengths))
-        for number, group in groupby(self._parts(shapes), key=lambda part: part[0]):
+        expected_entries = iter(enumerate(self.lengths))
+        for number, group in groupby(self._episode_runs(shapes), key=lambda run: run[0]):
             (_, path, columns), *rest = group
-            for _, _, more in rest:  # an episode that goes on in the next file
-                columns = {name: np.concatenate((values, more[name])) for name, values in columns.items()}
-            due, found = next(expected, None), (number, len(columns["index"]))
+            for _, _, next_columns in rest:  # the episode continues in the next file
+                columns = {name: np.concatenate((values, next_columns[name])) for name, values in columns.items()}
+            due, found = next(expected_entries, None), (number, len(columns["index"]))
             if found != due:
-                named = f"episode {due[0]} with {due[1]} frames" if due else "its end"
-                raise FileFormatError(path, f"{named} as in meta/episodes", f"episode {found[0]} with {found[1]}")
+                expected = f"episode {due[0]} with {due[1]} frames" if due else "no further episode"
+                raise FileFormatError(path, f"{expected} as in meta/episodes", f"episode {found[0]} with {found[1]}")
             yield number, {name: columns[name] for name in shapes}
-        if left := next(expected, None):
-            raise FileFormatError(self.root / "data", f"the frames of episode {left[0]}", "none")
+        if missing := next(expected_entries, None):
+            raise FileFormatError(self.root / "data", f"the frames of episode {missing[0]}", "none")
 
-    def _parts(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, Path, dict[str, np.ndarray]]]:
-        """Number, file and columns of each run of rows of one episode, in the order of their `index`."""
+    def _episode_runs(self, shapes: Mapping[str, Sequence[int]]) -> Iterator[tuple[int, Path, dict[str, Array]]]:
+        """Yields number, file and columns of consecutive rows of one episode, sorted by `index`."""
         shapes = {"index": (1,), **shapes}
         for path in sorted(data_files(self.root), key=_first_index):
             table = read_parquet(path, ["episode_index", *shapes])
@@ -164,20 +164,20 @@ class LeRobotFolder:
                 yield int(numbers[start]), path, {name: values[start:end] for name, values in columns.items()}
 
     def require_task(self, features: Sequence[str] = (STATE, ACTION)) -> None:
-        """Checks that the data set is one of its task.
+        """Checks that the features of the data set match its task.
 
         Raises:
             FileFormatError: a feature is missing or has another shape, as in a data set of another task.
-            UnknownNameError: its task is not installed.
+            UnknownNameError: the task is not installed.
         """
-        difference = other_task(self.info, features)
+        difference = task_mismatch(self.info, features)
         if difference:
             expected = f"a data set of {self.task.spec.title} (copolicy-convert)"
             raise FileFormatError(self.root / INFO_FILE, expected, difference)
 
 
 def _first_index(path: Path) -> int:
-    """The least `index` of a file of frames."""
+    """The smallest `index` of a file of frames."""
     return int(feature_values(read_parquet(path, ["index"]), "index", (1,), path).min(initial=2**62))
 
 
@@ -187,10 +187,10 @@ def data_files(root: Path) -> list[Path]:
 
 
 def read_episodes(root: Path) -> pa.Table:
-    """All rows of meta/episodes, without the statistics of episodes.
+    """Reads all rows of meta/episodes, without the statistics of episodes.
 
     Raises:
-        FileFormatError: no file, one that is no complete Parquet file, or files that do not fit together.
+        FileFormatError: no file, an incomplete Parquet file, or files with different columns.
     """
     folder = root / EPISODES_FOLDER
     files = episode_files(root)
@@ -209,8 +209,8 @@ def read_episodes(root: Path) -> pa.Table:
     return table
 
 
-def other_task(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) -> str:
-    """What makes a feature table none of the task that its robot type names; empty where nothing does."""
+def task_mismatch(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) -> str:
+    """Describes how features differ from those of the task that the robot type names; empty if they do not."""
     expected = features_of(task_of(info).spec)
     for name in features:
         feature = info["features"].get(name)
@@ -223,7 +223,7 @@ def other_task(info: dict[str, Any], features: Sequence[str] = (STATE, ACTION)) 
     return ""
 
 
-def _wrong_numbers(numbers: np.ndarray) -> str:
+def _numbering_error(numbers: Array) -> str:
     repeated = numbers[1:][np.diff(numbers) == 0]
     if len(repeated):
         return f"episode {repeated[0]} twice"

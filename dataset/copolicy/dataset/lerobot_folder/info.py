@@ -1,4 +1,4 @@
-"""`meta/info.json` of a LeRobot v3 data set, and what a folder is that has none."""
+"""Reads `meta/info.json` of a LeRobot v3 data set and describes a folder without one."""
 
 import math
 import re
@@ -7,32 +7,32 @@ from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 from ..files.json_file import read_json
 from ..files.listing import visible_files
 from ..files.meta_files import EPISODES_FOLDER, INFO_FILE
 from ..task import TABLE, PairTask, get_task
 
-_OURS = "copolicy"  # begins the robot types of our data sets
-_WHAT = "LeRobot's data set information"
+_ROBOT_TYPE_PREFIX = "copolicy"  # of data sets that copolicy-convert writes
+_DESCRIPTION = "LeRobot's data set information"
 
 
 def robot_type(task: str) -> str:
-    """The robot type in `meta/info.json` of the data sets that `copolicy-convert` writes: it names their task.
+    """The robot type in `meta/info.json` of data sets of a task written by `copolicy-convert`.
 
-    It survives LeRobot's tools and keeps sets of different tasks from being merged.
+    LeRobot's tools keep it and refuse to merge data sets with different robot types.
     """
-    return f"{_OURS}_{task}"
+    return f"{_ROBOT_TYPE_PREFIX}_{task}"
 
 
 def task_name(info: Mapping[str, Any]) -> str:
-    """Name of the task of a data set, installed or not; the table where its robot type names none."""
-    ours, _, name = str(info.get("robot_type") or "").partition("_")
-    return name if ours == _OURS and name else TABLE
+    """Name of the task of a data set, installed or not; `table` if its robot type names no task."""
+    prefix, _, name = str(info.get("robot_type") or "").partition("_")
+    return name if prefix == _ROBOT_TYPE_PREFIX and name else TABLE
 
 
 def task_of(info: Mapping[str, Any]) -> PairTask:
-    """The task of a data set.
+    """Returns the task of a data set.
 
     Raises:
         UnknownNameError: the task is not installed.
@@ -49,7 +49,7 @@ class Feature(TypedDict):
 
 
 class Info(TypedDict):
-    """The entries that LeRobot or copolicy reads; others are passed on."""
+    """The entries that LeRobot or copolicy reads; other keys are kept."""
 
     codebase_version: str
     fps: int | float
@@ -71,24 +71,24 @@ class _Version(TypedDict):
 
 
 def read_info(root: Path) -> dict[str, Any]:
-    """The information of a data set, with the types of all entries checked.
+    """Reads `meta/info.json` and checks the types of its entries.
 
     Raises:
-        FileFormatError: no such folder, a folder of something else, another version of the format, or an entry that
-            is missing or of another type.
+        FileFormatError: no such folder, not a data set, another version of the format, or an entry that is missing or
+            of another type.
     """
     path = root / INFO_FILE
     if not path.is_file():
-        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", _instead(root))
-    version = read_json(path, _Version, _WHAT).get("codebase_version")
+        raise FileFormatError(root, "a LeRobot v3 data set with meta/info.json", _describe_folder(root))
+    version = read_json(path, _Version, _DESCRIPTION).get("codebase_version")
     if version is not None and not version.startswith("v3."):
-        raise FileFormatError(path, "codebase_version v3.x", _other_version(version))
-    info: dict[str, Any] = dict(read_json(path, Info, _WHAT))
+        raise FileFormatError(path, "codebase_version v3.x", _describe_version(version))
+    info: dict[str, Any] = dict(read_json(path, Info, _DESCRIPTION))
     if not (math.isfinite(info["fps"]) and info["fps"] > 0):
-        raise FileFormatError(path, f"{_WHAT}, with a positive fps", repr(info["fps"]))
+        raise FileFormatError(path, f"{_DESCRIPTION}, with a positive fps", repr(info["fps"]))
     for name in ("chunks_size", "data_files_size_in_mb", "video_files_size_in_mb"):
         if info.get(name, 1) <= 0:
-            raise FileFormatError(path, f"{_WHAT}, with a positive {name}", repr(info[name]))
+            raise FileFormatError(path, f"{_DESCRIPTION}, with a positive {name}", repr(info[name]))
     for name, feature in info["features"].items():
         if not all(size > 0 for size in feature["shape"]):
             raise FileFormatError(path, f"a shape of positive sizes for the feature {name}", str(feature["shape"]))
@@ -101,52 +101,52 @@ def episode_files(root: Path) -> list[Path]:
 
 
 def split_range(text: object) -> range | None:
-    """The episodes of a split, FIRST:END as in `meta/info.json`; None for another form."""
+    """The episodes of a split, `FIRST:END` as in `meta/info.json`; None for any other form."""
     match = re.fullmatch(r"(\d+):(\d+)", str(text))
     return range(int(match[1]), int(match[2])) if match else None
 
 
 def require_episodes(root: Path, info: dict[str, Any]) -> None:
-    """Refuses a data set into which nothing was recorded yet.
+    """Refuses a data set without episodes.
 
     Raises:
-        FileFormatError: a data set that says of itself that it has no episode, and has none.
+        FileFormatError: `total_episodes` is 0 and meta/episodes is empty.
     """
     if info["total_episodes"] == 0 and not episode_files(root):
-        raise FileFormatError(root, "a data set with episodes", "one without any; nothing was recorded into it yet")
+        raise FileFormatError(root, "a data set with episodes", "an empty one (total_episodes is 0)")
 
 
-def is_ours(info: Mapping[str, Any]) -> bool:
-    """Whether `copolicy-convert` wrote a data set, by the marks in `meta/info.json` that LeRobot's tools keep."""
+def is_copolicy_info(info: Mapping[str, Any]) -> bool:
+    """Whether `copolicy-convert` wrote a data set, by the keys in `meta/info.json` that LeRobot's tools keep."""
     features = info.get("features")
     action = features.get("action") if isinstance(features, dict) else None
-    marked = isinstance(action, dict) and ("hold" in action or "record_hz" in action)
-    return marked or str(info.get("robot_type") or "").startswith(_OURS)
+    has_action_keys = isinstance(action, dict) and ("hold" in action or "record_hz" in action)
+    return has_action_keys or str(info.get("robot_type") or "").startswith(_ROBOT_TYPE_PREFIX)
 
 
 def stripped_hint(info: Mapping[str, Any], root: Path | str) -> str:
-    """What to do with a data set of ours whose episode columns are gone; empty for any other one.
+    """How to restore the episode columns of a data set of `copolicy-convert`; empty for any other data set.
 
     LeRobot's delete and split write meta/episodes without them.
     """
-    if not is_ours(info):
+    if not is_copolicy_info(info):
         return ""
     return (
-        f": LeRobot's delete and split lose them; copolicy-dataset amend {root} --restore-from ORIGINAL brings them "
-        "back from recordings or an earlier version, and copolicy-dataset select takes episodes out with all columns"
+        f": LeRobot's delete and split drop them; copolicy-dataset amend {root} --restore-from ORIGINAL restores them "
+        "from recordings or an earlier version, and copolicy-dataset select removes episodes but keeps all columns"
     )
 
 
-def _other_version(version: str) -> str:
+def _describe_version(version: str) -> str:
     if version.startswith("v2"):
         convert = "python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id=U/N --root=FOLDER --push-to-hub=false"
-        return f"{version}, an older one; LeRobot converts it: {convert}"
+        return f"{version}; LeRobot converts this older version: {convert}"
     return repr(version)
 
 
-def _instead(root: Path) -> str:
-    """What is at a path that is no data set."""
-    inside = sorted((*root.glob("*/meta/info.json"), *root.glob("*/*/meta/info.json")))
-    if inside:
-        return f"none, but one in {inside[0].parent.parent}"
-    return kind_of(root)
+def _describe_folder(root: Path) -> str:
+    """Describes a path that is not a data set."""
+    data_sets = sorted((*root.glob("*/meta/info.json"), *root.glob("*/*/meta/info.json")))
+    if data_sets:
+        return f"none, but a data set in {data_sets[0].parent.parent}"
+    return describe_path(root)

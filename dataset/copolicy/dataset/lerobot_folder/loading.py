@@ -1,4 +1,4 @@
-"""What LeRobot needs to load any single episode, join data sets, or normalise their frames."""
+"""Checks that LeRobot can load single episodes, merge data sets and normalise their frames."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import Array
 from ..exceptions import CopolicyError, FileFormatError
 from ..files.json_file import read_json
 from ..files.listing import visible_files
@@ -19,11 +20,11 @@ from .tables import (
     column_types,
     episode_values,
     is_list,
-    misfit,
     pa,
     read_parquet,
     row_count,
     scalars,
+    type_mismatch,
     vectors,
 )
 
@@ -31,11 +32,11 @@ STATISTICS = ("min", "max", "mean", "std")
 """The statistics of a feature that normalisation may use."""
 
 
-class Problem(NamedTuple):
-    """Something that keeps a data set, or one episode of it, from being loaded.
+class FolderProblem(NamedTuple):
+    """A problem that prevents LeRobot from loading a data set or one of its episodes.
 
     Attributes:
-        episode: its `episode_index`; None where all are concerned.
+        episode: `episode_index`; None if the problem concerns all episodes.
     """
 
     episode: int | None
@@ -46,10 +47,10 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
     """Checks that LeRobot can load every episode of a data set, whatever its task.
 
     Args:
-        finite_statistics: refuse `meta/stats.json` with NaN, which an episode that is not used may have caused.
+        finite_statistics: refuse NaN in `meta/stats.json`, which an unused episode may have caused.
 
     Raises:
-        FileFormatError: it cannot; the line names the first reason.
+        FileFormatError: LeRobot cannot load it; the message gives the first problem.
     """
     folder = LeRobotFolder.open(root)
     info = folder.info
@@ -75,7 +76,7 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
         episodes_of_files[path.relative_to(root).as_posix()] = frozenset(np.unique(numbers).tolist())
         task_numbers.update(np.unique(tasks).tolist())
     read_tasks(root)
-    read_statistics(root)
+    read_frame_statistics(root)
     rows = folder.episodes.to_pylist()
     for problems in (
         file_problems(root, info, rows, episodes_of_files),
@@ -84,13 +85,13 @@ def require_loadable(root: Path, finite_statistics: bool = True) -> LeRobotFolde
         episode_statistics_problems(root),
     ):
         for problem in problems:
-            where = "" if problem.episode is None else f"episode {problem.episode}: "
-            raise FileFormatError(root, "a data set that LeRobot can load", f"this: {where}{problem.message}")
+            prefix = "" if problem.episode is None else f"episode {problem.episode}: "
+            raise FileFormatError(root, "a data set that LeRobot can load", f"{prefix}{problem.message}")
     return folder
 
 
 def _require_spans(folder: LeRobotFolder) -> None:
-    """Checks that every frame belongs to one episode, by `dataset_from_index` and `dataset_to_index`."""
+    """Checks that `dataset_from_index` and `dataset_to_index` assign every frame to one episode."""
     first, end = (folder.episodes.column(name).to_numpy() for name in POSITIONS[2:])
     lengths = np.asarray(folder.lengths)
     wrong = np.flatnonzero(end - first != lengths)
@@ -99,136 +100,138 @@ def _require_spans(folder: LeRobotFolder) -> None:
         wrong = order[first[order] != np.cumsum(lengths[order]) - lengths[order]]
     if len(wrong):
         episode = int(wrong[0])
-        expected = f"episodes that follow each other, episode {episode} with {lengths[episode]} frames"
+        expected = f"consecutive episodes, episode {episode} with {lengths[episode]} frames"
         found = f"dataset_from_index {first[episode]} and dataset_to_index {end[episode]}"
         raise FileFormatError(folder.root / EPISODES_FOLDER, expected, found)
 
 
 def _require_features(path: Path, features: Mapping[str, Any]) -> None:
-    """Checks that a data file holds numbers where its features say so; LeRobot casts each column to its feature."""
+    """Checks that the columns of a data file fit their features, because LeRobot casts each column to its feature."""
     for name, feature in features.items():
         dtype, shape = feature["dtype"], feature["shape"]
         if not dtype.startswith(("float", "int", "uint", "bool")) or len(shape) != 1:
             continue
-        found = misfit(read_parquet(path, [name]).column(name), dtype, shape)
+        found = type_mismatch(read_parquet(path, [name]).column(name), dtype, shape)
         if found:
-            what = f"{math.prod(shape)} numbers" if math.prod(shape) > 1 else "a number"
-            raise FileFormatError(path, f"{what} of type {dtype} in every row of {name}", found)
+            expected = f"{math.prod(shape)} numbers" if math.prod(shape) > 1 else "a number"
+            raise FileFormatError(path, f"{expected} of type {dtype} in every row of {name}", found)
 
 
 def file_problems(
     root: Path, info: Mapping[str, Any], rows: Collection[dict[str, Any]], data_files: Mapping[str, frozenset[int]]
-) -> Iterator[Problem]:
-    """Episodes whose files are not where the metadata say.
+) -> Iterator[FolderProblem]:
+    """Yields the episodes whose files are not where the metadata say.
 
     Args:
-        rows: of meta/episodes.
-        data_files: the episodes that each data file has rows of, by its path below the folder.
+        rows: rows of meta/episodes.
+        data_files: the episodes in each data file, by its path relative to the folder.
     """
     for row in rows:
         index = row["episode_index"]
         try:
             name = data_path(info, row)
         except ValueError as error:
-            yield Problem(index, f"the metadata do not say which file holds the frames: {error}")
+            yield FolderProblem(index, f"the metadata do not name the file of the frames: {error}")
             continue
         if name not in data_files:
-            yield Problem(index, f"the frames should be in {name}, which is not there or cannot be read")
+            yield FolderProblem(index, f"the frames should be in {name}, which is missing or cannot be read")
         elif index not in data_files[name]:
-            yield Problem(index, f"the frames should be in {name}, which has none of this episode")
+            yield FolderProblem(index, f"the frames should be in {name}, which has no frame of this episode")
         for key in video_features(info):
             try:
                 _, start, end = video_span(root, info, row, key)
             except CopolicyError as error:
-                yield Problem(index, _below(root, error))
+                yield FolderProblem(index, _relative_message(root, error))
                 continue
             expected = row["length"] / info["fps"]
             if abs(end - start - expected) > 0.5 / info["fps"]:
-                yield Problem(index, f"{expected:g} s of frames, but {end - start:g} s of the video {key}")
+                yield FolderProblem(index, f"{expected:g} s of frames, but {end - start:g} s of the video {key}")
 
 
 def task_problems(
     root: Path, info: Mapping[str, Any], rows: Collection[dict[str, Any]], numbers: Collection[int]
-) -> Iterator[Problem]:
-    """What is wrong with the sentences of the tasks, which LeRobot looks up by their row.
+) -> Iterator[FolderProblem]:
+    """Yields the problems of `meta/tasks.parquet`, whose sentences LeRobot looks up by row.
 
     Args:
-        numbers: every `task_index` that a frame has.
+        numbers: every `task_index` of the frames.
     """
     try:
         tasks = read_tasks(root)
     except CopolicyError as error:
-        yield Problem(None, _below(root, error))
+        yield FolderProblem(None, _relative_message(root, error))
         return
     name = TASKS_FILE
     if list(tasks) != list(range(len(tasks))) or not all(text.strip() for text in tasks.values()):
-        yield Problem(None, f"{name} does not number its sentences 0, 1, ...: {list(tasks)[:5]}")
+        yield FolderProblem(None, f"{name} does not number its sentences 0, 1, ...: {list(tasks)[:5]}")
     if not tasks_are_indexed(root / TASKS_FILE):
-        yield Problem(None, f"{name} does not mark its sentences as the index, where LeRobot looks for them")
+        yield FolderProblem(None, f"{name} does not have its sentences as the pandas index, where LeRobot reads them")
     if info.get("total_tasks") != len(tasks):
-        yield Problem(None, f"meta/info.json has total_tasks {info.get('total_tasks')}, {name} {len(tasks)} rows")
+        yield FolderProblem(None, f"meta/info.json has total_tasks {info.get('total_tasks')}, {name} {len(tasks)} rows")
     unknown = sorted(set(numbers) - set(tasks))
     if unknown:
-        yield Problem(None, f"frames name task {unknown[0]}, which {name} does not have")
+        yield FolderProblem(None, f"frames name task {unknown[0]}, which {name} does not have")
     for row in rows:
-        named = row.get("tasks")
-        if not isinstance(named, list) or not named or not {str(text) for text in named} <= set(tasks.values()):
-            yield Problem(row["episode_index"], f"meta/episodes names no task of the data set: {str(named)[:80]}")
+        texts = row.get("tasks")
+        if not isinstance(texts, list) or not texts or not {str(text) for text in texts} <= set(tasks.values()):
+            message = f"meta/episodes names no task of the data set: {str(texts)[:80]}"
+            yield FolderProblem(row["episode_index"], message)
 
 
-def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True) -> Iterator[Problem]:
-    """What is wrong with the form of `meta/stats.json`.
+def statistics_problems(root: Path, info: Mapping[str, Any], finite: bool = True) -> Iterator[FolderProblem]:
+    """Yields the problems of `meta/stats.json`.
 
     Args:
-        finite: NaN, infinite and empty numbers are wrong, too.
+        finite: treat NaN and infinite numbers as problems.
     """
     name = STATS_FILE
     try:
-        stored = read_statistics(root)
+        stored = read_frame_statistics(root)
     except CopolicyError as error:
-        yield Problem(None, _below(root, error))
+        yield FolderProblem(None, _relative_message(root, error))
         return
     for key, feature in info["features"].items():
         if feature["dtype"] == "string":
             continue
         if key not in stored:
-            yield Problem(None, f"{name} says nothing of {key}")
+            yield FolderProblem(None, f"{name} has no statistics of {key}")
             continue
-        # Pictures have one figure a channel.
+        # Images have one value per channel.
         width = None if feature["dtype"] in ("video", "image") else math.prod(feature["shape"])
-        for kind in dict.fromkeys((*STATISTICS, "count", *stored[key])):
-            if numbers(stored[key].get(kind), 1 if kind == "count" else width, finite) is None:
-                yield Problem(None, f"{name} has no usable {kind} of {key}")
+        for statistic in dict.fromkeys((*STATISTICS, "count", *stored[key])):
+            if number_array(stored[key].get(statistic), 1 if statistic == "count" else width, finite) is None:
+                yield FolderProblem(None, f"{name} has no usable {statistic} of {key}")
                 break
 
 
-def episode_statistics_problems(root: Path) -> Iterator[Problem]:
-    """Columns `stats/...` of meta/episodes that hold something else than lists of numbers, which joining reads."""
+def episode_statistics_problems(root: Path) -> Iterator[FolderProblem]:
+    """Yields the columns `stats/...` of meta/episodes that are not lists of numbers, which merging requires."""
     for path in episode_files(root):
-        names = [name for name, kind in column_types(path).items() if name.startswith("stats/") and _flat(kind)]
+        types = column_types(path)
+        names = [name for name in types if name.startswith("stats/") and _is_flat(types[name])]
         table = read_parquet(path, names)
         for name in names:
-            kind = table.column(name).type
-            if not is_list(kind):
-                yield Problem(None, f"{name} of meta/episodes: expected a list of numbers in every row, found {kind}")
+            if not is_list(types[name]):
+                message = f"{name} of meta/episodes: expected a list of numbers in every row, found {types[name]}"
+                yield FolderProblem(None, message)
                 continue
             try:
                 vectors(table.column(name))
             except ColumnError as error:
-                yield Problem(None, f"{name} of meta/episodes: expected {error.expected}, found {error.found}")
+                yield FolderProblem(None, f"{name} of meta/episodes: expected {error.expected}, found {error.found}")
 
 
-def read_statistics(root: Path) -> dict[str, dict[str, Any]]:
-    """`meta/stats.json`.
+def read_frame_statistics(root: Path) -> dict[str, dict[str, Any]]:
+    """Reads `meta/stats.json`.
 
     Raises:
-        FileFormatError: no such file, or something else.
+        FileFormatError: no such file, or another structure.
     """
     return read_json(root / STATS_FILE, dict[str, dict[str, Any]], "statistics of the frames")
 
 
-def numbers(value: Any, width: int | None, finite: bool = True) -> np.ndarray | None:
-    """Numbers, finite ones by default, `width` of them where that is given; None for anything else."""
+def number_array(value: Any, width: int | None, finite: bool = True) -> Array | None:
+    """Converts a JSON value to a flat array of numbers; None if they are not finite or not `width` many."""
     if isinstance(value, str | bool) or value is None:
         return None
     try:
@@ -240,18 +243,18 @@ def numbers(value: Any, width: int | None, finite: bool = True) -> np.ndarray | 
     return array
 
 
-def _flat(kind: pa.DataType) -> bool:
-    """Not the statistics of pictures, which are nested."""
-    return not (pa.types.is_list(kind) and pa.types.is_nested(kind.value_type))
+def _is_flat(column_type: pa.DataType) -> bool:
+    """Whether a column is not nested; statistics of images are nested lists."""
+    return not (pa.types.is_list(column_type) and pa.types.is_nested(column_type.value_type))
 
 
-def _whole_numbers(table: pa.Table, name: str, path: Path) -> np.ndarray:
+def _whole_numbers(table: pa.Table, name: str, path: Path) -> Array:
     try:
         return scalars(table.column(name), "int")
     except ColumnError as error:
         raise FileFormatError(path, f"{error.expected} of {name}", error.found) from None
 
 
-def _below(root: Path, error: CopolicyError) -> str:
-    """An error's line with paths below the data set's folder."""
+def _relative_message(root: Path, error: CopolicyError) -> str:
+    """An error's message with paths relative to the data set's folder."""
     return str(error).replace(f"{root}/", "").removeprefix(f"{root}: ")

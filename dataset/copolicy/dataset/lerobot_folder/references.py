@@ -1,4 +1,4 @@
-"""What a LeRobot data set refers to: tasks by number, files by number and template, pictures by time."""
+"""Resolves references in a LeRobot data set: tasks by number, files by index and template, video frames by time."""
 
 import json
 import math
@@ -14,20 +14,20 @@ from .tables import column_types, episode_values, pq, read_parquet
 DATA_TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_TEMPLATE = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 _TASK_NAMES = ("task", "__index_level_0__")
-"""pandas calls an index without a name so, and LeRobot before 0.4 left it without one."""
+"""The second is pandas' name of an unnamed index, which LeRobot before 0.4 wrote."""
 
 
-Place = tuple[int, int]
-"""Numbers of a chunk and of a file in it."""
-_NAME = r"chunk-(\d+)/file-(\d+)\."
-_FILES_IN_A_CHUNK = 1000  # LeRobot's, where meta/info.json does not say
+FileIndex = tuple[int, int]
+"""Index of a chunk and of a file in it."""
+_CHUNK_FILE = r"chunk-(\d+)/file-(\d+)\."
+_FILES_PER_CHUNK = 1000  # LeRobot's default if meta/info.json has no chunks_size
 
 
 def read_tasks(root: Path) -> dict[int, str]:
-    """The sentence of each task by its number.
+    """Reads the sentence of each task by task number.
 
     Raises:
-        FileFormatError: no or a broken `meta/tasks.parquet`.
+        FileFormatError: `meta/tasks.parquet` is missing or damaged.
     """
     path = root / TASKS_FILE
     if not path.is_file():
@@ -41,7 +41,7 @@ def read_tasks(root: Path) -> dict[int, str]:
 
 
 def tasks_are_indexed(path: Path) -> bool:
-    """Whether pandas takes the sentences for the index of the table, where LeRobot looks for them."""
+    """Whether the sentences are the pandas index of the table, where LeRobot reads them."""
     stored = (pq.read_schema(path).metadata or {}).get(b"pandas")
     try:
         columns = json.loads(stored or b"{}").get("index_columns", [])
@@ -51,22 +51,22 @@ def tasks_are_indexed(path: Path) -> bool:
 
 
 def data_path(info: Mapping[str, Any], row: Mapping[str, Any]) -> str:
-    """Path of the file with an episode's frames, below the data set's folder.
+    """Path of the file with an episode's frames, relative to the data set's folder.
 
     Args:
-        row: of meta/episodes.
+        row: row of meta/episodes.
 
     Raises:
-        ValueError: no usable template, or no numbers for it; the message says what.
+        ValueError: the template is not usable, or the row lacks an index.
     """
-    return _filled("data_path", info.get("data_path", DATA_TEMPLATE), row, "data/", {})
+    return _fill_template("data_path", info.get("data_path", DATA_TEMPLATE), row, "data/", {})
 
 
 def data_file(root: Path, info: Mapping[str, Any], row: Mapping[str, Any]) -> Path:
     """The file with an episode's frames.
 
     Raises:
-        FileFormatError: the row or the template does not say.
+        FileFormatError: the template is not usable, or the row lacks an index.
     """
     try:
         return root / data_path(info, row)
@@ -75,16 +75,16 @@ def data_file(root: Path, info: Mapping[str, Any], row: Mapping[str, Any]) -> Pa
 
 
 def video_path(info: Mapping[str, Any], row: Mapping[str, Any], key: str) -> str:
-    """The same for the file with an episode's pictures of a video feature."""
+    """Path of the video file with an episode's frames of a video feature, see `data_path`."""
     template = info.get("video_path", VIDEO_TEMPLATE)
-    return _filled("video_path", template, row, f"videos/{key}/", {"video_key": key})
+    return _fill_template("video_path", template, row, f"videos/{key}/", {"video_key": key})
 
 
 def video_span(root: Path, info: Mapping[str, Any], row: Mapping[str, Any], key: str) -> tuple[Path, float, float]:
-    """File, first and last moment (s) of an episode's pictures.
+    """Video file, start and end (s) of an episode.
 
     Raises:
-        FileFormatError: the row does not say, or there is no such file.
+        FileFormatError: the row lacks an entry, or the file does not exist.
     """
     episodes = root / EPISODES_FOLDER
     try:
@@ -93,7 +93,7 @@ def video_span(root: Path, info: Mapping[str, Any], row: Mapping[str, Any], key:
         raise FileFormatError(
             episodes, f"where the video {key} of episode {row['episode_index']} is", str(error)
         ) from None
-    start, end = (_time(row.get(f"videos/{key}/{part}_timestamp")) for part in ("from", "to"))
+    start, end = (_finite(row.get(f"videos/{key}/{part}_timestamp")) for part in ("from", "to"))
     if not 0 <= start < end:
         expected = f"a span of time in the video {key} for episode {row['episode_index']}"
         raise FileFormatError(episodes, expected, f"{start} to {end}")
@@ -107,12 +107,12 @@ def video_features(info: Mapping[str, Any]) -> Iterator[str]:
     return (name for name, feature in info["features"].items() if feature["dtype"] == "video")
 
 
-def _time(value: object) -> float:
-    """A finite number, or NaN."""
+def _finite(value: object) -> float:
+    """Converts to a finite number, else NaN."""
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else math.nan
 
 
-def _filled(name: str, template: Any, row: Mapping[str, Any], columns: str, keys: dict[str, str]) -> str:
+def _fill_template(name: str, template: Any, row: Mapping[str, Any], columns: str, keys: dict[str, str]) -> str:
     if not isinstance(template, str):
         raise ValueError(f"{name} {template!r} in meta/info.json")
     numbers: dict[str, int] = {}
@@ -130,22 +130,23 @@ def _filled(name: str, template: Any, row: Mapping[str, Any], columns: str, keys
     return filled
 
 
-def numbered(folder: Path, place: Place, suffix: str = "parquet") -> Path:
-    """The path of a numbered file."""
-    return folder / f"chunk-{place[0]:03d}" / f"file-{place[1]:03d}.{suffix}"
+def chunk_file(folder: Path, index: FileIndex, suffix: str = "parquet") -> Path:
+    """Path of a file by its chunk and file index."""
+    return folder / f"chunk-{index[0]:03d}" / f"file-{index[1]:03d}.{suffix}"
 
 
-def numbered_files(folder: Path, suffix: str = "parquet") -> dict[Place, Path]:
-    """The numbered files of a folder, in the order of their numbers; files of other names are passed over."""
-    found = ((re.fullmatch(_NAME + suffix, path.relative_to(folder).as_posix()), path) for path in folder.glob("*/*"))
-    return dict(sorted(((int(match[1]), int(match[2])), path) for match, path in found if match))
+def chunk_files(folder: Path, suffix: str = "parquet") -> dict[FileIndex, Path]:
+    """The files `chunk-NNN/file-NNN` of a folder in the order of their indices; other files are ignored."""
+    pattern = re.compile(_CHUNK_FILE + suffix)
+    matches = ((pattern.fullmatch(path.relative_to(folder).as_posix()), path) for path in folder.glob("*/*"))
+    return dict(sorted(((int(match[1]), int(match[2])), path) for match, path in matches if match))
 
 
-def next_place(place: Place | None, info: dict[str, Any]) -> Place:
-    """The numbers after some numbers; the first ones for None."""
-    if place is None:
+def next_index(index: FileIndex | None, info: dict[str, Any]) -> FileIndex:
+    """The index after `index`; the first one for None."""
+    if index is None:
         return 0, 0
-    chunk, file = place
+    chunk, file = index
     size = info.get("chunks_size")
-    full = file + 1 >= (size if isinstance(size, int) and size > 0 else _FILES_IN_A_CHUNK)
+    full = file + 1 >= (size if isinstance(size, int) and size > 0 else _FILES_PER_CHUNK)
     return (chunk + 1, 0) if full else (chunk, file + 1)

@@ -1,4 +1,4 @@
-"""The Parquet tables of a LeRobot data set: columns as arrays, with their types checked."""
+"""Reads Parquet tables of a LeRobot data set and checks the types of their columns."""
 
 import math
 from collections.abc import Sequence
@@ -6,30 +6,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
-from ..exceptions import FileFormatError, MissingExtraError
-
-try:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-except ModuleNotFoundError:
-    raise MissingExtraError("pyarrow") from None
+from ..arrays import Array
+from ..exceptions import FileFormatError
 
 DAMAGED = (pa.ArrowException, OSError, ValueError)
-"""What pyarrow raises where a file is no complete Parquet file."""
+"""Exceptions that pyarrow raises for an incomplete Parquet file."""
 _LISTS = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
-_NAMES = {"str": "texts", "int": "whole numbers", "float": "numbers", "bool": "true or false"}
+_TYPE_NAMES = {"str": "texts", "int": "whole numbers", "float": "numbers", "bool": "true or false"}
 _DTYPES: dict[str, Any] = {"int": np.int64, "float": np.float64, "bool": bool}
 
 
 class ColumnError(ValueError):
-    """A column that does not hold what it should.
+    """A column with other values than expected.
 
     Attributes:
-        expected: what it should hold.
-        found: what it holds.
-        rows: the rows concerned, where it is not the whole column.
+        expected: description of the expected values.
+        found: description of the values found.
+        rows: rows of the wrong values, empty if the whole column is wrong.
     """
 
     def __init__(self, expected: str, found: str, rows: Sequence[int] = ()):
@@ -38,33 +35,33 @@ class ColumnError(ValueError):
 
 
 def read_parquet(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    """The table in one file.
+    """Reads one Parquet file.
 
     Args:
-        columns: only these, all of which must be there.
+        columns: columns to read, all of which must exist; None reads all.
 
     Raises:
-        FileFormatError: no complete Parquet file, or one without these columns.
+        FileFormatError: an incomplete Parquet file, or a missing column.
     """
     try:
-        # One file, not a data set of pyarrow's, which would take chunk-000 for a partition.
+        # Not as a pyarrow data set, which would read the folder chunk-000 as a partition key.
         with pq.ParquetFile(path) as file:
-            there = file.schema_arrow.names
-            missing = [name for name in columns or () if name not in there]
+            present = file.schema_arrow.names
+            missing = [name for name in columns or () if name not in present]
             if missing:
                 raise FileFormatError(path, "the columns of copolicy", f"none named {', '.join(missing)}")
-            if len(set(there)) < len(there):
-                raise FileFormatError(path, "each column once", f"{_repeated(there)} twice")
+            if len(set(present)) < len(present):
+                raise FileFormatError(path, "each column once", f"{_first_repeated(present)} twice")
             return file.read(columns=None if columns is None else list(columns))
     except DAMAGED as error:
         raise damaged(path, error) from None
 
 
 def column_types(path: Path) -> dict[str, pa.DataType]:
-    """Name and type of the columns of a file.
+    """Type of each column of a file by name.
 
     Raises:
-        FileFormatError: no complete Parquet file.
+        FileFormatError: an incomplete Parquet file.
     """
     try:
         with pq.ParquetFile(path) as file:
@@ -74,10 +71,10 @@ def column_types(path: Path) -> dict[str, pa.DataType]:
 
 
 def row_count(path: Path) -> int:
-    """Rows of a file.
+    """Number of rows of a file.
 
     Raises:
-        FileFormatError: no complete Parquet file.
+        FileFormatError: an incomplete Parquet file.
     """
     try:
         with pq.ParquetFile(path) as file:
@@ -87,58 +84,58 @@ def row_count(path: Path) -> int:
 
 
 def damaged(path: Path, error: Exception) -> FileFormatError:
-    """The error for a file that pyarrow refuses."""
+    """The error for a file that pyarrow cannot read."""
     found = getattr(error, "strerror", None) or (str(error).splitlines() or [type(error).__name__])[0]
     return FileFormatError(path, "a complete Parquet file", found)
 
 
-def is_list(kind: pa.DataType) -> bool:
-    """Whether a column holds lists, of one length or of several."""
-    return any(test(kind) for test in _LISTS)
+def is_list(column_type: pa.DataType) -> bool:
+    """Whether a column type is a list, of fixed or variable length."""
+    return any(test(column_type) for test in _LISTS)
 
 
-def scalars(column: pa.ChunkedArray, kind: str, unknown: Any = None) -> np.ndarray:
-    """`(N,)` a column of single values.
+def scalars(column: pa.ChunkedArray, type_name: str, unknown: Any = None) -> Array:
+    """Converts a column of single values to an array `(N,)`.
 
     Args:
-        kind: `str`, `int`, `float` or `bool`, as `EPISODE_COLUMNS` has it; whole numbers may be stored as floats.
-        unknown: stands for an empty entry; None where there may be none.
+        type_name: `str`, `int`, `float` or `bool`, as in `EPISODE_COLUMNS`; whole numbers may be stored as floats.
+        unknown: replaces nulls; None if nulls are an error.
 
     Raises:
-        ColumnError: values of another type, or an empty entry.
+        ColumnError: values of another type, or a null.
     """
     values = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if pa.types.is_dictionary(values.type):
         values = values.dictionary_decode()
-    expected = f"{_NAMES[kind]} in every row" if unknown is None else _NAMES[kind]
-    if not (_fits(values.type, kind) or (pa.types.is_null(values.type) and unknown is not None)):
+    expected = f"{_TYPE_NAMES[type_name]} in every row" if unknown is None else _TYPE_NAMES[type_name]
+    if not (_has_type(values.type, type_name) or (pa.types.is_null(values.type) and unknown is not None)):
         raise ColumnError(expected, str(values.type))
     empty = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
     if len(empty) and unknown is None:
         raise ColumnError(expected, "nothing", empty.tolist())
-    if kind == "str":
+    if type_name == "str":
         return np.array([unknown if value is None else value for value in values.to_pylist()], str)
     if pa.types.is_null(values.type):
-        return np.full(len(values), unknown, _DTYPES[kind])
+        return np.full(len(values), unknown, _DTYPES[type_name])
     numbers = pc.fill_null(values, pa.scalar(unknown, values.type)) if len(empty) else values
     array = numbers.to_numpy(zero_copy_only=False)
-    if kind == "int" and array.dtype.kind == "f":
-        broken = np.flatnonzero(~(np.isfinite(array) & (array == np.rint(array)) & (np.abs(array) < 2**62)))
-        if len(broken):
-            raise ColumnError(expected, "others", broken.tolist())
-    if kind == "int" and array.dtype == np.uint64 and array.size and array.max() >= 2**63:
+    if type_name == "int" and array.dtype.kind == "f":
+        invalid = np.flatnonzero(~(np.isfinite(array) & (array == np.rint(array)) & (np.abs(array) < 2**62)))
+        if len(invalid):
+            raise ColumnError(expected, "others", invalid.tolist())
+    if type_name == "int" and array.dtype == np.uint64 and array.size and array.max() >= 2**63:
         raise ColumnError(expected, f"{array.max()}")
-    return array.astype(_DTYPES[kind])
+    return array.astype(_DTYPES[type_name])
 
 
-def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
-    """`(N,)` or `(N, n)` a column of numbers, or of lists of as many numbers in every row.
+def vectors(column: pa.ChunkedArray, width: int | None = None) -> Array:
+    """Converts a column of numbers to an array `(N,)`, or of equally long lists of numbers to `(N, n)`.
 
     Args:
-        width: numbers a row; a list of one may also be a single number. None for whatever there is.
+        width: numbers per row; for 1 the column may have lists or single numbers. None allows any width.
 
     Raises:
-        ColumnError: values that are no numbers, rows of another or several widths, or an empty entry.
+        ColumnError: other values than numbers, rows of another or varying width, or a null.
     """
     values = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     rows = len(values)
@@ -159,9 +156,9 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
         values = values.flatten()
         if is_list(values.type):
             raise ColumnError(expected, "lists of lists")
-        holes = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
-        if len(holes):
-            raise ColumnError(expected, "nothing", sorted({int(hole) // found_width for hole in holes}))
+        nulls = np.flatnonzero(values.is_null().to_numpy(zero_copy_only=False))
+        if len(nulls):
+            raise ColumnError(expected, "nothing", sorted({int(position) // found_width for position in nulls}))
     elif width is not None and width > 1:
         raise ColumnError(expected, str(values.type))
     if not (pa.types.is_integer(values.type) or pa.types.is_floating(values.type) or pa.types.is_boolean(values.type)):
@@ -170,15 +167,15 @@ def vectors(column: pa.ChunkedArray, width: int | None = None) -> np.ndarray:
     return array.reshape(rows, found_width) if listed else array
 
 
-def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path) -> np.ndarray:
-    """`(N, n)` numbers of a feature, `(N,)` where it has one number a frame.
+def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path) -> Array:
+    """Numbers of a feature, `(N, n)`, or `(N,)` for one number per frame.
 
     Args:
-        shape: of the feature, as `meta/info.json` has it.
-        path: of the file, for the error.
+        shape: shape of the feature in `meta/info.json`.
+        path: file of the table, for error messages.
 
     Raises:
-        FileFormatError: the column is missing or holds something else.
+        FileFormatError: the column is missing or has other values.
     """
     if name not in table.column_names:
         raise FileFormatError(path, f"a column {name}", "none")
@@ -186,73 +183,73 @@ def feature_values(table: pa.Table, name: str, shape: Sequence[int], path: Path)
     try:
         values = vectors(table.column(name), width)
     except ColumnError as error:
-        raise FileFormatError(path, f"{error.expected} of {name}", _with_rows(error)) from None
+        raise FileFormatError(path, f"{error.expected} of {name}", _found_with_rows(error)) from None
     return values.reshape(-1) if width == 1 else values
 
 
-def misfit(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> str:
-    """What a column of frames holds where a feature of one axis needs numbers; empty where it fits.
+def type_mismatch(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> str:
+    """Describes values of a column that do not fit a numeric feature of one axis; empty if they fit.
 
-    Empty values fit: whether they are read depends on the episodes in use.
+    Nulls fit, because whether they are read depends on the episodes in use.
 
     Args:
-        dtype: of the feature, such as `float32`.
-        shape: of the feature, such as `(4,)`; numbers of a feature of one may stand alone.
+        dtype: type of the feature, such as `float32`.
+        shape: shape of the feature, such as `(4,)`; for `(1,)` the column may have single numbers.
     """
     values, width = column.combine_chunks(), math.prod(shape)
-    listed = is_list(values.type)
-    kind = values.type.value_type if listed else values.type
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
+    is_listed = is_list(values.type)
+    value_type = values.type.value_type if is_listed else values.type
+    if not (pa.types.is_integer(value_type) or pa.types.is_floating(value_type) or pa.types.is_boolean(value_type)):
         return str(values.type)
-    if listed:
+    if is_listed:
         lengths = _lengths(values)
-        wrong = lengths[values.is_valid().to_numpy(zero_copy_only=False) & (lengths != width)]
-        if len(wrong):
-            return f"{int(wrong[0])} numbers in a row"
+        wrong_lengths = lengths[values.is_valid().to_numpy(zero_copy_only=False) & (lengths != width)]
+        if len(wrong_lengths):
+            return f"{int(wrong_lengths[0])} numbers in a row"
         values = values.flatten()
     elif width > 1:
         return str(values.type)
-    if "int" in dtype and pa.types.is_floating(kind):
+    if "int" in dtype and pa.types.is_floating(value_type):
         numbers = values.drop_null().to_numpy(zero_copy_only=False)
         if not np.array_equal(numbers, np.rint(numbers)):
             return "fractions"
     return ""
 
 
-def episode_values(table: pa.Table, name: str, kind: str, path: Path, unknown: Any = None) -> np.ndarray:
-    """`(E,)` an episode column, see `scalars`.
+def episode_values(table: pa.Table, name: str, type_name: str, path: Path, unknown: Any = None) -> Array:
+    """Converts an episode column to an array `(E,)`, see `scalars`.
 
     Raises:
-        FileFormatError: the column is missing or holds something else; the line names the episodes.
+        FileFormatError: the column is missing or has other values; the message names the rows.
     """
     if name not in table.column_names:
         raise FileFormatError(path, f"a column {name}", "none")
     try:
-        return scalars(table.column(name), kind, unknown)
+        return scalars(table.column(name), type_name, unknown)
     except ColumnError as error:
-        raise FileFormatError(path, f"{error.expected} of {name}", _with_rows(error)) from None
+        raise FileFormatError(path, f"{error.expected} of {name}", _found_with_rows(error)) from None
 
 
-def _repeated(names: Sequence[str]) -> str:
+def _first_repeated(names: Sequence[str]) -> str:
     return next(name for name in names if names.count(name) > 1)
 
 
-def _with_rows(error: ColumnError) -> str:
+def _found_with_rows(error: ColumnError) -> str:
     if not error.rows:
         return error.found
-    named = ", ".join(map(str, error.rows[:3])) + (", ..." if len(error.rows) > 3 else "")
-    return f"{error.found} in row {named}" if len(error.rows) == 1 else f"{error.found} in rows {named}"
+    rows = ", ".join(map(str, error.rows[:3])) + (", ..." if len(error.rows) > 3 else "")
+    return f"{error.found} in row {rows}" if len(error.rows) == 1 else f"{error.found} in rows {rows}"
 
 
-def _fits(kind: pa.DataType, wanted: str) -> bool:
-    if wanted == "str":
-        return pa.types.is_string(kind) or pa.types.is_large_string(kind)
-    if wanted == "bool":
-        return pa.types.is_boolean(kind)
-    return pa.types.is_integer(kind) or pa.types.is_floating(kind)
+def _has_type(column_type: pa.DataType, type_name: str) -> bool:
+    if type_name == "str":
+        return pa.types.is_string(column_type) or pa.types.is_large_string(column_type)
+    if type_name == "bool":
+        return pa.types.is_boolean(column_type)
+    return pa.types.is_integer(column_type) or pa.types.is_floating(column_type)
 
 
-def _lengths(values: Any) -> np.ndarray:
+def _lengths(values: Any) -> Array:
     if pa.types.is_fixed_size_list(values.type):
         return np.full(len(values), values.type.list_size)
     return values.value_lengths().to_numpy(zero_copy_only=False)

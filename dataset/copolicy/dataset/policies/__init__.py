@@ -1,1 +1,1 @@
-"""The files of a trained policy, read without torch."""
+"""Reads the files of a trained policy without torch."""

@@ -1,4 +1,4 @@
-"""Types of the JSON documents beside a policy: results of `copolicy-eval`, recipe, configuration, training settings."""
+"""Types of a policy's JSON documents: results of `copolicy-eval`, recipe, configuration, training settings."""
 
 from typing import Any, NotRequired, TypedDict
 
@@ -9,7 +9,7 @@ Distribution = dict[str, Number]
 
 
 class SuccessDocument(TypedDict):
-    """How many episodes succeeded."""
+    """Success rate over episodes."""
 
     mean: float | int
     standard_error: Number
@@ -22,13 +22,13 @@ class _Mean(TypedDict):
 
 
 class PartnerSummaryDocument(TypedDict):
-    """The episodes with one kind of partner."""
+    """Summary of the episodes with one kind of partner."""
 
     success: _Mean
 
 
 class SummaryDocument(TypedDict):
-    """All episodes of a study."""
+    """Summary of all episodes of a study."""
 
     success: SuccessDocument
     planning_ms_per_call: NotRequired[Distribution | None]
@@ -39,7 +39,7 @@ class SummaryDocument(TypedDict):
 
 
 class EvaluatedPolicyDocument(TypedDict):
-    """What was evaluated; a scripted robot has no weights."""
+    """The evaluated policy or scripted agent; only a policy has weights."""
 
     weights_sha256: NotRequired[str | None]
     parameters: NotRequired[Number]
@@ -60,7 +60,7 @@ class EvaluationSettingsDocument(TypedDict):
 
 
 class BaselineDocument(TypedDict):
-    """Another robot in the same study."""
+    """A baseline agent in the same study."""
 
     name: str
     policy: NotRequired[EvaluatedPolicyDocument]
@@ -81,7 +81,7 @@ class EvaluationDocument(TypedDict):
 
 
 class ComparedDocument(TypedDict):
-    """What a comparison reads of such a result."""
+    """The keys of an evaluation that a comparison reads."""
 
     study: str
     label: str
@@ -90,7 +90,7 @@ class ComparedDocument(TypedDict):
     episodes: list[dict[str, Any]]
 
 
-class KeptEvaluationsDocument(TypedDict):
+class ExportedEvaluationsDocument(TypedDict):
     """`eval.json` of an exported policy."""
 
     evaluations: NotRequired[list[EvaluationDocument] | None]
@@ -135,7 +135,7 @@ class _TrainingData(TypedDict, total=False):
 
 
 class TrainingDocument(TypedDict):
-    """What is read of `train_config.json`."""
+    """The keys of `train_config.json` that are read."""
 
     dataset: NotRequired[_TrainingData | None]
     batch_size: NotRequired[int | None]
@@ -143,15 +143,15 @@ class TrainingDocument(TypedDict):
     optimizer: NotRequired[dict[str, Any] | None]
 
 
-class ReachedStep(TypedDict):
-    """LeRobot's `training_step.json` beside a checkpoint."""
+class TrainingStepDocument(TypedDict):
+    """LeRobot's `training_step.json` of a checkpoint."""
 
     step: NotRequired[int]
     num_processes: NotRequired[int]
 
 
 class PolicyConfigDocument(TypedDict):
-    """What cards read of `config.json`."""
+    """The keys of `config.json` that cards read."""
 
     type: str
     license: NotRequired[str | None]

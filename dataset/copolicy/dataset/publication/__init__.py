@@ -1,1 +1,1 @@
-"""Names, licences and the smallest card of a data set that goes to the Hub."""
+"""Repository names, licences, versions and the minimal card of a data set on the Hub."""

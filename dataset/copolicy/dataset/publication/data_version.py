@@ -1,4 +1,4 @@
-"""Numbers of data versions, and the Git tags that stand for them."""
+"""Version numbers of data sets and their Git tags."""
 
 import re
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from ..exceptions import InvalidValueError
 Bump = Literal["major", "minor", "patch"]
 
 BUMPS: tuple[Bump, ...] = ("patch", "minor", "major")
-"""From small to large."""
+"""In increasing order."""
 
 TAG_PREFIX = "data-"
-"""LeRobot rewrites a plain number such as `1.2` to `v1.2` when it asks the Hub for it; this it leaves alone."""
+"""LeRobot rewrites a revision such as `1.2` to `v1.2`; it does not change a tag with this prefix."""
 
 
 @dataclass(frozen=True, order=True)
@@ -52,13 +52,13 @@ class DataVersion:
         }[bump]
 
 
-def newest(tags: list[str]) -> DataVersion | None:
-    """The highest data version among some tags; others are passed over."""
+def newest_version(tags: list[str]) -> DataVersion | None:
+    """The highest data version among tags; ignores other tags, None if there is no data version."""
     versions = []
     for tag in tags:
         if tag.startswith(TAG_PREFIX):
             try:
                 versions.append(DataVersion.parse(tag))
             except InvalidValueError:
-                continue  # somebody's own tag, such as data-draft
+                continue  # another tag with this prefix, such as data-draft
     return max(versions, default=None)

@@ -1,6 +1,6 @@
-"""Licences by the identifiers that the Hub's cards take.
+"""Licence identifiers of the Hub's cards.
 
-The list is that of https://huggingface.co/docs/hub/repositories-licenses; the Hub refuses a card with another one.
+The list is https://huggingface.co/docs/hub/repositories-licenses; the Hub rejects a card with any other identifier.
 """
 
 import difflib
@@ -93,15 +93,15 @@ LICENCES: dict[str, str] = {
     "unknown": "Unknown",
     "other": "Other",
 }
-"""Identifier and full name."""
+"""Full name by identifier."""
 
-_OTHER_NAMES = {  # that the rules of `_spelling` do not reach
+_ALIASES = {  # spellings that `_normalised` does not map to an identifier
     "cc0": "cc0-1.0", "cczero": "cc0-1.0", "apache2": "apache-2.0", "gplv3": "gpl-3.0", "gplv2": "gpl-2.0",
     "bsd3": "bsd-3-clause", "bsd2": "bsd-2-clause", "odbl1": "odbl", "odcby1": "odc-by", "pddl1": "pddl",
     "cuda1": "c-uda", "expat": "mit", "gnugpl3": "gpl-3.0", "gnugpl2": "gpl-2.0", "gnulgpl3": "lgpl-3.0",
     "gnuagpl3": "agpl-3.0",
 }  # fmt: skip
-_ABBREVIATED = (
+_ABBREVIATIONS = (
     ("creative commons", "cc"), ("attribution", "by"), ("non commercial", "nc"), ("noncommercial", "nc"),
     ("share alike", "sa"), ("sharealike", "sa"), ("no derivatives", "nd"), ("noderivatives", "nd"),
     ("noderivs", "nd"), ("international", ""), ("unported", ""), ("universal", ""), ("generic", ""),
@@ -111,13 +111,13 @@ _ABBREVIATED = (
 
 
 def checked_licence(text: str, name: str = "--license") -> str:
-    """The identifier as it was given; an empty text, which states no licence, too.
+    """Returns a licence identifier unchanged, or an empty text, which states no licence.
 
     Args:
-        name: of the flag or column, for the message.
+        name: flag or column, for the error message.
 
     Raises:
-        InvalidValueError: no identifier of the Hub; the message names the right one where the text tells it.
+        InvalidValueError: not an identifier of the Hub; the message suggests one.
     """
     if not text or text in LICENCES:
         return text
@@ -135,27 +135,27 @@ def checked_licence(text: str, name: str = "--license") -> str:
 
 
 def licence_identifier(text: str) -> str | None:
-    """The Hub's identifier for a licence in whatever common spelling, None where none is meant for certain."""
+    """The Hub's identifier for a licence in a common spelling; None if the text is not unambiguous."""
     if text in LICENCES:
         return text
-    return _SPELLINGS.get(_spelling(text))
+    return _IDENTIFIERS.get(_normalised(text))
 
 
-def _spelling(text: str) -> str:
-    """Letters and figures alone, of words that say something: `CC BY 4.0` and `cc-by-4.0` are the same."""
+def _normalised(text: str) -> str:
+    """Reduces a licence name to letters and digits of its significant words: `CC BY 4.0` equals `cc-by-4.0`."""
     text = re.sub(r"https?://(?:www\.)?creativecommons\.org/licenses/([a-z-]+)/([\d.]+).*", r"cc-\1-\2", text.lower())
     text = re.sub(r"https?://(?:www\.)?creativecommons\.org/publicdomain/zero/1\.0.*", "cc0-1.0", text)
     text = re.sub(r"[^a-z0-9.+]+", " ", text)
-    for words, short in _ABBREVIATED:
-        text = text.replace(words, f"{short} " if short else " ")
+    for phrase, abbreviation in _ABBREVIATIONS:
+        text = text.replace(phrase, f"{abbreviation} " if abbreviation else " ")
     text = re.sub(r"(?<=[ a-z])v(?:er)?\.? ?(?=\d)", "", text)
-    # 4, 4.0 and 4.0.0 are one version; the point between 2 and 1 tells 2.1 from 21.
+    # 4, 4.0 and 4.0.0 are one version.
     text = re.sub(r"(\d+(?:\.\d+)*?)(?:\.0)+(?![\d.])", r"\1", text)
     return re.sub(r"[ .]+", "", text)
 
 
-_SPELLINGS = {
-    **_OTHER_NAMES,
-    **{_spelling(name): identifier for identifier, name in LICENCES.items()},
-    **{_spelling(identifier): identifier for identifier in LICENCES},
+_IDENTIFIERS = {
+    **_ALIASES,
+    **{_normalised(name): identifier for identifier, name in LICENCES.items()},
+    **{_normalised(identifier): identifier for identifier in LICENCES},
 }

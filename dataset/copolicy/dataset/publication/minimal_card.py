@@ -1,6 +1,6 @@
-"""The README of a data set that has no card yet: what `datasets.load_dataset` needs to find its two tables, no more.
+"""The README of a data set without a card: the two configurations that `datasets.load_dataset` needs.
 
-It is no card: it describes nothing, `copolicy-cards dataset` replaces it unasked, and `publish` refuses it.
+`copolicy-cards dataset` overwrites this file without `--overwrite`, and `publish` refuses it as a card.
 """
 
 from collections.abc import Iterable
@@ -9,17 +9,17 @@ from pathlib import Path
 from .licences import licence_identifier
 
 CONFIGS = (("default", "data/*/*.parquet"), ("episodes", "meta/episodes/*/*.parquet"))
-"""Name and files of each table: the frames, and who, what and how of each episode."""
+"""Name and files of each configuration: the frames and the episodes."""
 
 _MARKER = "<!-- minimal card of copolicy-convert; `copolicy-cards dataset` replaces it -->"
 
 
 def write_minimal_card(path: Path, licences: Iterable[str | None], task: str) -> None:
-    """Writes the file.
+    """Writes the minimal card.
 
     Args:
-        licences: of the episodes; stated where all have the same one.
-        task: its name.
+        licences: licence of each episode; written if all are the same.
+        task: name of the task.
     """
     identifiers = {licence_identifier(text or "") for text in licences}
     (licence,) = identifiers if len(identifiers) == 1 else (None,)
@@ -36,5 +36,5 @@ def write_minimal_card(path: Path, licences: Iterable[str | None], task: str) ->
 
 
 def is_minimal_card(path: Path) -> bool:
-    """The file is there and is what `write_minimal_card` writes, which nobody has to keep."""
+    """Whether the file exists and was written by `write_minimal_card`."""
     return path.is_file() and _MARKER.encode() in path.read_bytes()

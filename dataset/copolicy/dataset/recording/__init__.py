@@ -1,1 +1,1 @@
-"""One MCAP file an episode: its topics and records, and how they are read."""
+"""Recordings: one MCAP file per episode, with its topics, metadata records and reader."""

@@ -1,4 +1,4 @@
-"""How an episode's columns are spread over the metadata records of its recording, there and back."""
+"""Encodes the episode columns as metadata records of a recording, and decodes them."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ from ..task import PairTask
 from ..task_spec import TaskSpec
 
 SCHEMA_VERSION = "1"
-"""Version of what a recording holds; a reader refuses one that it does not know."""
+"""Schema version of recordings; readers refuse unknown versions."""
 
 COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "session": ("session_id",),
@@ -25,9 +25,9 @@ COLUMNS_AT_START: dict[str, tuple[str, ...]] = {
     "physics": (),
     "dataset_info": (),
 }
-"""The metadata records at the start of a recording and the episode columns that each holds.
+"""The metadata records at the start of a recording, each with its episode columns.
 
-Those of `SET_COLUMNS` are there only where the map is of a file.
+The columns in `SET_COLUMNS` are written only for maps from a file.
 """
 
 RESULT = "episode_result"
@@ -44,14 +44,14 @@ COLUMNS_AT_END = (
 """The episode columns of the record `episode_result` at the end of a recording."""
 
 START_DIGEST = "start_sha256"
-"""The entry of the record `dataset_info` that vouches for all records at the start (`start_digest`)."""
+"""The entry of the record `dataset_info` with the digest of all records at the start (`start_digest`)."""
 
 TASK, TASK_SPEC = "task", "task_spec"
-"""The entries of the record `dataset_info` with the name of the task and its spec; the table where there is none."""
+"""The entries of the record `dataset_info` with name and spec of the task; without them it is the table task."""
 
 
 def dataset_info(spec: TaskSpec) -> dict[str, str]:
-    """What a converter needs to know about the numbers, so that it need not know the program that wrote them."""
+    """The record `dataset_info`: rate, names and units of the vectors, alignment, and the spec of the task."""
     return {
         "schema_version": SCHEMA_VERSION,
         "fps": str(spec.record_hz),
@@ -66,24 +66,23 @@ def dataset_info(spec: TaskSpec) -> dict[str, str]:
 
 
 def encode_settings(settings: Any) -> dict[str, str]:
-    """The record `physics`: every setting of the world, in exact digits."""
+    """The record `physics`: every world setting as exact decimal text."""
     return {name: repr(value) for name, value in asdict(settings).items()}
 
 
 def decode_settings(records: Mapping[str, Mapping[str, str]], task: PairTask) -> Any:
-    """The inverse of `encode_settings` over all records of a recording.
+    """World settings from the metadata records, the inverse of `encode_settings`.
 
     Raises:
-        InvalidValueError: a setting is missing or no number.
+        InvalidValueError: a setting is missing or not a number.
     """
     return task.settings_of(records.get("physics", {}), "metadata record 'physics', entry '{}'")
 
 
 def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
-    """The sha256 of the metadata records at the start, without the digest itself.
+    """sha256 of the metadata records at the start, without the digest itself.
 
-    The check sum over a recording's metadata stands at the end of its file; where a recording broke off, this entry
-    alone tells whether they are still what was written.
+    It verifies the metadata of an unfinished recording, which lacks the check sum at the end of the file.
     """
     start = {
         record: {name: text for name, text in records[record].items() if name != START_DIGEST}
@@ -94,17 +93,17 @@ def start_digest(records: Mapping[str, Mapping[str, str]]) -> str:
 
 
 def encode(meta: EpisodeMeta, columns: tuple[str, ...]) -> dict[str, str]:
-    """The texts of some columns; `true` and `false` for a bool, the shortest exact digits for a float."""
+    """Columns as text: `true` and `false` for a bool, the shortest exact digits for a float."""
     values = {name: getattr(meta, name) for name in columns}
-    said = (name for name in columns if name not in SET_COLUMNS or values[name] != UNKNOWN_VALUES[name])
-    return {name: _encode(values[name]) for name in said}
+    names = (name for name in columns if name not in SET_COLUMNS or values[name] != UNKNOWN_VALUES[name])
+    return {name: _encode(values[name]) for name in names}
 
 
 def decode(records: Mapping[str, Mapping[str, str]], spec: TaskSpec) -> EpisodeMeta:
-    """The inverse of `encode` over all records of a recording of a task.
+    """Episode metadata from the metadata records, the inverse of `encode`.
 
     Raises:
-        InvalidValueError: a record or one of its entries is missing or is not of its column's type.
+        InvalidValueError: a record or an entry is missing, or has the wrong type.
     """
     columns: dict[str, Any] = {}
     for record, names in {**COLUMNS_AT_START, RESULT: COLUMNS_AT_END}.items():
@@ -129,19 +128,19 @@ def _encode(value: object) -> str:
 
 
 def _decode(name: str, text: str, spec: TaskSpec) -> object:
-    kind = EPISODE_COLUMNS[name]
+    type_name = EPISODE_COLUMNS[name]
     try:
-        if kind == "bool":
+        if type_name == "bool":
             return {"true": True, "false": False}[text]
-        if kind == "int":
+        if type_name == "int":
             return int(text)
-        if kind == "float":
+        if type_name == "float":
             number = float(text)
             if math.isinf(number):
                 raise ValueError
             return number
     except (KeyError, ValueError):
-        raise InvalidValueError(f"metadata entry {name!r}", kind, text) from None
+        raise InvalidValueError(f"metadata entry {name!r}", type_name, text) from None
     choices = {"source": get_args(Source), "termination_reason": termination_reasons(spec)}.get(name)
     if choices and text not in choices:
         raise InvalidValueError(f"metadata entry {name!r}", f"one of {choices}", text)

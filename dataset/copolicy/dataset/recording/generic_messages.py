@@ -1,4 +1,4 @@
-"""How a task is recorded that brings no messages of its own."""
+"""Generic messages for recordings of tasks without message types of their own."""
 
 import functools
 import json
@@ -10,18 +10,18 @@ from ..task import PairTask
 from ..task_spec import Vector
 from .messages.copolicy_task_pb2 import Action, Measures, State
 from .task_messages import TaskMessages
-from .topics import Topic, of_player
+from .topics import Topic, player_metadata
 
 
 class GenericMessages(TaskMessages):
-    """How a task is recorded that brings no messages of its own: numbers, whose meaning stands in the channels."""
+    """Messages of plain numbers; the channel metadata state their names and units."""
 
     def __init__(self, task: PairTask):
         spec = task.spec
         self._task, self._hz, self._sizes = task, spec.record_hz, (len(spec.recorded), len(spec.action))
         self.state = Topic("/state", State, _meaning(spec.recorded))
         first, second = (
-            Topic(f"/player/{player}/action", Action, {**_meaning(spec.action), **of_player(player)})
+            Topic(f"/player/{player}/action", Action, {**_meaning(spec.action), **player_metadata(player)})
             for player in range(2)
         )
         self.actions = first, second
@@ -54,7 +54,7 @@ class GenericMessages(TaskMessages):
 
 @functools.cache
 def messages_of(task: PairTask) -> TaskMessages:
-    """How a task is recorded: in messages of its own, or in the generic ones."""
+    """The messages of a task: its own, or the generic ones."""
     return task.recording or GenericMessages(task)
 
 
@@ -62,7 +62,7 @@ def _meaning(vector: Vector) -> dict[str, str]:
     return {"names": json.dumps(vector.names), "units": json.dumps(vector.units)}
 
 
-def _sized(values: Sequence[float], size: int, what: str) -> Sequence[float]:
+def _sized(values: Sequence[float], size: int, label: str) -> Sequence[float]:
     if len(values) != size:
-        raise ValueError(f"a {what} of {len(values)} numbers instead of {size}")
+        raise ValueError(f"a {label} of {len(values)} numbers instead of {size}")
     return values

@@ -1,6 +1,6 @@
-"""A chunk of an MCAP file: decompressed within bounds, verified where it carries a check sum, and walked.
+"""Reads chunks of an MCAP file: bounded decompression, verification of the check sum, iteration over messages.
 
-Format: https://mcap.dev/spec. The decompressors are those that the `mcap` library itself brings.
+Format: https://mcap.dev/spec. The decompressors are those of the `mcap` library.
 """
 
 import struct
@@ -16,32 +16,32 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 
 LARGEST_CHUNK = 64 << 20
-"""Bytes of a chunk, as it is stored and decompressed, that are worth holding in memory; our recorder's have 1 MiB."""
+"""Largest chunk that is read, bytes, both stored and decompressed; the recorder writes chunks of 1 MiB."""
 
 MESSAGE_HEAD = 22
 """Bytes before the payload in the body of a message: channel, sequence, log time, publish time."""
 
 _HEAD_SIZE = 9  # opcode, length of the body
-_IN_CHUNK = struct.Struct("<BQH")  # the same, and the channel where it is a message
+_IN_CHUNK = struct.Struct("<BQH")  # opcode, length, and the channel of a message
 
 
 class UnreadChunkError(ValueError):
-    """A chunk that may be sound, but is larger or compressed otherwise than what is read here."""
+    """A chunk is too large or has an unknown compression; it need not be damaged."""
 
 
 class ChunkRecords(NamedTuple):
-    """The records in a chunk, decompressed, and whether a check sum of the chunk vouches for them."""
+    """The decompressed records of a chunk, and whether a check sum verified them."""
 
     data: bytes
     verified: bool
 
 
 def chunk_records(body: bytes) -> ChunkRecords:
-    """The records in the body of a chunk.
+    """Decompresses and verifies the body of a chunk.
 
     Raises:
-        ValueError: the chunk fails its check sum or is not what its head says.
-        UnreadChunkError: it is too large, or its compression is unknown.
+        ValueError: the chunk fails its check sum or contradicts its header.
+        UnreadChunkError: the chunk is too large, or its compression is unknown.
     """
     chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     size = chunk.uncompressed_size
@@ -56,14 +56,14 @@ def chunk_records(body: bytes) -> ChunkRecords:
     else:
         raise UnreadChunkError(f"a chunk compressed with {chunk.compression!r}")
     if len(data) != size:
-        raise ValueError("a chunk of another size than its head says")
+        raise ValueError("a chunk whose size contradicts its header")
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise ValueError("a chunk that fails its check sum")
     return ChunkRecords(data, chunk.uncompressed_crc != 0)
 
 
 def _zstd(compressed: bytes, size: int) -> bytes:
-    """At most `size + 1` bytes: what a frame says of its content, if anything, decides about no allocation."""
+    """At most `size + 1` bytes; does not trust the content size stated in the frame, to bound the memory."""
     with zstandard.ZstdDecompressor().stream_reader(compressed, read_across_frames=True) as stream:
         return _read_up_to(stream.read, size + 1)
 
@@ -84,22 +84,22 @@ def _read_up_to(read: Callable[[int], bytes], size: int) -> bytes:
 def walk_chunk(
     data: bytes, handlers: Mapping[int, Callable[[bytes], None]], declare: Callable[[int, bytes], None]
 ) -> int:
-    """Hands out the messages of a chunk without touching those of channels that nobody wants.
+    """Passes the messages of a chunk to the handlers of their channels; skips other messages without decoding.
 
     Args:
-        data: the chunk's records, decompressed.
-        handlers: for each wanted channel, what takes the payload of its messages.
-        declare: takes opcode and body of each other record, schemas and channels first of all; may add to `handlers`.
+        data: decompressed records of the chunk.
+        handlers: functions of a message's payload, by channel.
+        declare: function of opcode and body of every other record, such as schemas and channels; may extend `handlers`.
 
     Returns:
-        The number of messages.
+        Number of messages, including skipped ones.
 
     Raises:
-        ValueError: a record leaves the chunk or is shorter than its kind allows.
+        ValueError: a record extends beyond the chunk or is too short.
     """
     unpack, handler_of, message = _IN_CHUNK.unpack_from, handlers.get, int(Opcode.MESSAGE)
     position, end, messages = 0, len(data), 0
-    data += bytes(2)  # so that the last record, too, can be looked at as if it were a message
+    data += bytes(2)  # padding, so that the channel can be unpacked for any record
     while position < end:
         if end - position < _HEAD_SIZE:
             raise ValueError("a record that leaves its chunk")

@@ -1,8 +1,8 @@
-"""Walks the records of an MCAP file from its first byte to its last, verifying every check sum that it carries.
+"""Reads the records of an MCAP file sequentially and verifies all check sums.
 
-The library's readers either trust the summary at the end of a file or hold a whole attachment in memory, and none
-of them verifies the summary; this walk holds one record at a time. Format: https://mcap.dev/spec, in which a check
-sum of 0 means that none was computed.
+The readers of the `mcap` library either trust the summary at the end of a file or load whole attachments, and do not
+verify the summary; this reader loads one record at a time. Format: https://mcap.dev/spec; a check sum of 0 means that
+none was computed.
 """
 
 import hashlib
@@ -20,25 +20,25 @@ from mcap.records import Channel, Metadata, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from ..exceptions import FileFormatError
-from ..files.file_kinds import kind_of
+from ..files.file_kinds import describe_path
 
 _HEAD = struct.Struct("<BQ")  # opcode, length of the body
 _FOOTER_SIZE = 20  # start of the summary, start of its offsets, check sum
 _BLOCK = 1 << 20
-_LARGEST = 1 << 20  # of a record of the summary or a metadata record
+_LARGEST = 1 << 20  # bytes, of a summary or metadata record that is read
 
 
 class RecordWalk:
     """One pass over an open file.
 
     Attributes:
-        sha256: hexadecimal digest of the file; final once `records` is exhausted.
+        sha256: hexadecimal digest of the file; complete after `records` is exhausted.
         offset: bytes read so far.
-        counts: records of the data section by opcode, read or passed by.
-        passed_by: size of the largest wanted record that was too large to be read, bytes.
-        data_verified: the data section passed a check sum over all its bytes; False where it carries none.
-        statistics: what the summary counts, where it does.
-        summary_topics: the topics of the channels that the summary lists.
+        counts: number of records of the data section by opcode, read or skipped.
+        largest_skipped: size of the largest requested record that was too large to read, bytes.
+        data_verified: whether a check sum verified the data section; False if it has none.
+        statistics: the statistics record of the summary; None if it has none.
+        summary_topics: topics of the channels in the summary.
     """
 
     def __init__(self, path: Path, file: BinaryIO, size: int):
@@ -47,7 +47,7 @@ class RecordWalk:
         self._crc = 0
         self.offset = 0
         self.counts: Counter[int] = Counter()
-        self.passed_by = 0
+        self.largest_skipped = 0
         self.data_verified = False
         self.statistics: Statistics | None = None
         self.summary_topics: list[str] = []
@@ -57,13 +57,13 @@ class RecordWalk:
         return self._sha256.hexdigest()
 
     def records(self, largest: Mapping[int, int]) -> Iterator[tuple[int, bytes]]:
-        """Opcode and body of the records of the data section.
+        """Iterates over opcode and body of the records of the data section.
 
         Args:
-            largest: the opcodes that are wanted, each with the largest body that is worth holding in memory, bytes.
+            largest: requested opcodes, each with the largest body to read, bytes.
 
         Raises:
-            FileFormatError: no MCAP file, or one that is cut short, is followed by something, or fails a check sum.
+            FileFormatError: not an MCAP file, or a truncated one, one with trailing bytes or a wrong check sum.
         """
         self._read_magic()
         in_data = True
@@ -77,7 +77,7 @@ class RecordWalk:
             if opcode == 0:
                 raise self.damage("a record without a kind")
             if not in_data:
-                self._take_summary(opcode, length)
+                self._read_summary_record(opcode, length)
             elif opcode == Opcode.DATA_END:
                 self._end_data(crc, self._read(length))
                 in_data, self._crc = False, 0
@@ -86,7 +86,7 @@ class RecordWalk:
                 if length <= largest.get(opcode, -1):
                     yield opcode, self._read(length)
                 else:
-                    self.passed_by = max(self.passed_by, length if opcode in largest else 0)
+                    self.largest_skipped = max(self.largest_skipped, length if opcode in largest else 0)
                     self._skip(length)
         if in_data or length != _FOOTER_SIZE:
             raise self.damage("a footer without an end of the data section")
@@ -96,17 +96,17 @@ class RecordWalk:
         if expected not in (0, summary_crc):
             raise self.damage(f"a summary with check sum {summary_crc:08x} instead of {expected:08x}")
         if self._read(len(MCAP0_MAGIC)) != MCAP0_MAGIC or self.offset != self._size:
-            raise self.damage("another end")
+            raise self.damage("a wrong end of the file")
 
-    def damage(self, found: str) -> FileFormatError:
-        """The error for something found at the current position."""
-        return FileFormatError(self._path, "an intact and complete MCAP file", f"{found} at byte {self.offset}")
+    def damage(self, finding: str) -> FileFormatError:
+        """The error for damage at the current position."""
+        return FileFormatError(self._path, "an intact and complete MCAP file", f"{finding} at byte {self.offset}")
 
     def _read_magic(self) -> None:
-        begin = self._file.read(len(MCAP0_MAGIC))
+        magic = self._file.read(len(MCAP0_MAGIC))
         self._file.seek(0)
-        if not begin or not MCAP0_MAGIC.startswith(begin):
-            raise FileFormatError(self._path, "an MCAP file", kind_of(self._path))
+        if not magic or not MCAP0_MAGIC.startswith(magic):
+            raise FileFormatError(self._path, "an MCAP file", describe_path(self._path))
         self._read(len(MCAP0_MAGIC))
 
     def _end_data(self, crc: int, body: bytes) -> None:
@@ -117,7 +117,7 @@ class RecordWalk:
             raise self.damage(f"a data section with check sum {crc:08x} instead of {expected:08x}")
         self.data_verified = expected != 0
 
-    def _take_summary(self, opcode: int, length: int) -> None:
+    def _read_summary_record(self, opcode: int, length: int) -> None:
         if opcode not in (Opcode.STATISTICS, Opcode.CHANNEL) or length > _LARGEST:
             self._skip(length)
             return
@@ -127,7 +127,7 @@ class RecordWalk:
                 self.statistics = Statistics.read(stream)
             else:
                 self.summary_topics.append(Channel.read(stream).topic)
-        except Exception as error:  # as many kinds as there are ways to damage a record
+        except Exception as error:  # damaged bytes cause many types of errors
             raise self.damage(f"damage ({error or type(error).__name__}) in the summary record that ends") from None
 
     def _read(self, length: int) -> bytes:
@@ -145,23 +145,23 @@ class RecordWalk:
 
 
 def metadata_records(path: Path) -> dict[str, dict[str, str]]:
-    """The metadata records of a file, finished or not, by name; the last of a name wins.
+    """The metadata records of a file by name; of equal names the last.
 
-    Reads the head of each record and seeks past everything else (about a millisecond for an episode), so it also
-    works where a recording broke off and there is no summary to consult. No check sum is verified.
+    Reads only record headers and metadata (about a millisecond per episode), so it also works for an unfinished
+    recording without summary. Verifies no check sums.
 
     Raises:
-        FileFormatError: no MCAP file.
+        FileFormatError: not an MCAP file.
     """
     return {record.name: record.metadata for record in walk_metadata(path)}
 
 
 def walk_metadata(path: Path) -> Iterator[Metadata]:
-    """The metadata records of a file in their order, as `metadata_records` finds them."""
+    """Iterates over the metadata records of a file, see `metadata_records`."""
     size = path.stat().st_size
     with path.open("rb") as file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise FileFormatError(path, "an MCAP file", kind_of(path))
+            raise FileFormatError(path, "an MCAP file", describe_path(path))
         while len(head := file.read(_HEAD.size)) == _HEAD.size:
             opcode, length = _HEAD.unpack(head)
             if opcode in (0, Opcode.DATA_END, Opcode.FOOTER) or length > size - file.tell():

@@ -1,4 +1,4 @@
-"""The messages of a recording that depend on its task: states, actions, what is measured, and the scene."""
+"""The messages of a recording that depend on the task: states, actions, measures and the scene."""
 
 import functools
 from abc import ABC, abstractmethod
@@ -8,18 +8,18 @@ from typing import Any
 from .topics import EVENT, INPUTS, LOOP_TIMING, Record, Topic
 
 SceneWriter = Callable[[int, Sequence[float], Sequence[float]], list[Record]]
-"""Records of a scene from a time (ns), a recorded state and the joint action that acts in it."""
+"""Makes the scene records from a time (ns), a recorded state and the joint action applied in it."""
 
 
 class TaskMessages(ABC):
-    """How a task is recorded.
+    """Encoding of a task's recordings.
 
     Attributes:
         scenario_file: name of the attachment with the scenario.
         state: topic of the states.
         actions: topic of each player's actions.
-        measures: topic of what is known after a step: the reward, and perhaps the interaction.
-        scene: topics of the scene, which only viewers read.
+        measures: topic of the reward after a step and, if measured, the interaction.
+        scene: topics of the scene, for viewers only.
     """
 
     scenario_file: str = "scenario.json"
@@ -30,7 +30,7 @@ class TaskMessages(ABC):
 
     @functools.cached_property
     def topics(self) -> tuple[Topic, ...]:
-        """Every topic of a recording, in the order of its channels."""
+        """All topics of a recording, in the order of its channels."""
         return (self.state, *INPUTS, *self.actions, self.measures, LOOP_TIMING, EVENT, *self.scene)
 
     @abstractmethod
@@ -39,7 +39,7 @@ class TaskMessages(ABC):
 
     @abstractmethod
     def decode_state(self, payload: bytes) -> tuple[int, Sequence[float]]:
-        """Step and state of a message."""
+        """Step and recorded state of a message."""
 
     @abstractmethod
     def encode_action(self, step: int, action: Sequence[float]) -> bytes:
@@ -51,16 +51,16 @@ class TaskMessages(ABC):
 
     @abstractmethod
     def encode_measures(self, step: int, recorded: Sequence[float], action: Sequence[float], reward: float) -> bytes:
-        """The message after a step whose joint action led to a state."""
+        """The message after a step: `recorded` is the state after the joint action `action`."""
 
     @abstractmethod
     def decode_reward(self, payload: bytes) -> float:
-        """The reward of such a message."""
+        """The reward of a message of `measures`."""
 
     def scenario_records(self, scenario: Any, time_ns: int) -> list[Record]:
-        """What of the scene stands still, written once."""
+        """Records of the fixed parts of the scene, written once."""
         return []
 
     def scene_writer(self) -> SceneWriter:
-        """What writes the rest of the scene, in each step."""
+        """A function that makes the records of the moving parts of the scene, called in each step."""
         return lambda time_ns, recorded, action: []

@@ -1,6 +1,6 @@
-"""The topics of a recording: their names, the message type of each, and what their channels say about units.
+"""The topics of a recording that do not depend on the task: names, message types and channel metadata.
 
-Those that depend on the task are in `task_messages`.
+See `task_messages` for the other topics.
 """
 
 import functools
@@ -19,12 +19,12 @@ ENCODING = "protobuf"
 """Encoding of every message and of every schema."""
 
 SCHEMA_PACKAGE = "copolicy."
-"""What the name of every message of ours begins with, in every version."""
+"""Prefix of the names of our messages, in every version."""
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One stream of messages in a recording."""
+    """A topic: name, message type and metadata of its channel."""
 
     name: str
     message: Any  # class of a protobuf message
@@ -32,7 +32,7 @@ class Topic:
 
     @property
     def schema_name(self) -> str:
-        """Full name of the message, as the schema record has it."""
+        """Full name of the message type, as in the schema record."""
         return self.message.DESCRIPTOR.full_name
 
 
@@ -40,13 +40,13 @@ Record = tuple[Topic, bytes]
 """A serialised message and its topic."""
 
 
-def of_player(player: int) -> dict[str, str]:
-    """What the metadata of a channel says of a player."""
+def player_metadata(player: int) -> dict[str, str]:
+    """Channel metadata of a topic of one player."""
     return {"player": str(player), "seat": PLAYERS[player]}
 
 
 INPUTS = tuple(
-    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **of_player(player)})
+    Topic(f"/player/{player}/input", PlayerInput, {"units": "axes: [-1, 1]; age_ns: ns", **player_metadata(player)})
     for player in range(2)
 )
 LOOP_TIMING = Topic("/loop/timing", LoopTiming, {"units": "ns on the monotonic clock"})
@@ -55,47 +55,47 @@ EVENT = Topic("/episode/event", EpisodeEvent)
 
 @functools.cache
 def schema_data(message: Any) -> bytes:
-    """The FileDescriptorSet of a message and all it needs, the `data` of its schema record."""
+    """Serialised FileDescriptorSet of a message type with its dependencies, the `data` of its schema record."""
     return build_file_descriptor_set(message).SerializeToString(deterministic=True)
 
 
-def is_ours(channel: Channel, schema_name: str, topics: Iterable[Topic]) -> bool:
-    """Whether a channel has one of some topics, its encoding and its schema."""
-    names = {(topic.name, topic.schema_name) for topic in topics}
-    return channel.message_encoding == ENCODING and (channel.topic, schema_name) in names
+def is_channel_of(channel: Channel, schema_name: str, topics: Iterable[Topic]) -> bool:
+    """Whether a channel has the name, encoding and schema of one of the topics."""
+    pairs = {(topic.name, topic.schema_name) for topic in topics}
+    return channel.message_encoding == ENCODING and (channel.topic, schema_name) in pairs
 
 
 def channel_difference(channel: Channel, schema: Schema | None, topic: Topic) -> str:
-    """What keeps messages of a file's channel from being read as those of a topic; empty where nothing does."""
+    """Reason why messages of a channel cannot be read as those of a topic; empty if they can."""
     if schema is None:
         return f"{topic.name} without a schema"
-    kind = (channel.message_encoding, schema.encoding, schema.name)
-    if kind != (ENCODING, ENCODING, topic.schema_name):
-        return f"{topic.name} with encodings and schema {kind}"
+    types = (channel.message_encoding, schema.encoding, schema.name)
+    if types != (ENCODING, ENCODING, topic.schema_name):
+        return f"{topic.name} with encodings and schema {types}"
     difference = schema_difference(schema.data, topic.message)
     return difference and f"{topic.name} with {difference}"
 
 
 @functools.cache
 def schema_difference(data: bytes, message: Any) -> str:
-    """What keeps our message class from decoding what a file's schema describes; empty where nothing does.
+    """Reason why our message class cannot decode messages of a file's schema; empty if it can.
 
-    A field of another type would not fail to decode, it would silently read as zero. Further fields are harmless.
+    A field of another type would not fail to decode but silently read as zero. Additional fields are harmless.
     """
     if data == schema_data(message):
         return ""
     full_name = message.DESCRIPTOR.full_name
-    theirs = {
-        f"{file.package}.{kind.name}": {one.name: (one.number, one.type, one.label) for one in kind.field}
+    fields_in_file = {
+        f"{file.package}.{message_type.name}": {f.name: (f.number, f.type, f.label) for f in message_type.field}
         for file in FileDescriptorSet.FromString(data).file
-        for kind in file.message_type
+        for message_type in file.message_type
     }
-    if full_name not in theirs:
+    if full_name not in fields_in_file:
         return f"no message {full_name} in the schema"
-    for ours in build_file_descriptor_set(message).file:
-        for kind in ours.message_type:
-            if f"{ours.package}.{kind.name}" == full_name:
-                for one in kind.field:
-                    if theirs[full_name].get(one.name) != (one.number, one.type, one.label):
-                        return f"another field {one.name!r} in the schema of {full_name}"
+    for file in build_file_descriptor_set(message).file:
+        for message_type in file.message_type:
+            if f"{file.package}.{message_type.name}" == full_name:
+                for field in message_type.field:
+                    if fields_in_file[full_name].get(field.name) != (field.number, field.type, field.label):
+                        return f"another field {field.name!r} in the schema of {full_name}"
     return ""

@@ -1,6 +1,6 @@
-"""Statistics of pair data: how multimodal a data set is, who leads, how hard the players press, and how sure that is.
+"""Statistics of pair data with confidence intervals and null distributions: multimodality, leadership, forces, ...
 
-Each family has a file; `compute.py` puts them together and `command.py` is `copolicy-dataset stats`.
+One family per module; `compute.py` runs them all, `command.py` is `copolicy-dataset stats`.
 """
 
 from .command import add_stats_command

@@ -1,11 +1,10 @@
-"""`copolicy-dataset stats`: how multimodal a data set is, and how sure that is."""
+"""`copolicy-dataset stats`: writes the statistics of a data set."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..command_line.flag_numbers import seed
 from ..episode import Source
 from ..exceptions import FileFormatError, InvalidValueError
@@ -13,25 +12,19 @@ from ..files.meta_files import STATISTICS_FILE
 from ..files.staging import replace_json
 
 
-def add_stats_command(commands: argparse._SubParsersAction) -> None:
+def add_stats_command(commands: Commands) -> None:
     """Adds `stats`."""
-    parser = add_command(
-        commands,
-        "stats",
-        _stats,
-        "compute the statistics of a data set, with intervals and nulls, into meta/copolicy_stats.json",
-        "copolicy-dataset stats datasets/table",
-        (*TABLES, "sklearn", "diptest"),
-    )
+    summary_text = "compute statistics with intervals and null distributions, into meta/copolicy_stats.json"
+    parser = add_command(commands, "stats", _stats, summary_text, "copolicy-dataset stats datasets/table")
     parser.add_argument("path", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write here instead of into the data set")
-    parser.add_argument("--seed", type=seed(), default=0, help="of everything that is drawn (default: %(default)s)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write to this file instead of into the data set")
+    parser.add_argument("--seed", type=seed(), default=0, help="seed of all random draws (default: %(default)s)")
     parser.add_argument(
-        "--source", choices=Source.__args__, default=None, help="describe only episodes of this source (needs --out)"
+        "--source", choices=Source.__args__, default=None, help="use only episodes of this source (needs --out)"
     )
 
 
-def _stats(arguments: argparse.Namespace) -> dict:
+def _stats(arguments: argparse.Namespace) -> dict[str, Any]:
     from .compute import compute_statistics
     from .reading import read_trajectories
 
@@ -49,7 +42,7 @@ def _stats(arguments: argparse.Namespace) -> dict:
 
 
 def summary(document: dict[str, Any]) -> dict[str, Any]:
-    """The statistics as one readable line each: value, interval, unit, and what chance gives."""
+    """The statistics as one readable line each: value, interval, unit, and null distribution."""
     lines: dict[str, Any] = {"definition_version": document["definition_version"]}
     lines["dataset"] = {
         **{name: value for name, value in document["dataset"].items() if isinstance(value, int)},
@@ -65,10 +58,10 @@ def summary(document: dict[str, Any]) -> dict[str, Any]:
         for name, entry in estimates.items():
             if name == "route_entropy_pooled" and "details" in entry:
                 lines[family].pop(name)
-                lines[family] |= {f"{name}_{size}": _entropy_line(part) for size, part in entry["details"].items()}
+                lines[family] |= {f"{name}_{size}": _entropy_line(pooled) for size, pooled in entry["details"].items()}
     if "human_reference" in document:
         routes = document["human_reference"]["routes"]
-        pooled = {f"route_entropy_pooled_{size}": _entropy_line(part) for size, part in routes.items()}
+        pooled = {f"route_entropy_pooled_{size}": _entropy_line(pooled) for size, pooled in routes.items()}
         lines["people, for comparison"] = pooled
     return lines
 
@@ -83,11 +76,11 @@ def _line(estimate: dict[str, Any]) -> str:
         text += f" {estimate['unit']}"
     if "null" in estimate:
         null = estimate["null"]
-        text += f"; by chance {null['mean']:.3g} [{null['low']:.3g}, {null['high']:.3g}], p = {null['p']:.2g}"
+        text += f"; null {null['mean']:.3g} [{null['low']:.3g}, {null['high']:.3g}], p = {null['p']:.2g}"
     details = estimate.get("details", {})
     if "reading" in details:
-        other = details["mirrored_bits" if details["reading"] == "as labelled" else "as_labelled_bits"]
-        text += f"; labels {details['reading']}, the other reading {other:.3g}"
+        other_bits = details["mirrored_bits" if details["reading"] == "as labelled" else "as_labelled_bits"]
+        text += f"; labels {details['reading']}, the other reading {other_bits:.3g}"
     return text
 
 

@@ -7,24 +7,24 @@ from typing import Any
 import numpy as np
 
 from ..command_line.commands import progress
+from .action_variance import variance_statistics
 from .energy_distance import energy_statistics
 from .estimate import rounded
 from .forces import activity_statistics, force_statistics
 from .leadership import leadership_statistics
-from .neighbours import neighbour_statistics
-from .pair_share import pair_share_statistics
 from .path_modes import path_mode_statistics
 from .resampling import MIN_CLUSTERS, Bootstrap
 from .route_entropy import route_statistics
 from .smoothness import smoothness_statistics
 from .trajectories import Trajectories
+from .variance_explained import eta_squared_statistics
 from .visitation import visitation_statistics
 
 DEFINITION_VERSION = "2.0.0"
-"""Of the statistics' definitions: major where a value is computed otherwise, minor where one is added."""
+"""Version of the definitions: major if the computation of a value changes, minor if a statistic is added."""
 
 REPLICATES = 1000
-_SOURCES = {
+_SOURCE_LABELS = {
     "simulated": "scripted pairs, no person took part",
     "upstream": "files of the original program, which do not say who held the sticks",
 }
@@ -33,37 +33,37 @@ _SOURCES = {
 def compute_statistics(
     data: Trajectories, seed: int = 0, left_out: Mapping[str, int] | None = None, replicates: int = REPLICATES
 ) -> dict[str, Any]:
-    """The document: definition version, settings, seed, what was described, and the statistics by family.
+    """Computes all statistics as a document: definition version, settings, data set, and the statistics by family.
 
-    The same data and seed give the same document: each family draws from a generator of its own.
+    Deterministic for equal data and seed: each family has its own random generator.
 
     Args:
-        left_out: episodes that were not described, by reason.
-        replicates: of the bootstrap.
+        left_out: number of omitted episodes, by reason.
+        replicates: number of bootstrap replicates.
     """
     bootstrap = Bootstrap(data.pairs, replicates, np.random.default_rng((seed, 0)))
     families = {
         "routes": lambda rng: route_statistics(data, bootstrap, rng),
         "paths": lambda rng: path_mode_statistics(data, seed),
-        "actions": lambda rng: neighbour_statistics(data, bootstrap, rng),
+        "actions": lambda rng: variance_statistics(data, bootstrap, rng),
         "visitation": lambda rng: visitation_statistics(data, bootstrap, rng),
         "leadership": lambda rng: leadership_statistics(data, bootstrap, rng),
         "forces": lambda rng: force_statistics(data, bootstrap, rng),
         "activity": lambda rng: activity_statistics(data, bootstrap),
         "smoothness": lambda rng: smoothness_statistics(data, bootstrap),
         "distances": lambda rng: energy_statistics(data, rng),
-        "pairs": lambda rng: pair_share_statistics(data, bootstrap, rng),
+        "pairs": lambda rng: eta_squared_statistics(data, bootstrap, rng),
     }
-    own = data.task.statistics
-    families |= {name: lambda rng: {} for name in own.families if name not in families}
+    of_task = data.task.statistics
+    families |= {name: lambda rng: {} for name in of_task.families if name not in families}
     statistics = {}
-    for number, (family, compute) in enumerate(progress(families.items(), len(families), "statistics"), start=1):
-        rng = np.random.default_rng((seed, number))
+    for index, (family, compute) in enumerate(progress(families.items(), len(families), "statistics"), start=1):
+        rng = np.random.default_rng((seed, index))
         estimates = compute(rng)
-        if family in own.families:
-            estimates |= own.families[family](data, bootstrap, rng)
+        if family in of_task.families:
+            estimates |= of_task.families[family](data, bootstrap, rng)
         statistics[family] = {name: estimate.as_dict() for name, estimate in estimates.items()}
-    labels = {**_SOURCES, "human": own.people}
+    labels = {**_SOURCE_LABELS, "human": of_task.people}
     sources = Counter(row.source for row in data.rows)
     document = {
         "definition_version": DEFINITION_VERSION,
@@ -85,7 +85,7 @@ def compute_statistics(
             "sources": dict(sorted(sources.items())),
             "source_labels": {name: labels.get(name, "unknown") for name in sorted(sources)},
         },
-        **({"human_reference": own.reference(np.random.default_rng((seed, 11)))} if own.reference else {}),
+        **({"human_reference": of_task.reference(np.random.default_rng((seed, 11)))} if of_task.reference else {}),
         "statistics": statistics,
     }
     return rounded(document)

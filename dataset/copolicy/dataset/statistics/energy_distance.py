@@ -1,4 +1,4 @@
-"""How far two parts of a data set are apart in states and actions: splits, early and late, pairs."""
+"""Energy distance between parts of a data set in states and actions: splits, early and late episodes, pairs."""
 
 from itertools import combinations
 
@@ -6,14 +6,15 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.stats import false_discovery_control
 
+from ..arrays import Array
 from .estimate import Estimate, Null
 from .resampling import exchangeable, interval, permuted_within
 from .trajectories import Trajectories
 
 MAX_FRAMES = 4_000
 MAX_EPISODES = 1_000
-MAX_TABLE = 12
-"""Pairs up to which each two are compared; of more, all at once alone."""
+MAX_COMPARED_PAIRS = 12
+"""Largest number of pairs of players for which every two are compared, in addition to all at once."""
 
 _PERMUTATIONS = 499
 _REPLICATES = 200
@@ -24,7 +25,7 @@ _DISTANCE = (
 
 
 def energy_statistics(data: Trajectories, rng: np.random.Generator) -> dict[str, Estimate]:
-    """Between splits, or between earlier and later episodes where there is one split, and between pairs."""
+    """Energy coefficients between splits (earlier and later episodes if there is one split) and between pairs."""
     chosen = np.arange(len(data.rows))
     if len(chosen) > MAX_EPISODES:
         chosen = np.sort(rng.choice(len(chosen), MAX_EPISODES, replace=False))
@@ -32,24 +33,24 @@ def energy_statistics(data: Trajectories, rng: np.random.Generator) -> dict[str,
     strata, pairs = data.strata[chosen], data.pairs[chosen]
     splits = np.unique([data.rows[index].split for index in chosen], return_inverse=True)[1]
     if len(np.unique(splits)) > 1:
-        name, what, labels, blocks = "energy_between_splits", "the splits of meta/info.json", splits, strata
+        name, description, labels, blocks = "energy_between_splits", "the splits of meta/info.json", splits, strata
     else:
-        labels = _halves(pairs)
-        name, what, blocks = "energy_between_halves", "each pair's earlier and later episodes", pairs
+        labels = _earlier_later(pairs)
+        name, description, blocks = "energy_between_halves", "each pair's earlier and later episodes", pairs
     return {
-        name: _estimate(distances, labels, blocks, what, rng),
+        name: _estimate(distances, labels, blocks, description, rng),
         "energy_between_pairs": _between_pairs(distances, pairs, data, chosen, rng),
     }
 
 
-def episode_distances(data: Trajectories, chosen: np.ndarray) -> np.ndarray:
-    """`(E, E)` mean distance between the frames of two episodes, an even selection of each episode's frames.
+def episode_distances(data: Trajectories, chosen: Array) -> Array:
+    """`(E, E)` mean distances between the frames of two episodes, for evenly spaced frames of each episode.
 
-    Permutations and resamples then move whole episodes: frames of an episode are no independent draws.
+    Frames of an episode are not independent; with these distances permutations and resamples draw whole episodes.
     """
-    each = max(2, MAX_FRAMES // max(len(chosen), 1))
+    per_episode = max(2, MAX_FRAMES // max(len(chosen), 1))
     frames = np.concatenate(
-        [np.linspace(data.starts[index], data.ends[index] - 1, each).round().astype(int) for index in chosen]
+        [np.linspace(data.starts[index], data.ends[index] - 1, per_episode).round().astype(int) for index in chosen]
     )
     spec = data.task.spec
     points = np.hstack(
@@ -60,75 +61,81 @@ def episode_distances(data: Trajectories, chosen: np.ndarray) -> np.ndarray:
     )
     result = np.empty((len(chosen), len(chosen)))
     for row in range(len(chosen)):
-        block = cdist(points[row * each : (row + 1) * each], points)
-        result[row] = block.reshape(each, len(chosen), each).mean(axis=(0, 2))
+        block = cdist(points[row * per_episode : (row + 1) * per_episode], points)
+        result[row] = block.reshape(per_episode, len(chosen), per_episode).mean(axis=(0, 2))
     return result
 
 
-def energy_coefficient(distances: np.ndarray, labels: np.ndarray, weights: np.ndarray | None = None) -> float:
-    """Of two groups, or the mean over all two of several by the product of their sizes.
+def energy_coefficient(distances: Array, labels: Array, weights: Array | None = None) -> float:
+    """Energy coefficient of two groups; for several groups the mean over all two, weighted by their sizes' product.
 
     Args:
         distances: `(E, E)` from `episode_distances`.
         labels: `(E,)` group of each episode.
-        weights: `(E,)` how often each is counted, once by default.
+        weights: `(E,)` multiplicity of each episode, 1 by default.
     """
-    onehot = (labels[:, None] == np.unique(labels)).astype(float)
+    membership = (labels[:, None] == np.unique(labels)).astype(float)
     if weights is not None:
-        onehot *= weights[:, None]
-    sizes = onehot.sum(axis=0)
+        membership *= weights[:, None]
+    sizes = membership.sum(axis=0)
     present = sizes > 0
-    onehot, sizes = onehot[:, present], sizes[present]
+    membership, sizes = membership[:, present], sizes[present]
     if len(sizes) < 2:
         return 0.0
-    means = (onehot.T @ distances @ onehot) / np.outer(sizes, sizes)
-    own = np.diag(means)
-    energy = 2 * means - own[:, None] - own
-    size = np.outer(sizes, sizes)
+    means = (membership.T @ distances @ membership) / np.outer(sizes, sizes)
+    within = np.diag(means)
+    energy = 2 * means - within[:, None] - within
+    products = np.outer(sizes, sizes)
     upper = np.triu_indices(len(sizes), 1)
-    between = (2 * means * size)[upper].sum()
-    return float((energy * size)[upper].sum() / between) if between > 0 else 0.0
+    between = (2 * means * products)[upper].sum()
+    return float((energy * products)[upper].sum() / between) if between > 0 else 0.0
 
 
-def _estimate(
-    distances: np.ndarray, labels: np.ndarray, blocks: np.ndarray, what: str, rng: np.random.Generator
-) -> Estimate:
-    definition = f"{_DISTANCE} Between {what}."
+def _estimate(distances: Array, labels: Array, blocks: Array, description: str, rng: np.random.Generator) -> Estimate:
+    definition = f"{_DISTANCE} Between {description}."
     episodes = len(labels)
     if len(np.unique(labels)) < 2:
-        return Estimate(None, "1", definition, episodes, note="there is only one")
+        return Estimate(None, "1", definition, episodes, note="there is only one part")
     value = energy_coefficient(distances, labels)
-    again = [energy_coefficient(distances, labels, _drawn(labels, rng)) for _ in range(_REPLICATES)]
-    bounds = interval(value, np.array(again), 0.0, 1.0)
+    replicates = [energy_coefficient(distances, labels, _bootstrap_weights(labels, rng)) for _ in range(_REPLICATES)]
+    bounds = interval(value, np.array(replicates), 0.0, 1.0)
     within = exchangeable(labels, blocks) >= episodes / 2
     strata = blocks if within else np.zeros(episodes, dtype=int)
     draws = [energy_coefficient(distances, permuted_within(labels, strata, rng)) for _ in range(_PERMUTATIONS)]
-    how = "whole episodes exchanged" + (" within each pair or configuration" if within else "")
-    null = Null.of(how, value, np.array(draws))
+    method = "whole episodes exchanged" + (" within each pair or configuration" if within else "")
+    null = Null.from_draws(method, value, np.array(draws))
     return Estimate(value, "1", definition, episodes, bounds, "episodes of each part", null)
 
 
 def _between_pairs(
-    distances: np.ndarray, pairs: np.ndarray, data: Trajectories, chosen: np.ndarray, rng: np.random.Generator
+    distances: Array, pairs: Array, data: Trajectories, chosen: Array, rng: np.random.Generator
 ) -> Estimate:
     strata = data.strata[chosen]
     estimate = _estimate(distances, pairs, strata, "pairs, the mean over each two by their episodes", rng)
     numbers = np.unique(pairs)
-    if not 2 < len(numbers) <= MAX_TABLE:
+    if not 2 < len(numbers) <= MAX_COMPARED_PAIRS:
         return estimate
-    names = {int(pairs[place]): data.rows[index].pair_id for place, index in enumerate(chosen)}
-    table = []
-    for one, other in combinations(numbers, 2):
-        of_two = np.isin(pairs, (one, other))
-        part = _estimate(distances[np.ix_(of_two, of_two)], pairs[of_two], strata[of_two], "two pairs", rng)
-        table.append({"pairs": [names[one], names[other]], "value": part.value, "p": part.null.p if part.null else 1.0})
-    for entry, p in zip(table, false_discovery_control([entry["p"] for entry in table]), strict=True):
-        entry["p_adjusted"] = float(p)
-    estimate.details["each_two"] = table
+    names = {int(pairs[position]): data.rows[index].pair_id for position, index in enumerate(chosen)}
+    rows = []
+    for first, second in combinations(numbers, 2):
+        selected = np.isin(pairs, (first, second))
+        estimate_two = _estimate(
+            distances[np.ix_(selected, selected)], pairs[selected], strata[selected], "two pairs", rng
+        )
+        rows.append(
+            {
+                "pairs": [names[first], names[second]],
+                "value": estimate_two.value,
+                "p": estimate_two.null.p if estimate_two.null else 1.0,
+            }
+        )
+    for row, p in zip(rows, false_discovery_control([row["p"] for row in rows]), strict=True):
+        row["p_adjusted"] = float(p)
+    estimate.details["each_two"] = rows
     return estimate
 
 
-def _halves(pairs: np.ndarray) -> np.ndarray:
+def _earlier_later(pairs: Array) -> Array:
     """0 for the earlier half of each pair's episodes, 1 for the later."""
     labels = np.zeros(len(pairs), dtype=int)
     for pair in np.unique(pairs):
@@ -137,7 +144,7 @@ def _halves(pairs: np.ndarray) -> np.ndarray:
     return labels
 
 
-def _drawn(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _bootstrap_weights(labels: Array, rng: np.random.Generator) -> Array:
     weights = np.zeros(len(labels))
     for label in np.unique(labels):
         members = np.flatnonzero(labels == label)

@@ -1,4 +1,4 @@
-"""A statistic with all that belongs to it: what it is, its unit, how sure it is, and what chance alone would give."""
+"""The value of a statistic with definition, unit, confidence interval and null distribution."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,17 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
+
 _DIGITS = 6  # more would differ between machines
 
 
 @dataclass(frozen=True)
 class Null:
-    """What the statistic would be by chance.
+    """The null distribution of a statistic.
 
     Attributes:
-        how: how chance was made.
+        how: how the null distribution was drawn.
         low, high: 2.5 and 97.5 percent quantiles.
-        p: share of chance results at least as extreme, the observed one counted among them.
+        p: proportion of draws at least as extreme as the observed value, which counts as one of them.
     """
 
     how: str
@@ -26,15 +28,15 @@ class Null:
     p: float
 
     @classmethod
-    def of(cls, how: str, value: float, draws: np.ndarray, two_sided: bool = False) -> "Null":
-        """From the statistic under chance `(n,)`; one-sided means larger than chance."""
+    def from_draws(cls, method: str, value: float, draws: Array, two_sided: bool = False) -> "Null":
+        """From draws `(n,)` of the statistic under the null hypothesis; a one-sided test is for larger values."""
         centre = float(np.mean(draws))
         distance = np.abs(draws - centre) if two_sided else draws
         observed = abs(value - centre) if two_sided else value
-        # Equal up to rounding is equal: a statistic that cannot vary has p = 1.
+        # Tolerates rounding, so that a constant statistic has p = 1.
         p = (1 + np.sum(distance >= observed - 1e-9)) / (1 + len(draws))
         low, high = np.quantile(draws, (0.025, 0.975))
-        return cls(how, centre, float(low), float(high), float(p))
+        return cls(method, centre, float(low), float(high), float(p))
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,11 @@ class Estimate:
     """One statistic.
 
     Attributes:
-        value: None where it cannot be computed; `note` says why.
-        interval: 95 percent confidence interval; `resampled` says what was drawn anew for it.
-        episodes: how many episodes it rests on.
-        details: the parts it is made of, JSON-able.
+        value: None if it cannot be computed; `note` states the reason.
+        interval: 95 percent confidence interval.
+        resampled: what the bootstrap for the interval resampled.
+        episodes: number of episodes that the value is based on.
+        details: components of the value, JSON-compatible.
     """
 
     value: float | None
@@ -59,7 +62,7 @@ class Estimate:
     details: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: numbers of six digits, None for what is not finite, nothing that is empty."""
+        """A JSON-compatible dictionary: numbers with six digits, None for NaN and infinity, no empty entries."""
         entry: dict[str, Any] = {"value": self.value, "unit": self.unit, "interval": self.interval}
         if self.interval is not None:
             entry["resampled"] = self.resampled
@@ -71,16 +74,12 @@ class Estimate:
 
 
 def left_out(reason: str, *names: str) -> dict[str, Estimate]:
-    """Statistics that a task lacks the part for.
-
-    Args:
-        reason: of `PairTask.missing`.
-    """
+    """Estimates without value for statistics that need a part that the task lacks (`reason`: `PairTask.missing`)."""
     return {name: Estimate(None, "1", "Not defined for this task.", 0, note=reason) for name in names}
 
 
 def rounded(value: Any) -> Any:
-    """The same with plain numbers of six digits, None for what is not finite, lists for tuples and arrays."""
+    """JSON-compatible copy: numbers rounded to six digits, None for NaN and infinity, lists for tuples and arrays."""
     if isinstance(value, dict):
         return {str(key): rounded(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -1,11 +1,10 @@
-"""Reads the episodes of a LeRobot v3 data set for its statistics: three columns of the frames, no images."""
+"""Reads the episodes of a LeRobot v3 data set for statistics: states, actions and scenarios, no images."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from ..arrays import Array
 from ..exceptions import CopolicyError, FileFormatError, RunError
 from ..features import ACTION, ENVIRONMENT_STATE, STATE, features_of
 from ..lerobot_folder.folder import LeRobotFolder
@@ -20,16 +19,16 @@ _EPISODE_COLUMNS = (
 
 
 def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectories, dict[str, int]]:
-    """The episodes of a data set that count, and how many were left out for each reason.
+    """Reads the episodes of a data set, and the number of omitted episodes by reason.
 
-    Discarded episodes do not count: those that their operator discarded, those of `copolicy-dataset exclude`.
+    Discarded episodes are omitted: those discarded by the operator or by `copolicy-dataset exclude`.
 
     Args:
         source: only episodes of this source (`human`, `simulated` or `upstream`).
 
     Raises:
-        FileFormatError: no LeRobot v3 data set of this task, or a damaged one.
-        RunError: no episode is left.
+        FileFormatError: not a LeRobot v3 data set of an installed task, or a damaged one.
+        RunError: all episodes are omitted.
     """
     folder = LeRobotFolder.open(root)
     folder.require_task((STATE, ACTION, ENVIRONMENT_STATE))
@@ -37,8 +36,8 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
     rows = folder.rows(_EPISODE_COLUMNS)
     split_of = _splits(info.get("splits") or {}, len(rows))
     left_out = {"discarded": 0, "other_source": 0, "empty": 0}
-    kept: list[tuple[np.ndarray, np.ndarray]] = []
-    kept_rows: list[EpisodeRow] = []
+    motions: list[tuple[Array, Array]] = []
+    episode_rows: list[EpisodeRow] = []
     for index, frames in _frames(folder):
         row = rows[index]
         reason = (
@@ -50,34 +49,34 @@ def read_trajectories(root: Path, source: str | None = None) -> tuple[Trajectori
         if reason:
             left_out[reason] += 1
             continue
-        kept.append((frames[STATE], frames[ACTION]))
-        kept_rows.append(_row(folder, row, frames[ENVIRONMENT_STATE][0], split_of[index]))
-    if not kept:
+        motions.append((frames[STATE], frames[ACTION]))
+        episode_rows.append(_row(folder, row, frames[ENVIRONMENT_STATE][0], split_of[index]))
+    if not motions:
         raise RunError(f"{root}: expected an episode to describe, found {len(rows)}, left out {left_out}")
-    return Trajectories.of(kept, kept_rows, int(info["fps"]), folder.task), {
+    return Trajectories.from_episodes(motions, episode_rows, int(info["fps"]), folder.task), {
         name: n for name, n in left_out.items() if n
     }
 
 
-def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-    total, found = sum(folder.lengths), sum(row_count(path) for path in folder.data_files)
-    if found != total:
-        raise FileFormatError(folder.root / "data", f"{total} frames with index 0, 1, ..., each once", f"{found}")
+def _frames(folder: LeRobotFolder) -> Iterator[tuple[int, dict[str, Array]]]:
+    total, actual = sum(folder.lengths), sum(row_count(path) for path in folder.data_files)
+    if actual != total:
+        raise FileFormatError(folder.root / "data", f"{total} frames with index 0, 1, ..., each once", f"{actual}")
     features = features_of(folder.task.spec)
     return folder.frames({name: features[name]["shape"] for name in (STATE, ACTION, ENVIRONMENT_STATE)})
 
 
-def _row(folder: LeRobotFolder, row: dict[str, Any], vector: np.ndarray, split: str) -> EpisodeRow:
+def _row(folder: LeRobotFolder, row: dict[str, Any], vector: Array, split: str) -> EpisodeRow:
     try:
         scenario = folder.task.scenario_of_vector(vector, row)
     except CopolicyError as error:
         raise FileFormatError(folder.root, f"a map in episode {row['episode_index']}", str(error)) from None
     names = ("episode_uuid", "pair_id", "map_id", "source", "success", "duration_s", "route_class")
-    return EpisodeRow(**{name: row[name] for name in names}, map_config=scenario, split=split)
+    return EpisodeRow(**{name: row[name] for name in names}, scenario=scenario, split=split)
 
 
 def _splits(splits: Mapping[str, str], episodes: int) -> list[str]:
-    """Name of the split of each episode, from `{"train": "0:80", "test": "80:100"}`; empty where none has it."""
+    """Split of each episode, from `{"train": "0:80", "test": "80:100"}`; empty for episodes outside of all splits."""
     names = [""] * episodes
     for name, span in splits.items():
         numbers = split_range(span) or range(0)

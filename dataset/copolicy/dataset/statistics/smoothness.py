@@ -1,44 +1,45 @@
-"""How fast the input moves and how smooth the motion is: f95, SPARC and log dimensionless jerk."""
+"""Bandwidth of the input and smoothness of the motion: f95, SPARC and log dimensionless jerk."""
 
 import numpy as np
 from scipy.signal import welch
 
+from ..arrays import Array
 from .estimate import Estimate, left_out
 from .resampling import Bootstrap
 from .trajectories import Trajectories
 
 WELCH_S = 3.2
-"""Length of a Welch segment; its inverse is the resolution, Hz."""
+"""Length of a Welch segment, s; its inverse is the frequency resolution, Hz."""
 
 MIN_S = 1.0
-"""Episodes shorter than this have no spectrum and no smoothness."""
+"""Shortest episode, s, for which spectrum and smoothness are computed."""
 
-_POWER_SHARE = 0.95
+_POWER_FRACTION = 0.95
 _SPARC_CUTOFF_HZ = 10.0
 _SPARC_THRESHOLD = 0.05
 _SPARC_PADDING = 4
 
 
-def f95(action: np.ndarray, fps: float) -> float:
-    """Frequency below which 95 percent of the power of an action `(T, m)` lies, Hz; nan where it never changes.
+def f95(action: Array, fps: float) -> float:
+    """Frequency below which 95 percent of the power of an action `(T, m)` lies, Hz; NaN for a constant action.
 
-    Welch's density (Hann, mean removed, half overlapping), all axes added, between bins interpolated.
+    Welch's power spectral density (Hann window, mean removed, half overlap), summed over axes, interpolated.
     """
     segment = min(len(action), max(4, round(WELCH_S * fps)))
     frequency, power = welch(action, fs=fps, nperseg=segment, axis=0, detrend="constant")
     cumulative = np.cumsum(power.sum(axis=1))
     if not cumulative[-1] > 1e-12:
         return float("nan")
-    # A bin's power is spread from half a bin below its frequency to half a bin above.
+    # The power of a bin is spread over half a bin on both sides of its frequency.
     edges = np.minimum(frequency + (frequency[1] - frequency[0]) / 2, fps / 2)
-    return float(np.interp(_POWER_SHARE * cumulative[-1], cumulative, edges))
+    return float(np.interp(_POWER_FRACTION * cumulative[-1], cumulative, edges))
 
 
-def sparc(speed: np.ndarray, fps: float) -> float:
-    """Spectral arc length of a speed profile `(T,)`: 0 is smoothest; nan without motion.
+def sparc(speed: Array, fps: float) -> float:
+    """Spectral arc length of a speed profile `(T,)`: 0 is smoothest; NaN without motion.
 
-    Length of the normalised magnitude spectrum up to 10 Hz (or half the rate), cut where it stays below 0.05
-    (Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet 2015).
+    Length of the normalised magnitude spectrum up to 10 Hz (or half the rate), between the first and last value of at
+    least 0.05 (Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet 2015).
     """
     points = 2 ** (int(np.ceil(np.log2(len(speed)))) + _SPARC_PADDING)
     magnitude = np.abs(np.fft.rfft(speed, points))
@@ -56,10 +57,10 @@ def sparc(speed: np.ndarray, fps: float) -> float:
     return -float(np.hypot(steps, np.diff(magnitude)).sum())
 
 
-def log_dimensionless_jerk(speed: np.ndarray, fps: float) -> float:
-    """-ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2) of a speed profile `(T,)`; larger is smoother; nan without motion.
+def log_dimensionless_jerk(speed: Array, fps: float) -> float:
+    """-ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2) of a speed profile `(T,)`; larger is smoother; NaN without motion.
 
-    Same source as `sparc`. A minimum-jerk movement has -ln(204.8) = -5.32.
+    Source: see `sparc`. A minimum-jerk movement has -ln(204.8) = -5.32.
     """
     peak = float(np.abs(speed).max())
     jerk = np.diff(speed, 2) * fps**2
@@ -71,21 +72,21 @@ def log_dimensionless_jerk(speed: np.ndarray, fps: float) -> float:
 
 
 def smoothness_statistics(data: Trajectories, bootstrap: Bootstrap) -> dict[str, Estimate]:
-    """Means over episodes; f95 for each player, smoothness of the speed of what moves."""
+    """Means over episodes of each player's f95, and of the smoothness of the body's speed."""
     names = ("action_f95_player_0", "action_f95_player_1", "sparc", "log_dimensionless_jerk")
     values = np.full((len(data.rows), len(names)), np.nan)
-    actions, speed = [data.force_of(player) for player in (0, 1)], np.linalg.norm(data.velocity, axis=1)
+    actions, speed = [data.player_force(player) for player in (0, 1)], np.linalg.norm(data.velocity, axis=1)
     for index, (start, end) in enumerate(zip(data.starts.tolist(), data.ends.tolist(), strict=True)):
         if end - start < MIN_S * data.fps or end - start < 4:
             continue
-        of_speed = (sparc(speed[start:end], data.fps), log_dimensionless_jerk(speed[start:end], data.fps))
-        values[index] = (*(f95(action[start:end], data.fps) for action in actions), *of_speed)
+        speed_smoothness = (sparc(speed[start:end], data.fps), log_dimensionless_jerk(speed[start:end], data.fps))
+        values[index] = (*(f95(action[start:end], data.fps) for action in actions), *speed_smoothness)
     spectrum = (
         "Frequency below which 95 % of the power of player {}'s action lies (Welch, segments of "
         f"{WELCH_S:g} s{data.axes}), mean over episodes; at most half the frame rate of {data.fps} Hz."
     )
     speed_of = f"of the {data.task.words.noun}'s speed"
-    rate = f"{speed_of}, mean over episodes. It depends on the frame rate ({data.fps} Hz): compare alike."
+    rate = f"{speed_of}, mean over episodes. Comparable only at the same frame rate ({data.fps} Hz)."
     definitions = (
         ("Hz", spectrum.format(0)),
         ("Hz", spectrum.format(1)),

@@ -1,1 +1,1 @@
-"""A released data set on its way to the Hub and back, whole."""
+"""Uploads a released data set to the Hub and downloads it again."""

@@ -1,8 +1,8 @@
 """Publishes a released data set: one commit, then its tags.
 
-The data tag is set last, so that its being there says that a publication is complete. Whatever breaks off before can
-be run again: files that arrived are not sent twice, a commit that arrived is found by its manifest, and what is
-missing is done.
+The data tag is set last, so an existing tag means that the publication is complete. An interrupted call can be
+repeated: uploaded files are not sent again, an existing commit is recognised by its manifest, and the remaining steps
+are done.
 """
 
 from dataclasses import dataclass
@@ -25,23 +25,23 @@ from ..hub.client import CommitOperationAdd, CommitOperationDelete, HfApi, hub_a
 from ..hub.repository import BRANCH, Repository, read_file, read_repository
 from ..lerobot_folder.exclusions import excluded_episodes
 from ..lerobot_folder.info import read_info
-from ..publication.data_version import newest
+from ..publication.data_version import newest_version
 from ..publication.minimal_card import is_minimal_card
 from ..publication.repo_id import checked_repo_id
 from ..versions.content import read_content
 from ..versions.manifest import Manifest
 from ..versions.release_record import ReleaseRecord, read_release
-from .raw_recordings import RawRecordings, find_raw_recordings, still_wanted
+from .raw_recordings import RawRecordings, find_raw_recordings, remaining_recordings
 
-_CHECKED = ("data/", "meta/", "videos/")
+_DATA_FOLDERS = ("data/", "meta/", "videos/")
 
 
 @dataclass(frozen=True)
-class Published:
-    """What stands on the Hub now.
+class PublishResult:
+    """The published state on the Hub.
 
     Attributes:
-        committed: False where an earlier call that broke off had committed already.
+        committed: False if an earlier, interrupted call had made the commit.
     """
 
     repo_id: str
@@ -55,23 +55,23 @@ class Published:
 
 def publish(
     root: Path, repo_id: str, private: bool = False, raw: Path | None = None, with_excluded: bool = False
-) -> Published:
+) -> PublishResult:
     """Checks the data set, uploads its newest release and tags it.
 
     Args:
-        private: of a repository that does not exist yet; one that is there must be private already.
-        raw: folder of the recordings that the episodes were made from, to go up as `raw/`.
-        with_excluded: send episodes that are marked as excluded too; not every trainer leaves them out.
+        private: create a private repository; an existing one must be private.
+        raw: folder of the recordings that the episodes were made from, uploaded as `raw/`.
+        with_excluded: upload excluded episodes too; not every trainer leaves them out.
 
     Raises:
-        FileFormatError: no release, no card, or a folder that is no data set.
-        RunError: a check finds an error; the folder is not what was released; it holds excluded episodes that were not
-            asked for; this version, or a newer one, is on the Hub.
-        HubError: the Hub did not do what was asked.
+        FileFormatError: no release, no card, or no data set.
+        RunError: a check finds an error; the folder differs from its release; it has excluded episodes and
+            `with_excluded` is off; this version, or a newer one, is on the Hub.
+        HubError: a request to the Hub failed.
     """
     checked_repo_id(repo_id)
     record, manifest = verify_release(root)
-    _require_checked(root)
+    _require_check_passed(root)
     if not with_excluded:
         _require_none_excluded(root)
     recordings = find_raw_recordings(root, raw) if raw is not None else None
@@ -86,20 +86,20 @@ def publish(
             raise RunError(f"{repo_id}: expected the repository just created, found none")
     if private and not repository.private:
         raise RunError(f"{repo_id}: expected a private repository, found a public one; nothing was uploaded")
-    _refuse_published(api, repository, record)
-    commit = _committed(api, repository, manifest, recordings)
+    _require_unpublished(api, repository, record)
+    commit = _find_head(api, repository, manifest, recordings)
     committed = commit is None
     if commit is None:
         commit = _commit(api, repository, root, record, manifest, recordings)
     with hub_errors(repo_id, f"setting the tags {codebase_tag} and {record.data_version.tag}"):
-        _move_tag(api, repository, codebase_tag, commit)
+        _set_tag(api, repository, codebase_tag, commit)
         api.create_tag(repo_id, tag=record.data_version.tag, revision=commit, repo_type="dataset")
     files = len(manifest.files) + 1 + (len(recordings.files) + 1 if recordings else 0)
     left_out = recordings.left_out if recordings else []
-    return Published(repo_id, record.data_version.tag, commit, record.content_hash, files, committed, left_out)
+    return PublishResult(repo_id, record.data_version.tag, commit, record.content_hash, files, committed, left_out)
 
 
-def _require_checked(root: Path) -> None:
+def _require_check_passed(root: Path) -> None:
     result = check_dataset(root)
     if result.failed():
         raise RunError(
@@ -114,49 +114,49 @@ def _require_none_excluded(root: Path) -> None:
         listed = ", ".join(map(str, excluded[:12])) + (", ..." if len(excluded) > 12 else "")
         raise RunError(
             f"{root}: expected a release without excluded episodes, found {len(excluded)} ({listed}); nothing was "
-            f"uploaded; `copolicy-dataset select {root} --out NEW --drop-excluded` leaves them out (release NEW then), "
-            "--with-excluded sends them all the same"
+            f"uploaded; `copolicy-dataset select {root} --out NEW --drop-excluded` removes them (then release NEW), "
+            "--with-excluded uploads them"
         )
 
 
 def verify_release(root: Path) -> tuple[ReleaseRecord, Manifest]:
-    """Checks that the folder holds what its newest release says, and brings the manifest up to date with the card.
+    """Checks that the folder matches its newest release, and updates the manifest if card files changed.
 
-    Card, figures, report and Croissant's description may be made anew after a release, so that they can name its
-    version, and so may the findings of a check; data and other metadata may not change.
+    Card, figures, report, Croissant metadata and check findings may be rewritten after a release, so that they can
+    name its version; data and other metadata must not change.
 
     Raises:
-        FileFormatError: no release, no card, a damaged manifest, or a folder that is no data set.
+        FileFormatError: no release, no card, a damaged manifest, or no data set.
         RunError: data or metadata changed since the release.
     """
     record = read_release(root)
     minimal = is_minimal_card(root / CARD_FILE)
     if minimal or not (root / CARD_FILE).is_file():
-        found = "the minimal one of copolicy-convert, which describes nothing" if minimal else "none"
+        found = "the minimal one of copolicy-convert" if minimal else "none"
         raise FileFormatError(root, f"a card ({CARD_FILE}); make one with copolicy-cards dataset", found)
-    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.of_folder(root)
+    released, present = Manifest.read(root / MANIFEST_FILE), Manifest.from_folder(root)
     differences = released.differences(present)
-    about = {CHECK_FILE, CROISSANT_FILE}
-    changed = [line for line in released.differences(present, without=about) if line.startswith(_CHECKED)]
+    unchecked = {CHECK_FILE, CROISSANT_FILE}
+    changed = [line for line in released.differences(present, without=unchecked) if line.startswith(_DATA_FOLDERS)]
     content_hash = read_content(root).hash
     if content_hash != record.content_hash or changed:
         reason = changed[0] if changed else f"content hash {content_hash}"
-        raise RunError(f"{root}: expected what release {record.version} holds, found that {reason}; release it first")
+        raise RunError(f"{root}: expected the content of release {record.version}, found {reason}; release it first")
     if differences:
         replace_text(root / MANIFEST_FILE, present.to_text())
     return record, present
 
 
-def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:
+def _require_unpublished(api: HfApi, repository: Repository, record: ReleaseRecord) -> None:
     tag = record.data_version.tag
     if tag in repository.tags:
         text = read_file(api, repository.repo_id, repository.tags[tag], RELEASE_FILE)
         name = f"{RELEASE_FILE} of {tag} in {repository.repo_id}"
         published = parse_json(text, dict[str, Any], "the record of a release", name) if text else {}
         content_hash = published.get("content_hash")
-        what = "this content" if content_hash == record.content_hash else f"other content ({content_hash})"
-        raise RunError(f"{repository.repo_id}: {tag} is on the Hub already, with {what}; nothing was uploaded")
-    latest = newest(list(repository.tags))
+        description = "this content" if content_hash == record.content_hash else f"other content ({content_hash})"
+        raise RunError(f"{repository.repo_id}: {tag} is on the Hub already, with {description}; nothing was uploaded")
+    latest = newest_version(list(repository.tags))
     if latest is not None and latest > record.data_version:
         raise RunError(
             f"{repository.repo_id}: expected a release after {latest.tag}, which is on the Hub, found {tag}; "
@@ -164,12 +164,12 @@ def _refuse_published(api: HfApi, repository: Repository, record: ReleaseRecord)
         )
 
 
-def _committed(api: HfApi, repository: Repository, manifest: Manifest, recordings: RawRecordings | None) -> str | None:
-    """The head, where it holds exactly what would be committed."""
-    wanted = {MANIFEST_FILE: manifest}
+def _find_head(api: HfApi, repository: Repository, manifest: Manifest, recordings: RawRecordings | None) -> str | None:
+    """The head commit if it already has exactly the files to be committed, else None."""
+    manifests = {MANIFEST_FILE: manifest}
     if recordings is not None:
-        wanted[RAW_MANIFEST_FILE] = recordings.manifest
-    for name, expected in wanted.items():
+        manifests[RAW_MANIFEST_FILE] = recordings.manifest
+    for name, expected in manifests.items():
         if read_file(api, repository.repo_id, repository.head, name) != expected.to_text().encode():
             return None
     return repository.head
@@ -185,18 +185,18 @@ def _commit(
 ) -> str:
     sources: dict[str, Path | bytes] = {name: root / name for name in manifest.files}
     sources[MANIFEST_FILE] = manifest.to_text().encode()
-    kept: set[str] = set()
+    raw_files: set[str] = set()
     if recordings is not None:
         sources.update(recordings.files)
         sources[RAW_MANIFEST_FILE] = recordings.manifest.to_text().encode()
-    elif there := read_file(api, repository.repo_id, repository.head, RAW_MANIFEST_FILE):
-        wanted = still_wanted(root, Manifest.from_text(there.decode()))
-        kept = set(wanted.files)
-        if kept:
-            sources[RAW_MANIFEST_FILE] = wanted.to_text().encode()
+    elif published_manifest := read_file(api, repository.repo_id, repository.head, RAW_MANIFEST_FILE):
+        remaining = remaining_recordings(root, Manifest.from_text(published_manifest.decode()))
+        raw_files = set(remaining.files)
+        if raw_files:
+            sources[RAW_MANIFEST_FILE] = remaining.to_text().encode()
     with hub_errors(repository.repo_id, "uploading"):
         files = api.list_repo_files(repository.repo_id, repo_type="dataset", revision=repository.head)
-        stale = [name for name in files if not (name in sources or name in kept or name.startswith("."))]
+        stale = [name for name in files if not (name in sources or name in raw_files or name.startswith("."))]
         commit = api.create_commit(
             repository.repo_id,
             [
@@ -212,8 +212,8 @@ def _commit(
     return commit.oid
 
 
-def _move_tag(api: HfApi, repository: Repository, tag: str, commit: str) -> None:
-    """LeRobot loads what its format's tag names; the Hub moves no tag, so it is set anew."""
+def _set_tag(api: HfApi, repository: Repository, tag: str, commit: str) -> None:
+    """Sets a tag such as the format version that LeRobot loads; the Hub cannot move a tag, so it is deleted first."""
     if repository.tags.get(tag) == commit:
         return
     if tag in repository.tags:

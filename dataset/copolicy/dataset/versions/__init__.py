@@ -1,1 +1,1 @@
-"""Versions of a data set: what it holds as one hash, releases of it, and what differs between two."""
+"""Versions of a data set: its content hash, releases, and the differences between two versions."""

@@ -2,51 +2,49 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from ..command_line.commands import add_command
-from ..command_line.extras import TABLES
+from ..command_line.commands import Commands, add_command
 from ..exceptions import CopolicyError, RunError
 
-_SHOWN = 20
+_MAX_SHOWN = 20
 
 
-def add_release_command(commands: argparse._SubParsersAction) -> None:
+def add_release_command(commands: Commands) -> None:
     """Adds `release`."""
     parser = add_command(
         commands,
         "release",
         _release,
-        "give a data set its next version: content hash, manifest and change log",
+        "release the next version of a data set: writes content hash, manifest and change log",
         'copolicy-dataset release outputs/dataset --bump minor --notes "Session of pair 3"',
-        TABLES,
     )
     parser.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     parser.add_argument(
         "--bump",
         required=True,
         choices=("major", "minor", "patch"),
-        help="major: features, rate or existing frames changed, or episodes went; minor: episodes were added or "
-        "excluded; patch: metadata, card or statistics were corrected",
+        help="major: features, rate or existing frames changed, or episodes were removed; minor: episodes were added "
+        "or excluded; patch: metadata, card or statistics were corrected",
     )
-    parser.add_argument("--notes", required=True, help="what a reader should know, for the change log")
+    parser.add_argument("--notes", required=True, help="text of this release in the change log")
 
 
-def add_diff_command(commands: argparse._SubParsersAction) -> None:
+def add_diff_command(commands: Commands) -> None:
     """Adds `diff`."""
     parser = add_command(
         commands,
         "diff",
         _diff,
-        "say what differs between two data sets; exit status 0 same, 1 different, 2 trouble",
+        "list the differences between two data sets; exit status 0: same, 1: different, 2: error",
         "copolicy-dataset diff outputs/dataset@1.0.0 outputs/dataset",
-        TABLES,
     )
-    what = "folder, FOLDER@x.y.z (a release), or U/N[@REVISION] on the Hub, such as my-lab/table@data-1.0.0"
-    parser.add_argument("a", metavar="A", help=what)
-    parser.add_argument("b", metavar="B", help="the same, after")
+    input_help = "folder, FOLDER@x.y.z (a release), or U/N[@REVISION] on the Hub, such as my-lab/table@data-1.0.0"
+    parser.add_argument("a", metavar="A", help=input_help)
+    parser.add_argument("b", metavar="B", help="data set to compare with A")
 
 
-def _release(arguments: argparse.Namespace) -> dict:
+def _release(arguments: argparse.Namespace) -> dict[str, Any]:
     from .release import release
 
     record = release(arguments.root, arguments.bump, arguments.notes)
@@ -59,14 +57,14 @@ def _release(arguments: argparse.Namespace) -> dict:
     }
 
 
-def _diff(arguments: argparse.Namespace) -> dict:
+def _diff(arguments: argparse.Namespace) -> dict[str, Any]:
+    from .diff_inputs import compare_statistics, read_diff_input
     from .difference import compare
-    from .sources import compare_statistics, read_side
 
     try:
-        a, b = read_side(arguments.a), read_side(arguments.b)
+        a, b = read_diff_input(arguments.a), read_diff_input(arguments.b)
     except RunError as error:
-        # Like diff(1): a status of 1 says that both were read and differ.
+        # As in diff(1), exit status 1 means that both were read and differ.
         raise CopolicyError(str(error)) from None
     difference = compare(a.content, b.content)
     summary: dict = {
@@ -83,15 +81,15 @@ def _diff(arguments: argparse.Namespace) -> dict:
         return {**summary, **difference.to_json(), "statistics": statistics}
     for number, change in enumerate(difference.changes):
         summary[f"change {number + 1}"] = f"{change.text} ({change.bump})"
-    for uuid, columns in list(difference.episodes_changed.items())[:_SHOWN]:
+    for uuid, columns in list(difference.episodes_changed.items())[:_MAX_SHOWN]:
         summary[f"episode {uuid}"] = ", ".join(columns)
-    if len(difference.episodes_changed) > _SHOWN:
-        summary["further episodes"] = f"{len(difference.episodes_changed) - _SHOWN} (see --json)"
+    if len(difference.episodes_changed) > _MAX_SHOWN:
+        summary["further episodes"] = f"{len(difference.episodes_changed) - _MAX_SHOWN} (see --json)"
     if statistics is None:
-        summary["statistics"] = "not compared: stored on one side at most"
+        summary["statistics"] = "not compared: not stored for both data sets"
     else:
-        shown = {name: f"{before} -> {after}" for name, (before, after) in list(statistics.items())[:_SHOWN]}
+        shown = {name: f"{before} -> {after}" for name, (before, after) in list(statistics.items())[:_MAX_SHOWN]}
         summary["statistics"] = shown or "same"
-        if len(statistics) > _SHOWN:
-            summary["further statistics"] = f"{len(statistics) - _SHOWN} (see --json)"
+        if len(statistics) > _MAX_SHOWN:
+            summary["further statistics"] = f"{len(statistics) - _MAX_SHOWN} (see --json)"
     return summary

@@ -1,18 +1,18 @@
-"""What a data set holds, apart from how its files are cut, compressed and ordered; and the hash of it.
+"""Reads the content of a data set and its hash, independent of how files are split, compressed and ordered.
 
-The content hash `copolicy-content-1:sha256:HEX` is the sha256 of `canonical.encode` of a dict with
+The content hash `copolicy-content-1:sha256:HEX` is the sha256 of `digests.encode` of a dict with
 
 * `format`: `copolicy-content-1`
-* `fps`, `robot_type`, `features` (the table of `meta/info.json`), `tasks` (the sentences, sorted)
-* `episodes`: the digest of each episode in order, the sha256 of `canonical.encode` of its length, its episode columns
-  (exclusions are among them) and the digests of its features (`frames.frame_digests`, `videos.video_digest`)
+* `fps`, `robot_type`, `features` (the dict in `meta/info.json`), `tasks` (the sentences, sorted)
+* `episodes`: the digest of each episode in order, the sha256 of `digests.encode` of its length, its episode columns
+  (including exclusions) and the digests of its features (`frame_digests.frame_digests` and `video_digest`)
 
-An episode column of later versions (`UNHASHED_DEFAULTS`) counts only where it says something, so that a data set has
-one hash with and without it.
+An episode column of later versions (`UNHASHED_DEFAULTS`) counts only if its value is not the default, so that the
+hash is the same with and without the column.
 
-Left out on purpose: where things lie (chunk, file, row group, compression, order of columns and of rows, the running
-numbers of frames and episodes), what is computed from the frames (statistics), and what describes (the card, the
-figures, `meta/copolicy.json`). A manifest covers those.
+The hash excludes the storage layout (chunk, file, row group, compression, order of columns and rows, indices of
+frames and episodes), values computed from the frames (statistics), and descriptions (the card, the figures,
+`meta/copolicy.json`). The manifest covers those.
 """
 
 import math
@@ -26,19 +26,18 @@ from ..files.meta_files import EPISODES_FOLDER
 from ..lerobot_folder.folder import LeRobotFolder
 from ..lerobot_folder.references import read_tasks, video_span
 from .digests import Content, EpisodeContent, digest
-from .frames import frame_digests, video_digest
+from .frame_digests import frame_digests, video_digest
 
-_LAYOUT = ("data/", "meta/episodes/", "videos/", "stats/")
-_POSITION = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}
-_DIGITS = 16  # of a column's digest; it is compared, never trusted
+_STORAGE_PREFIXES = ("data/", "meta/episodes/", "videos/", "stats/")
+_POSITION_COLUMNS = {"episode_index", "length", "dataset_from_index", "dataset_to_index"}
+_DIGEST_LENGTH = 16  # enough to compare columns; security rests on the full digest
 
 
 def read_content(root: Path) -> Content:
-    """Reads a LeRobot v3 data set folder.
+    """Reads the content of a LeRobot v3 data set folder.
 
     Raises:
-        FileFormatError: no such data set, one without `episode_uuid`, or one that contradicts itself.
-        MissingExtraError: pyarrow is not installed.
+        FileFormatError: no such data set, one without `episode_uuid`, or an inconsistent one.
     """
     folder = LeRobotFolder.open(root)
     info, rows = folder.info, _read_episodes(folder)
@@ -62,16 +61,16 @@ def _episode(root: Path, info: dict, row: dict[str, Any], features: dict[str, st
     columns = {
         name: digest(value)
         for name, value in row.items()
-        if name not in _POSITION
-        and not name.startswith(_LAYOUT)
+        if name not in _POSITION_COLUMNS
+        and not name.startswith(_STORAGE_PREFIXES)
         and (name not in UNHASHED_DEFAULTS or value not in (None, UNKNOWN_VALUES[name]))
     }
     return EpisodeContent(
         row["episode_uuid"],
         digest({"frames": row["length"], "features": features, "columns": columns}),
         row["length"],
-        {name: text[:_DIGITS] for name, text in sorted(features.items())},
-        {name: text[:_DIGITS] for name, text in sorted(columns.items())},
+        {name: text[:_DIGEST_LENGTH] for name, text in sorted(features.items())},
+        {name: text[:_DIGEST_LENGTH] for name, text in sorted(columns.items())},
     )
 
 
@@ -80,12 +79,12 @@ def _read_episodes(folder: LeRobotFolder) -> list[dict[str, Any]]:
     uuids = Counter(row["episode_uuid"] for row in folder.rows(("episode_uuid",)))
     uuid, episodes = uuids.most_common(1)[0]
     if episodes > 1 or "" in uuids:
-        found = f"{episodes} with {uuid!r}" if episodes > 1 else "one with none"
-        raise FileFormatError(root / EPISODES_FOLDER, "an episode_uuid of its own for each episode", found)
-    # A file of a merge may lack a column that another has; LeRobot reads it as null.
-    return [{name: _known(name, value) for name, value in row.items()} for row in folder.episodes.to_pylist()]
+        found = f"{episodes} with {uuid!r}" if episodes > 1 else "an episode without one"
+        raise FileFormatError(root / EPISODES_FOLDER, "a unique episode_uuid for each episode", found)
+    # After a merge a file may lack a column that another file has; LeRobot reads it as null.
+    return [{name: _null_as_nan(name, value) for name, value in row.items()} for row in folder.episodes.to_pylist()]
 
 
-def _known(name: str, value: Any) -> Any:
-    """A number that is not known is null in a table, NaN in those of earlier versions: one content."""
+def _null_as_nan(name: str, value: Any) -> Any:
+    """An unknown number is null, in data sets of earlier versions NaN; both are hashed as NaN."""
     return math.nan if value is None and EPISODE_COLUMNS.get(name) == "float" else value

@@ -1,8 +1,8 @@
-"""What differs between two contents, and how large a step of the version it asks for.
+"""Differences between two contents, and the smallest version bump that each requires.
 
-| step | what changed |
+| bump | change |
 |---|---|
-| major | rate, robot type, features; a task, an episode column or an episode went; other frames or another number |
+| major | rate, robot type, features; a task, an episode column or an episode removed; changed frames or numbers |
 | minor | episodes, an episode column or a task were added; episodes were excluded or included |
 | patch | values of episode columns were corrected; other files (card, statistics, figures, layout) |
 """
@@ -16,14 +16,14 @@ from .digests import Content, EpisodeContent
 from .withdrawals import is_anonymous
 
 EXCLUSION = "discarded"
-"""The episode column that tells training to leave an episode out."""
+"""The episode column that marks an episode as excluded from training."""
 
-_SHOWN = 5
+_MAX_SHOWN = 5
 
 
 @dataclass(frozen=True)
 class Change:
-    """One line of what changed, and the smallest step of the version for it."""
+    """One line of the change log, and the smallest version bump that it requires."""
 
     bump: Bump
     text: str
@@ -31,16 +31,16 @@ class Change:
 
 @dataclass(frozen=True)
 class Difference:
-    """From one content to another.
+    """Differences from one content to another; episodes are listed by `episode_uuid`.
 
     Attributes:
         schema: changes of rate, robot type, features, tasks and the set of episode columns.
-        episodes_added, episodes_removed: by `episode_uuid`, in order.
-        episodes_changed: for each `episode_uuid` in both, the features and episode columns whose values differ.
+        episodes_added, episodes_removed: in the order of the content that has them.
+        episodes_changed: for each episode in both, the features and episode columns whose values differ.
         renumbered: episodes in both whose number differs.
-        frames_changed: those of `episodes_changed` with other frames, not only other episode columns.
+        frames_changed: those of `episodes_changed` with different frames, not only episode columns.
         exclusions_changed: those of `episodes_changed` that `copolicy-dataset exclude` excluded or included.
-        withdrawn: those of `episodes_removed` that nothing names any more (`withdrawals`).
+        withdrawn: anonymous entries of `episodes_removed` (see `withdrawals`).
     """
 
     schema: tuple[Change, ...]
@@ -54,45 +54,45 @@ class Difference:
 
     @property
     def same(self) -> bool:
-        """Whether nothing differs."""
+        """Whether there is no difference."""
         return not self.changes
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """All changes, the largest step first."""
-        told = {*self.frames_changed, *self.exclusions_changed}
-        metadata = [uuid for uuid in self.episodes_changed if uuid not in told]
+        """All changes, the largest bump first."""
+        listed_uuids = {*self.frames_changed, *self.exclusions_changed}
+        metadata = [uuid for uuid in self.episodes_changed if uuid not in listed_uuids]
         columns = {name for uuid in metadata for name in self.episodes_changed[uuid]}
         removed = [uuid for uuid in self.episodes_removed if uuid not in self.withdrawn]
-        found = [
+        changes = [
             *self.schema,
-            *_withdrawn(len(self.withdrawn)),
-            *_counted("major", "removed", removed),
-            *_counted("major", "with other frames", self.frames_changed),
-            *_counted("major", "with another number", self.renumbered),
-            *_counted("minor", "added", self.episodes_added),
-            *_counted("minor", "excluded or included again", self.exclusions_changed),
-            *_counted("patch", f"with other values of {', '.join(sorted(columns))}", metadata),
+            *_withdrawal_changes(len(self.withdrawn)),
+            *_episode_changes("major", "removed", removed),
+            *_episode_changes("major", "with other frames", self.frames_changed),
+            *_episode_changes("major", "with another number", self.renumbered),
+            *_episode_changes("minor", "added", self.episodes_added),
+            *_episode_changes("minor", "excluded or included again", self.exclusions_changed),
+            *_episode_changes("patch", f"with other values of {', '.join(sorted(columns))}", metadata),
         ]
-        return tuple(sorted(found, key=lambda change: -BUMPS.index(change.bump)))
+        return tuple(sorted(changes, key=lambda change: -BUMPS.index(change.bump)))
 
     def to_json(self) -> dict[str, Any]:
-        """For `--json`."""
+        """The fields for `--json`."""
         fields = asdict(self)
         return {**fields, "schema": [change.text for change in self.schema]}
 
 
 def compare(before: Content, after: Content) -> Difference:
-    """What changed from one content to the next; episodes are told apart by `episode_uuid`."""
+    """Compares two contents; episodes are matched by `episode_uuid`."""
     old = {episode.episode_uuid: (number, episode) for number, episode in enumerate(before.episodes)}
     new = {episode.episode_uuid: (number, episode) for number, episode in enumerate(after.episodes)}
     common = [uuid for uuid in new if uuid in old]
-    kept_features = before.features.keys() & after.features.keys()
+    common_features = before.features.keys() & after.features.keys()
     changed, frames = {}, []
     for uuid in common:
         a, b = old[uuid][1], new[uuid][1]
-        features = _differing(a.features, b.features, kept_features)
-        columns = _differing(a.columns, b.columns, a.columns.keys() & b.columns.keys())
+        features = _differing_keys(a.features, b.features, common_features)
+        columns = _differing_keys(a.columns, b.columns, a.columns.keys() & b.columns.keys())
         if a.frames != b.frames:
             features.append("length")
         if features or columns:
@@ -128,34 +128,34 @@ def _schema_changes(before: Content, after: Content) -> Iterable[Change]:
         yield from _set_changes("episode column", _columns(before.episodes), _columns(after.episodes))
 
 
-def _set_changes(kind: str, before: Iterable[str], after: Iterable[str]) -> Iterable[Change]:
+def _set_changes(noun: str, before: Iterable[str], after: Iterable[str]) -> Iterable[Change]:
     for name in sorted(set(before) - set(after)):
-        yield Change("major", f"{kind} {name!r} removed")
+        yield Change("major", f"{noun} {name!r} removed")
     for name in sorted(set(after) - set(before)):
-        yield Change("minor", f"{kind} {name!r} added")
+        yield Change("minor", f"{noun} {name!r} added")
 
 
 def _columns(episodes: tuple[EpisodeContent, ...]) -> Iterable[str]:
     return next((episode.columns for episode in episodes if episode.columns), {})  # the same in all
 
 
-def _differing(a: dict[str, str], b: dict[str, str], names: Iterable[str]) -> list[str]:
+def _differing_keys(a: dict[str, str], b: dict[str, str], names: Iterable[str]) -> list[str]:
     return sorted(name for name in names if a.get(name) != b.get(name))
 
 
-def _withdrawn(count: int) -> Iterable[Change]:
+def _withdrawal_changes(count: int) -> Iterable[Change]:
     if count:
         yield Change("major", withdrawal_text(count))
 
 
 def withdrawal_text(count: int) -> str:
-    """The line of a change log for withdrawn episodes: how many, not which."""
-    what = "episode" if count == 1 else "episodes"
-    return f"{count} {what} removed: withdrawn by people who took part"
+    """The line of the change log for withdrawn episodes: their number, not their names."""
+    noun = "episode" if count == 1 else "episodes"
+    return f"{count} {noun} removed: withdrawn by people who took part"
 
 
-def _counted(bump: Bump, what: str, uuids: Iterable[str]) -> Iterable[Change]:
+def _episode_changes(bump: Bump, description: str, uuids: Iterable[str]) -> Iterable[Change]:
     uuids = list(uuids)
     if uuids:
-        shown = ", ".join(uuids[:_SHOWN]) + (", ..." if len(uuids) > _SHOWN else "")
-        yield Change(bump, f"{len(uuids)} {'episode' if len(uuids) == 1 else 'episodes'} {what}: {shown}")
+        shown = ", ".join(uuids[:_MAX_SHOWN]) + (", ..." if len(uuids) > _MAX_SHOWN else "")
+        yield Change(bump, f"{len(uuids)} {'episode' if len(uuids) == 1 else 'episodes'} {description}: {shown}")

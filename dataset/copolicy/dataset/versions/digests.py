@@ -1,4 +1,4 @@
-"""What two data sets are compared by: a digest of each episode, feature and episode column. Plain data."""
+"""Digests that data sets are compared by: one for each episode, feature and episode column."""
 
 import hashlib
 import math
@@ -9,20 +9,20 @@ from typing import Any
 from ..exceptions import InvalidValueError
 
 Value = None | bool | int | float | str | bytes | list | tuple | dict
-"""What JSON or a row of a Parquet file may hold."""
+"""A value of JSON or of a Parquet row."""
 
 _NAN = struct.pack("<d", math.nan)
 
 
 FORMAT = "copolicy-content-1"
-"""Version of the algorithm; another one gives another prefix."""
+"""Version of the hash algorithm, the prefix of the content hash."""
 
 
 def encode(value: Value) -> bytes:
-    """A value as bytes: a letter for its type, its length where that varies, its content.
+    """Encodes a value as bytes: a letter for its type, its length if that varies, its content.
 
-    An integer is decimal digits, a float its 8 bytes (little-endian, one NaN for all), a text UTF-8, a dict its
-    items in the order of their keys. No two different values share their bytes; `1`, `1.0` and `True` differ.
+    Integers are decimal digits, floats 8 bytes (little-endian, one bit pattern for every NaN), texts UTF-8, dicts
+    their items sorted by key. Different values have different bytes; `1`, `1.0` and `True` differ.
 
     Raises:
         InvalidValueError: a value of another type.
@@ -53,19 +53,19 @@ def digest(value: Value) -> str:
     return hashlib.sha256(encode(value)).hexdigest()
 
 
-def _sized(kind: bytes, content: bytes) -> bytes:
-    return b"%s%d:" % (kind, len(content)) + content
+def _sized(prefix: bytes, content: bytes) -> bytes:
+    return b"%s%d:" % (prefix, len(content)) + content
 
 
 @dataclass(frozen=True)
 class EpisodeContent:
-    """One episode.
+    """Digests of one episode.
 
     Attributes:
-        digest: sha256 over everything in it.
-        frames: its length.
-        features: digest of each feature's values, shortened.
-        columns: digest of each episode column, shortened.
+        digest: sha256 over the whole episode.
+        frames: number of frames.
+        features: shortened digest of the values of each feature.
+        columns: shortened digest of each episode column.
     """
 
     episode_uuid: str
@@ -77,7 +77,7 @@ class EpisodeContent:
 
 @dataclass(frozen=True)
 class Content:
-    """Everything that two data sets are compared by."""
+    """Content of a data set as far as versions are compared: settings, tasks and digests of episodes."""
 
     fps: float
     robot_type: str | None
@@ -87,7 +87,7 @@ class Content:
 
     @property
     def hash(self) -> str:
-        """The content hash with its prefix."""
+        """The content hash, `copolicy-content-1:sha256:HEX`."""
         fields = {
             "format": FORMAT,
             "fps": float(self.fps),

@@ -1,4 +1,4 @@
-"""Makes a release of a data set folder: its record, its manifest and its change log in the form of Keep a Changelog."""
+"""Releases a data set folder: writes its record, manifest and change log (Keep a Changelog)."""
 
 import datetime
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 from ..exceptions import InvalidValueError, RunError
 from ..files.meta_files import CHANGELOG_FILE, CHECK_FILE, EARLIER_FOLDER, MANIFEST_FILE, RELEASE_FILE
 from ..files.staging import replacements
-from ..files.text_files import read_older_text
+from ..files.text_files import read_legacy_text
 from ..publication.data_version import BUMPS, Bump, DataVersion
 from .content import read_content
 from .difference import Change, compare, withdrawal_text
@@ -17,7 +17,7 @@ from .manifest import FileEntry, Manifest, file_entry
 from .release_record import ReleaseRecord, read_release
 from .withdrawals import read_withdrawals
 
-_HEAD = """# Changelog
+_CHANGELOG_HEAD = """# Changelog
 What changed in this data set, in the form of [Keep a Changelog](https://keepachangelog.com/en/1.1.0/).
 A version is `major.minor.patch`: major when features, rate or existing frames changed or episodes went, minor when
 episodes were added or excluded, patch when metadata or describing files were corrected.
@@ -27,25 +27,25 @@ _HEADINGS = {"removed": "Removed", "added": "Added"}
 
 
 def release(root: Path, bump: Bump, notes: str, date: datetime.date | None = None) -> ReleaseRecord:
-    """Gives the folder's present content the next version: change log, record, manifest.
+    """Releases the present content of a folder as its next version: writes change log, record and manifest.
 
-    The first release counts from 0.0.0. The record is put in place last: a release that breaks off before has not
-    happened, and running it again completes it.
+    The first release is a bump of 0.0.0. The record is written last: an interrupted release is not visible, and
+    running it again completes it.
 
     Args:
-        date: of the release; today (UTC) by default.
+        date: date of the release; today (UTC) by default.
 
     Raises:
-        FileFormatError: no data set, or one that contradicts itself.
-        InvalidValueError: empty notes, or a bump smaller than what changed asks for.
+        FileFormatError: no data set, or an inconsistent one.
+        InvalidValueError: empty notes, or a bump smaller than the changes require.
         RunError: nothing changed since the last release.
     """
     notes = notes.strip()
     if not notes or any(line.startswith("## ") for line in notes.splitlines()):
-        raise InvalidValueError("--notes", "a text without headings of its own", notes)
+        raise InvalidValueError("--notes", "a text without lines that begin with '## '", notes)
     content = read_content(root)
-    manifest = Manifest.of_folder(root)
-    files_sha256 = manifest.digest(without=_own_files(manifest))
+    manifest = Manifest.from_folder(root)
+    files_sha256 = manifest.digest(without=_unhashed_files(manifest))
     last = read_release(root) if (root / RELEASE_FILE).exists() else None
     withdrawn = sum(entry["episodes"] for entry in read_withdrawals(root))
     changes = _changes(last, content, files_sha256, withdrawn)
@@ -68,21 +68,21 @@ def _changes(last: ReleaseRecord | None, content: Content, files_sha256: str, wi
     if last is None:
         frames = sum(episode.frames for episode in content.episodes)
         changes = (Change("minor", f"{len(content.episodes)} episodes added, {frames} frames"),)
-        return (*changes, *_never_released(withdrawn))
+        return (*changes, *_unreleased_withdrawals(withdrawn))
     difference = compare(last.content, content)
-    # Of what was withdrawn since, the last release may have held a part.
-    changes = (*difference.changes, *_never_released(withdrawn - last.withdrawn - len(difference.withdrawn)))
+    # The last release may have contained only some of the episodes withdrawn since.
+    changes = (*difference.changes, *_unreleased_withdrawals(withdrawn - last.withdrawn - len(difference.withdrawn)))
     if not changes and files_sha256 != last.files_sha256:
         return (Change("patch", "files changed beside the content (card, statistics, figures or layout)"),)
     return changes
 
 
-def _never_released(count: int) -> tuple[Change, ...]:
+def _unreleased_withdrawals(count: int) -> tuple[Change, ...]:
     return (Change("patch", f"{withdrawal_text(count)}; no release held them"),) if count > 0 else ()
 
 
-def _own_files(manifest: Manifest) -> set[str]:
-    """What a release writes, which changes by releasing; and the findings, which change by looking."""
+def _unhashed_files(manifest: Manifest) -> set[str]:
+    """Files written by a release itself, and the check findings, which every check rewrites."""
     earlier = {name for name in manifest.files if name.startswith(EARLIER_FOLDER + "/")}
     return {CHANGELOG_FILE, RELEASE_FILE, CHECK_FILE, *earlier}
 
@@ -91,11 +91,11 @@ def _write(
     root: Path, record: ReleaseRecord, changes: tuple[Change, ...], last: ReleaseRecord | None, manifest: Manifest
 ) -> None:
     changelog = root / CHANGELOG_FILE
-    before = read_older_text(changelog) if changelog.exists() else ""
+    before = read_legacy_text(changelog) if changelog.exists() else ""
     texts: dict[str, str] = {}
     if last is not None:
         texts[f"{EARLIER_FOLDER}/{last.version}.json"] = last.to_text()
-    texts[CHANGELOG_FILE] = with_release(
+    texts[CHANGELOG_FILE] = changelog_with_release(
         before, record.version, record.date, record.notes, changes, record.content_hash
     )
     texts[RELEASE_FILE] = record.to_text()
@@ -111,14 +111,16 @@ def _write(
         staged[MANIFEST_FILE].write_text(Manifest(entries).to_text(), encoding="utf-8")
 
 
-def with_release(text: str, version: str, date: str, notes: str, changes: Iterable[Change], content_hash: str) -> str:
-    """A change log with one more release on top; `text` is empty for the first.
+def changelog_with_release(
+    text: str, version: str, date: str, notes: str, changes: Iterable[Change], content_hash: str
+) -> str:
+    """Adds a release at the top of a change log; `text` is empty for the first release.
 
-    Whatever stands under `[Unreleased]` stays there; a section of the same version, which a release that broke off
-    left behind, is replaced.
+    A section `[Unreleased]` is kept above it; a section of the same version, left by an interrupted release, is
+    replaced.
     """
     sections = list(_SECTION.finditer(text))
-    head = text[: sections[0].start()] if sections else (text or _HEAD)
+    head = text[: sections[0].start()] if sections else (text or _CHANGELOG_HEAD)
     ends = [*(match.start() for match in sections[1:]), len(text)][: len(sections)]
     bodies = [(match["version"], text[match.start() : end]) for match, end in zip(sections, ends, strict=True)]
     unreleased = [body for name, body in bodies if name.lower() == "unreleased"]
@@ -130,8 +132,8 @@ def with_release(text: str, version: str, date: str, notes: str, changes: Iterab
 def _section(version: str, date: str, notes: str, changes: Iterable[Change], content_hash: str) -> str:
     groups: dict[str, list[str]] = {}
     for change in changes:
-        word = next((word for word in _HEADINGS if f" {word}" in change.text), None)
-        groups.setdefault(_HEADINGS.get(word or "", "Changed"), []).append(change.text)
+        keyword = next((keyword for keyword in _HEADINGS if f" {keyword}" in change.text), None)
+        groups.setdefault(_HEADINGS.get(keyword or "", "Changed"), []).append(change.text)
     lines = [f"## [{version}] - {date}", "", notes, "", f"Content hash: `{content_hash}`"]
     for heading in ("Added", "Changed", "Removed"):
         if heading in groups:

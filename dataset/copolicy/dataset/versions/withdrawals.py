@@ -1,7 +1,7 @@
-"""That episodes were withdrawn by the people who played them, and when; not which: `meta/copolicy_withdrawals.json`.
+"""The record of withdrawals, `meta/copolicy_withdrawals.json`: when participants withdrew how many episodes, not which.
 
-Earlier releases keep an entry without name or digest in the place of each, so that the next release can count what
-went; their content hash can no longer be worked out from their entries.
+In records of earlier releases an entry without name or digest replaces each withdrawn episode, so that the next
+release can count the removed episodes; the content hash of such a record cannot be recomputed.
 """
 
 import json
@@ -24,39 +24,39 @@ class _Withdrawal(TypedDict):
     episodes: int
 
 
-class _File(TypedDict):
+class _WithdrawalsDocument(TypedDict):
     withdrawals: list[_Withdrawal]
 
 
 def read_withdrawals(root: Path) -> list[dict[str, Any]]:
-    """Date and number of episodes of each withdrawal, oldest first; none where there is no record.
+    """Reads date and number of episodes of each withdrawal, oldest first; empty if there is no record.
 
     Raises:
-        FileFormatError: a record of another form.
+        FileFormatError: not a record of withdrawals.
     """
     path = root / WITHDRAWALS_FILE
     if not path.is_file():
         return []
-    entries = read_json(path, _File, f"a record of withdrawals ({_SCHEMA})")["withdrawals"]
+    entries = read_json(path, _WithdrawalsDocument, f"a record of withdrawals ({_SCHEMA})")["withdrawals"]
     return [{"date": entry["date"], "episodes": entry["episodes"]} for entry in entries]
 
 
 def withdrawals_text(entries: Iterable[dict[str, Any]]) -> str:
-    """The text of the file."""
+    """The record as JSON text."""
     return json.dumps({"schema": _SCHEMA, "withdrawals": list(entries)}, indent=2) + "\n"
 
 
 def is_anonymous(episode: EpisodeContent) -> bool:
-    """Whether an entry only says that an episode was there."""
+    """Whether an entry replaces a withdrawn episode."""
     return _ANONYMOUS.fullmatch(episode.episode_uuid) is not None
 
 
-def anonymised(content: Content, gone: Callable[[EpisodeContent], bool]) -> Content:
-    """A content with entries without name, length and digests in the place of some episodes."""
+def anonymise(content: Content, is_withdrawn: Callable[[EpisodeContent], bool]) -> Content:
+    """Replaces withdrawn episodes by entries without name, length and digests."""
     number = sum(is_anonymous(episode) for episode in content.episodes)
     episodes: list[EpisodeContent] = []
     for episode in content.episodes:
-        if gone(episode):
+        if is_withdrawn(episode):
             number += 1
             episode = EpisodeContent(f"withdrawn-{number}", "", 0, {}, {})
         episodes.append(episode)

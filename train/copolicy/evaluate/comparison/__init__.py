@@ -1,4 +1,4 @@
-"""Paired comparison of results: the same starts, two methods."""
+"""Paired comparison of study results: several methods on the same starts."""
 
 from .command import add_compare_command
 

@@ -1,31 +1,31 @@
-"""Methods side by side, and each against the first."""
+"""Summarises each method, and compares the first with each of the others."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from .paired import BOOTSTRAP, Key, Values, between_runs, mcnemar_exact, mean_over, paired_differences, welch
-from .results import Method, Result, subset
+from .paired import BOOTSTRAP, EpisodeKey, Metrics, between_runs, mcnemar_exact, mean_over, paired_differences, welch
+from .results import Method, StudyResult, subset
 
 DEFINITIONS = {
-    "success": "mean over training runs of a run's share of successes; standard error between runs (with one run: "
-    "binomial over its episodes, which says nothing about other training seeds)",
+    "success": "mean over training runs of a run's success rate; standard error between runs (with one run: "
+    "binomial over its episodes, which does not cover the choice of training seed)",
     "time_s": "mean over runs of a run's mean time of successes",
     "interaction_mean": "mean over runs of the mean over episodes of |interaction force|, full forces",
     "difference": "first method minus the second on the same starts, each episode the mean over a method's runs",
-    "bootstrap_95": f"{BOOTSTRAP}; the training runs are taken as they are",
+    "bootstrap_95": f"{BOOTSTRAP}; training runs are not resampled",
     "between_runs": "Welch's t interval of the difference between training runs, with two or more of each method",
-    "mcnemar": "exact, two-sided, with one run of each method and one episode a start",
+    "mcnemar": "exact, two-sided, with one run of each method and one episode per start",
 }
 
-Part = Callable[[Result], dict[Key, Values]]
+Subset = Callable[[StudyResult], dict[EpisodeKey, Metrics]]
 
 
 def compare(methods: Sequence[Method]) -> dict[str, Any]:
-    """Everything about some methods of one protocol, JSON-able."""
+    """Compares methods of one protocol; the returned dict can be written as JSON."""
     first = methods[0].runs[0]
-    parts = _parts(first)
+    subsets = _subsets(first)
     return {
         "study": first.study,
         "label": first.label,
@@ -36,17 +36,17 @@ def compare(methods: Sequence[Method]) -> dict[str, Any]:
                 **_summary([run.values for run in method.runs]),
                 "files": [str(run.path) for run in method.runs],
                 "per_run_success": [run.success for run in method.runs],
-                "parts": {name: _summary([part(run) for run in method.runs]) for name, part in parts.items()},
+                "parts": {name: _summary([select(run) for run in method.runs]) for name, select in subsets.items()},
             }
             for method in methods
         },
-        "differences": [_difference(methods[0], other, parts) for other in methods[1:]],
-        **_definitions(first),
+        "differences": [_difference(methods[0], second, subsets) for second in methods[1:]],
+        **_definition_entries(first),
     }
 
 
-def _definitions(first: Result) -> dict[str, dict[str, str]]:
-    """What the measures mean; the reason of one that the task lacks, where the result has it, stands apart."""
+def _definition_entries(first: StudyResult) -> dict[str, dict[str, str]]:
+    """The `definitions` of the measures, and `not_measured` with the reason for one that the task lacks."""
     if first.measures_interaction:
         return {"definitions": DEFINITIONS}
     reason = first.not_measured.get("interaction_force", "left out: no result has it")
@@ -54,18 +54,18 @@ def _definitions(first: Result) -> dict[str, dict[str, str]]:
     return {"definitions": definitions, "not_measured": {"interaction_mean": reason}}
 
 
-def _parts(first: Result) -> dict[str, Part]:
-    """By number of obstacles and, with partners, by kind."""
-    parts: dict[str, Part] = {}
+def _subsets(first: StudyResult) -> dict[str, Subset]:
+    """Selects episodes by number of obstacles and, in a partner study, by kind of partner."""
+    subsets: dict[str, Subset] = {}
     for count in sorted({row["obstacles"] for row in first.rows if "obstacles" in row}):
         name = f"{count} obstacle{'s' * (count != 1)}"
-        parts[name] = lambda run, count=count: subset(run, "obstacles", count)
+        subsets[name] = lambda run, count=count: subset(run, "obstacles", count)
     for kind in dict.fromkeys(row["partner"] for row in first.rows if "partner" in row):
-        parts[f"partner {kind}"] = lambda run, kind=kind: subset(run, "partner", kind)
-    return parts
+        subsets[f"partner {kind}"] = lambda run, kind=kind: subset(run, "partner", kind)
+    return subsets
 
 
-def _summary(runs: Sequence[Mapping[Key, Values]]) -> dict[str, Any]:
+def _summary(runs: Sequence[Mapping[EpisodeKey, Metrics]]) -> dict[str, Any]:
     success = between_runs(_run_means(runs, "success"))
     error, source = success["standard_error"], "between runs"
     if error is None:
@@ -78,31 +78,33 @@ def _summary(runs: Sequence[Mapping[Key, Values]]) -> dict[str, Any]:
     }
 
 
-def _run_means(runs: Sequence[Mapping[Key, Values]], name: str) -> list[float]:
+def _run_means(runs: Sequence[Mapping[EpisodeKey, Metrics]], name: str) -> list[float]:
     means = []
     for run in runs:
-        values = np.array([one.get(name, np.nan) for one in run.values()])
+        values = np.array([metrics.get(name, np.nan) for metrics in run.values()])
         finite = values[np.isfinite(values)]
         means.append(float(finite.mean()) if len(finite) else float("nan"))
     return means
 
 
-def _difference(one: Method, other: Method, parts: Mapping[str, Part]) -> dict[str, Any]:
+def _difference(first: Method, second: Method, subsets: Mapping[str, Subset]) -> dict[str, Any]:
     result: dict[str, Any] = {
-        "first": one.name,
-        "second": other.name,
-        **paired_differences(mean_over([r.values for r in one.runs]), mean_over([r.values for r in other.runs])),
-        "between_runs": welch([run.success for run in one.runs], [run.success for run in other.runs]),
+        "first": first.name,
+        "second": second.name,
+        **paired_differences(mean_over([r.values for r in first.runs]), mean_over([r.values for r in second.runs])),
+        "between_runs": welch([run.success for run in first.runs], [run.success for run in second.runs]),
         "mcnemar": None,
     }
-    a, b = one.runs[0], other.runs[0]
-    # More episodes on a start are no independent pairs.
+    a, b = first.runs[0], second.runs[0]
+    # McNemar's test needs independent pairs; several episodes on one start are not.
     starts = {(key[0], key[2]) for key in a.values}
-    if len(one.runs) == len(other.runs) == 1 and len(starts) == len(a.values):
+    if len(first.runs) == len(second.runs) == 1 and len(starts) == len(a.values):
         successes = [(values["success"] > 0, b.values[key]["success"] > 0) for key, values in a.values.items()]
         result["mcnemar"] = mcnemar_exact([x for x, _ in successes], [y for _, y in successes])
     result["parts"] = {
-        name: paired_differences(mean_over([part(r) for r in one.runs]), mean_over([part(r) for r in other.runs]))
-        for name, part in parts.items()
+        name: paired_differences(
+            mean_over([select(r) for r in first.runs]), mean_over([select(r) for r in second.runs])
+        )
+        for name, select in subsets.items()
     }
     return result

@@ -1,11 +1,11 @@
-"""The comparison as a table for a paper, a card or an issue."""
+"""Formats a comparison as Markdown tables."""
 
 from collections.abc import Mapping
 from typing import Any
 
 
 def markdown(comparison: Mapping[str, Any]) -> str:
-    """Methods in rows, then differences in rows, then what they mean."""
+    """Returns a table of the methods, a table of the differences, and the definitions of the measures."""
     methods, settings = comparison["methods"], comparison["settings"]
     parts = list(next(iter(methods.values()))["parts"])
     missing = comparison.get("not_measured", {})
@@ -15,28 +15,28 @@ def markdown(comparison: Mapping[str, Any]) -> str:
     rows = [
         [
             name,
-            str(one["success"]["runs"]),
-            f"{_percent(one['success'])} ({100 * one['success']['max']:.1f})",
-            *(_plain(one[measure], digits) for measure, (_, digits) in measures.items()),
-            *(_percent(one["parts"][part]["success"]) for part in parts),
+            str(method["success"]["runs"]),
+            f"{_percent(method['success'])} ({100 * method['success']['max']:.1f})",
+            *(_mean(method[measure], digits) for measure, (_, digits) in measures.items()),
+            *(_percent(method["parts"][part]["success"]) for part in parts),
         ]
-        for name, one in methods.items()
+        for name, method in methods.items()
     ]
     text = [
-        f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes a "
-        f"run, {settings.get('actions_per_plan', '?')} actions a plan, hold {settings.get('hold', '?')}, at most "
+        f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes per "
+        f"run, {settings.get('actions_per_plan', '?')} actions per chunk, hold {settings.get('hold', '?')}, at most "
         f"{settings.get('step_limit', '?')} steps ({comparison['label']}).",
         _table(["method", "runs", "success, % (max)", *labels, *(f"{part}, %" for part in parts)], rows),
     ]
     if comparison["differences"]:
         rows = [
             [
-                f"{one['first']} - {one['second']}",
-                _interval(one["success"], 100, 1),
-                *(_interval(one[measure], 1, digits) for measure, (_, digits) in measures.items()),
-                *_tests(one),
+                f"{difference['first']} - {difference['second']}",
+                _interval(difference["success"], 100, 1),
+                *(_interval(difference[measure], 1, digits) for measure, (_, digits) in measures.items()),
+                *_tests(difference),
             ]
-            for one in comparison["differences"]
+            for difference in comparison["differences"]
         ]
         text.append(_table(["difference", "success, points", *labels, "McNemar p", "between runs, points"], rows))
     notes = {name: comparison["definitions"][name] for name in ("success", "bootstrap_95", "between_runs")}
@@ -44,8 +44,8 @@ def markdown(comparison: Mapping[str, Any]) -> str:
     return "\n\n".join(text) + "\n"
 
 
-def _tests(one: Mapping[str, Any]) -> list[str]:
-    between, mcnemar = one["between_runs"], one["mcnemar"]
+def _tests(difference: Mapping[str, Any]) -> list[str]:
+    between, mcnemar = difference["between_runs"], difference["mcnemar"]
     return [
         f"{mcnemar['p']:.3g} ({mcnemar['only_first']} against {mcnemar['only_second']})" if mcnemar else "",
         "{:+.1f} to {:+.1f}, p {:.3g}".format(*(100 * bound for bound in between["interval_95"]), between["p"])
@@ -58,20 +58,20 @@ def _percent(success: Mapping[str, Any]) -> str:
     return f"{100 * success['mean']:.1f} ± {100 * success['standard_error']:.1f}"
 
 
-def _plain(value: Mapping[str, Any], digits: int) -> str:
+def _mean(value: Mapping[str, Any], digits: int) -> str:
     if value["mean"] is None:
         return "none"
     error = value["standard_error"]
     return f"{value['mean']:.{digits}f}" + ("" if error is None else f" ± {error:.{digits}f}")
 
 
-def _interval(one: Mapping[str, Any], scale: float, digits: int) -> str:
-    if one["mean"] is None:
+def _interval(difference: Mapping[str, Any], scale: float, digits: int) -> str:
+    if difference["mean"] is None:
         return "none"
-    mean = f"{scale * one['mean']:+.{digits}f}"
-    if one["bootstrap_95"] is None:
+    mean = f"{scale * difference['mean']:+.{digits}f}"
+    if difference["bootstrap_95"] is None:
         return mean
-    low, high = (f"{scale * bound:+.{digits}f}" for bound in one["bootstrap_95"])
+    low, high = (f"{scale * bound:+.{digits}f}" for bound in difference["bootstrap_95"])
     return f"{mean} ({low} to {high})"
 
 

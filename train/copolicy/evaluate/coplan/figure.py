@@ -1,4 +1,4 @@
-"""A picture of a study: the paths of all episodes, one panel for each set of obstacles."""
+"""Figure of a co-planning study: the paths of all episodes, one panel for each set of obstacles."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -20,29 +20,29 @@ from copolicy.dataset.outline_figure import (
     show_whole,
 )
 
-from .rollouts import Outcome
+from .rollouts import EpisodeResult
 
 
-def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> None:
-    """Draws all outcomes into a PNG.
+def save_path_figure(episodes: Sequence[EpisodeResult], path: Path, title: str) -> None:
+    """Draws the paths of all episodes into a PNG.
 
     Raises:
-        CopolicyError: their task has no outline.
+        CopolicyError: the task has no outline.
     """
-    task = outcomes[0].task
+    task = episodes[0].task
     outline = task.required_outline
-    groups: dict[tuple, list[Outcome]] = defaultdict(list)
-    for outcome in outcomes:
-        groups[obstacles_of(outline.fixed(outcome.map_config))].append(outcome)
+    groups: dict[tuple, list[EpisodeResult]] = defaultdict(list)
+    for episode in episodes:
+        groups[obstacles_of(outline.fixed(episode.scenario))].append(episode)
     figure = Figure(dpi=110, layout="constrained")
     ordered = sorted(groups, key=lambda obstacles: (len(obstacles), obstacles))
     for obstacles, axes in zip(ordered, panels(figure, outline, len(groups), 4, 0.7), strict=True):
         members = groups[obstacles]
-        draw_fixed(axes, (shape for outcome in members for shape in outline.fixed(outcome.map_config)))
+        draw_fixed(axes, (shape for episode in members for shape in outline.fixed(episode.scenario)))
         _draw_paths(axes, members)
         show_whole(axes, outline)
-        around = f"{len(obstacles)} obstacle{'s' * (len(obstacles) != 1)}: " if any(groups) else ""
-        axes.set_title(f"{around}{sum(outcome.success for outcome in members)} of {len(members)}", fontsize=9)
+        heading = f"{len(obstacles)} obstacle{'s' * (len(obstacles) != 1)}: " if any(groups) else ""
+        axes.set_title(f"{heading}{sum(episode.success for episode in members)} of {len(members)}", fontsize=9)
     handles = [
         Line2D([], [], color=BLUE, label=task.words.success),
         Line2D([], [], color=FAILURE, linestyle="--", marker="x", label="did not"),
@@ -55,11 +55,11 @@ def save_trajectories(outcomes: Sequence[Outcome], path: Path, title: str) -> No
         figure.savefig(partial, format="png")
 
 
-def _draw_paths(axes, outcomes: Sequence[Outcome]) -> None:
-    for outcome in outcomes:
-        assert outcome.path is not None  # its task has an outline
-        colour, style = (BLUE, "-") if outcome.success else (FAILURE, "--")
-        axes.plot(*outcome.path.T, style, color=colour, linewidth=1, alpha=0.75)
-        axes.plot(*outcome.path[0], "o", color="black", markersize=3)
-        if not outcome.success:
-            axes.plot(*outcome.path[-1], "x", color=FAILURE, markersize=6)
+def _draw_paths(axes, episodes: Sequence[EpisodeResult]) -> None:
+    for episode in episodes:
+        assert episode.path is not None  # its task has an outline
+        colour, style = (BLUE, "-") if episode.success else (FAILURE, "--")
+        axes.plot(*episode.path.T, style, color=colour, linewidth=1, alpha=0.75)
+        axes.plot(*episode.path[0], "o", color="black", markersize=3)
+        if not episode.success:
+            axes.plot(*episode.path[-1], "x", color=FAILURE, markersize=6)

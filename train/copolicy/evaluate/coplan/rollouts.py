@@ -1,8 +1,8 @@
-"""The paper's co-planning study: both players act on one sampled plan, on every map of a set at once.
+"""The paper's co-planning study: both players execute one sampled action chunk, in all scenarios of a set in parallel.
 
-Protocol (paper, section V-A): from the last To observations a joint plan is sampled, its first actions are executed,
-then the next plan is sampled. A plan lives at the data set's rate, so each of its actions is held for record_hz / fps
-steps of the world (the original program's evaluation skips that hold and plays a 10 Hz plan three times too fast).
+Protocol (paper, section V-A): a joint action chunk is sampled from the last To observations, its first n_action_steps
+actions are executed, then the next chunk is sampled. Chunks have the data set's rate: each action is held for
+record_hz / fps steps (the original program's evaluation omits this hold and plays 10 Hz chunks three times too fast).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,97 +13,100 @@ import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent
 from copolicy.collect.rollout import Rollout, Trace
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask, get_task
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """One episode of a study.
+class EpisodeResult:
+    """Result of one episode of a study.
 
     Attributes:
-        path: `(steps + 1, 2)` of the point that the task follows, in the unit of its outline; None: it has none.
-        interaction: `(steps,)` the task's interaction measure; None: it has none.
-        task: that it is of.
+        map_index: position of the scenario in the study's list.
+        chunks: number of action chunks that were predicted.
+        path: `(steps + 1, 2)` of the task's tracked point, in the unit of its outline; None if it has no outline.
+        interaction: `(steps,)` the task's interaction measure; None if it has none.
     """
 
     map_index: int
-    map_config: Any
+    scenario: Any
     repeat: int
     success: bool
     reason: str
-    plans: int
-    path: np.ndarray | None
-    interaction: np.ndarray | None
+    chunks: int
+    path: Array | None
+    interaction: Array | None
     task: PairTask = field(default_factory=get_task, kw_only=True, repr=False)
     end: int | None = field(default=None, kw_only=True, repr=False)
 
     @property
     def steps(self) -> int:
-        """Steps of the world."""
+        """Number of steps of the world."""
         return len(self.interaction) if self.end is None and self.interaction is not None else int(self.end or 0)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The row of `eval.json`."""
         return {
             "map_index": self.map_index,
-            "map_id": self.task.identify(self.map_config)[0],
-            **self.task.studies.factors(self.map_config),
+            "map_id": self.task.identify(self.scenario)[0],
+            **self.task.studies.factors(self.scenario),
             "repeat": self.repeat,
             "success": self.success,
             "reason": self.reason,
             "steps": self.steps,
             "time_s": self.steps / self.task.spec.record_hz,
-            "plans": self.plans,
+            "plans": self.chunks,
             **interaction_columns(self.interaction),
         }
 
 
-def interaction_columns(interaction: np.ndarray | None) -> dict[str, float | None]:
-    """The columns of an episode's row with its interaction `(T,)`; null where the task does not measure it."""
-    size = None if interaction is None else np.abs(interaction)
+def interaction_columns(interaction: Array | None) -> dict[str, float | None]:
+    """The interaction columns of an episode's row, from `(T,)` values; null where the task does not measure it."""
+    magnitude = None if interaction is None else np.abs(interaction)
     return {
-        "interaction_mean": None if size is None else float(size.mean()),
-        "interaction_p95": None if size is None else float(np.quantile(size, 0.95)),
+        "interaction_mean": None if magnitude is None else float(magnitude.mean()),
+        "interaction_p95": None if magnitude is None else float(np.quantile(magnitude, 0.95)),
     }
 
 
 def coplan(
     policy: Policy,
-    maps: Sequence[Any],
-    physics: Any,
+    scenarios: Sequence[Any],
+    settings: Any,
     *,
     repeats: int = 1,
     fps: int | None = None,
     seed: int = 0,
     on_step: Callable[[int], object] = lambda finished: None,
-) -> list[Outcome]:
-    """Runs every map `repeats` times, all of them through one call of the policy a plan.
+) -> list[EpisodeResult]:
+    """Runs every scenario `repeats` times; the chunks of all episodes are predicted in one batch.
 
     Args:
-        policy: whose `n_action_steps` are executed of each action chunk.
-        fps: rate at which its actions are held; that of the data set that it was trained on if None.
+        policy: policy of which `n_action_steps` actions of each chunk are executed.
+        settings: settings of the world.
+        fps: actions per second; the rate of the policy's training data if None.
         on_step: called after each step with the number of finished episodes.
 
     Returns:
-        One outcome for each map and repeat, in that order.
+        One result for each scenario and repeat, in that order.
     """
-    episodes = [(index, config, repeat) for index, config in enumerate(maps) for repeat in range(repeats)]
+    episodes = [(index, scenario, repeat) for index, scenario in enumerate(scenarios) for repeat in range(repeats)]
     agent = PolicyAgent(policy, get_task(policy.task), fps=fps, seed=seed)
-    rollout = together(agent, [config for _, config, _ in episodes], physics)
-    trace = traced_to_the_end(rollout, on_step)
+    rollout = coplanning_rollout(agent, [scenario for _, scenario, _ in episodes], settings)
+    trace = run_traced(rollout, on_step)
     return [
-        Outcome(*episode, *measured(rollout, trace, agent, k), task=rollout.task, end=rollout.ends[k])
+        EpisodeResult(*episode, *episode_measures(rollout, trace, agent, k), task=rollout.task, end=rollout.ends[k])
         for k, episode in enumerate(episodes)
     ]
 
 
-def together(agent: PolicyAgent, maps: Sequence[Any], physics: Any) -> Rollout:
-    """A rollout at the start of maps in which both players act on the agent's chunks."""
-    return Rollout(agent.task, maps, (agent, agent.other_half()), settings=physics)
+def coplanning_rollout(agent: PolicyAgent, scenarios: Sequence[Any], settings: Any) -> Rollout:
+    """Creates a rollout in which both players execute the agent's action chunks."""
+    return Rollout(agent.task, scenarios, (agent, agent.human_half()), settings=settings)
 
 
-def traced_to_the_end(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:
-    """Steps until every world has ended; `on_step` is called after each step with the number of those that have."""
+def run_traced(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:
+    """Steps until every episode has ended; `on_step` gets the number of finished episodes after each step."""
     trace = Trace(rollout)
     while len(rollout.running):
         rollout.step()
@@ -111,18 +114,18 @@ def traced_to_the_end(rollout: Rollout, on_step: Callable[[int], object]) -> Tra
     return trace
 
 
-def measured(
+def episode_measures(
     rollout: Rollout, trace: Trace, agent: Any, index: int
-) -> tuple[bool, str, int, np.ndarray | None, np.ndarray | None]:
-    """The five fields of the `Outcome` of a world from `success` on."""
-    end, states = rollout.outcomes[index], trace.states(index)
+) -> tuple[bool, str, int, Array | None, Array | None]:
+    """The fields `success` to `interaction` of a world's `EpisodeResult`."""
+    outcome, states = rollout.outcomes[index], trace.states(index)
     interaction = rollout.task.interaction_recorded(states[1:], trace.actions(index))
     chunks = int(agent.chunks[index]) if isinstance(agent, PolicyAgent) else 0
-    return end.success, end.reason, chunks, _followed(rollout.task, states), interaction
+    return outcome.success, outcome.reason, chunks, _tracked_path(rollout.task, states), interaction
 
 
-def _followed(task: PairTask, recorded: np.ndarray) -> np.ndarray | None:
-    """`(T, 2)` the point that a task follows in recorded states, else the middle of the body of its outline."""
+def _tracked_path(task: PairTask, recorded: Array) -> Array | None:
+    """`(T, 2)` the task's tracked point in recorded states, or else the centre of its outline's body."""
     states = task.states_of(recorded)
     path = task.path(states)
     return path if path is not None or task.outline is None else task.outline.poses(states)[:, :2]

@@ -1,4 +1,4 @@
-"""The human study: blind, counterbalanced sessions of one person with several robots, and what came of them."""
+"""The human study: blind, counterbalanced sessions of a person with several robots, and their summary."""
 
 from .command import add_human_command
 

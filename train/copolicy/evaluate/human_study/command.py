@@ -2,38 +2,38 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import training_conditions
-from copolicy.dataset.command_line.commands import add_command, add_group
+from copolicy.dataset.command_line.commands import Commands, add_command, add_group
 from copolicy.dataset.command_line.extras import POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.dataset.files.file_kinds import kind_of
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.listing import visible_files
-from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.publication.licences import checked_licence
 
-from ..partner_study.configurations import MAPS, study_configurations
-from ..result_file import write_json
+from ..partner_study.configurations import DEFAULT_MAPS, study_configurations
 from ..study_flags import (
     add_protocol_flags,
     policy_settings,
-    protocol_of,
-    stated_settings,
+    recorded_settings,
+    study_protocol,
     task_entry,
     unseen_entry,
 )
 
 
-def add_human_command(commands: argparse._SubParsersAction) -> None:
+def add_human_command(commands: Commands) -> None:
     """Adds `human` with its three steps to the commands of `copolicy-eval`."""
     steps = add_group(
         commands,
         "human",
         "the human study: plan it, run a person's session, summarise the recordings",
-        "A person at the human seat with one robot after the other, blind and counterbalanced.",
+        "A person at the human's seat with several robots in turn, blind and counterbalanced.",
         (
             "copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --out study/plan.json",
             "copolicy-eval human run study/plan.json --participant P01 --out study/recordings",
@@ -45,83 +45,83 @@ def add_human_command(commands: argparse._SubParsersAction) -> None:
     _add_summarise(steps)
 
 
-def _add_plan(steps: argparse._SubParsersAction) -> None:
+def _add_plan(steps: Commands) -> None:
     command = add_command(
         steps,
         "plan",
         _plan,
-        "write the schedule: who carries with which robot on which start, in which order",
+        "write the schedule: robot and start of each trial of each participant",
         "copolicy-eval human plan CoDP-H=outputs/codp_h CoDP=outputs/codp --participants 5 --out study/plan.json",
     )
     command.add_argument("policies", nargs="+", metavar="NAME=CKPT", help="robots to compare, at least two")
-    add_whole_number(command, "--participants", "how many people (default: 5, the paper's)", 5, 1, 10_000)
-    add_maps_flag(command, MAPS, given=False)
+    add_whole_number(command, "--participants", "number of participants (default: 5, as in the paper)", 5, 1, 10_000)
+    add_maps_flag(command, DEFAULT_MAPS, use_default=False)
     add_whole_number(
         command,
         "--configurations",
-        "starts shared out among people, as in `partner` (default: 60, or all of a smaller set)",
+        "number of starts, chosen as in `partner` and dealt to the participants (default: 60, or all of a smaller set)",
         None,
         None,
     )
     add_whole_number(
         command,
         "--episodes-per-robot",
-        "starts of each person, the same with every robot (default: 12, or as many as there are)",
+        "starts of each participant, the same with every robot (default: 12, or all starts if there are fewer)",
         None,
         1,
         10_000,
     )
-    command.add_argument("--out", required=True, type=Path, help="where the plan goes; it holds the key: keep it shut")
-    add_protocol_flags(command, actions_per_plan=1)
+    command.add_argument("--out", required=True, type=Path, help="plan to write; it names the robots: keep it secret")
+    add_protocol_flags(command, n_action_steps=1)
 
 
-def _add_run(steps: argparse._SubParsersAction) -> None:
+def _add_run(steps: Commands) -> None:
     command = add_command(
         steps,
         "run",
         _run,
-        "one person's session in the window of `copolicy-collect play`; it goes on where it was left",
+        "run a participant's session in the window of `copolicy-collect play`, or continue an unfinished one",
         "copolicy-eval human run study/plan.json --participant P01 --out study/recordings --consent C-17",
         POLICIES,
     )
-    command.add_argument("plan", type=Path, help="of `copolicy-eval human plan`")
-    command.add_argument("--participant", required=True, help="as the plan names them: P01, P02, ...")
-    command.add_argument("--out", required=True, type=Path, help="folder of all sessions, an MCAP file an episode")
+    command.add_argument("plan", type=Path, help="file written by `copolicy-eval human plan`")
+    command.add_argument("--participant", required=True, help="code of the participant in the plan: P01, P02, ...")
+    command.add_argument("--out", required=True, type=Path, help="folder of all sessions, one MCAP file per episode")
     command.add_argument(
         "--human", default="joystick", help="joystick, keyboard, or scripted[:PAIR] to try the procedure without people"
     )
-    add_whole_number(command, "--practice", "episodes to get used to it, not counted (default: 2)", 2, 0, 1000)
-    command.add_argument("--consent", default="", metavar="ID", help="record id of the person's consent, no name")
-    command.add_argument("--license", default="", help="of the recordings, as the Hub spells it, such as cc-by-4.0")
+    add_whole_number(command, "--practice", "practice episodes, not counted (default: 2)", 2, 0, 1000)
+    command.add_argument("--consent", default="", metavar="ID", help="record id of the person's consent, not a name")
+    command.add_argument("--license", default="", help="licence of the recordings, a Hub id such as cc-by-4.0")
     command.add_argument(
         "--countdown", type=number("--countdown", 0, 60), default=3.0, help="seconds before each episode (default: 3)"
     )
-    command.add_argument("--device", default="cpu", help="where the robots plan (default: cpu)")
+    command.add_argument("--device", default="cpu", help="device of the policies (default: cpu)")
     command.add_argument("--new-session", action="store_true", help="do not continue the unfinished session")
     command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")
-    command.add_argument("--fullscreen", action="store_true", help="begin in full screen")
+    command.add_argument("--fullscreen", action="store_true", help="start in full screen")
     command.add_argument("--mute", action="store_true", help="no sounds")
 
 
-def _add_summarise(steps: argparse._SubParsersAction) -> None:
+def _add_summarise(steps: Commands) -> None:
     command = add_command(
         steps,
         "summarise",
         _summarise,
-        "success, time, interaction force and ratings of each robot, with the paper's tests between them",
+        "success, time, interaction force and ratings of each robot, with the paper's tests of their differences",
         "copolicy-eval human summarise study/recordings --plan study/plan.json --ratings study/ratings.csv "
         "--out study/result.json",
     )
     command.add_argument("recordings", type=Path, help="folder of sessions")
-    command.add_argument("--plan", type=Path, help="the key (default: robots by what recordings say of their seat)")
+    command.add_argument("--plan", type=Path, help="study plan (default: robots are named as in the recordings)")
     command.add_argument(
-        "--ratings", type=Path, metavar="FILE", help="CSV or JSON with participant, block and a column a question"
+        "--ratings", type=Path, metavar="FILE", help="CSV or JSON with participant, block and one column per question"
     )
-    command.add_argument("--out", type=Path, help="write everything, with every episode, as JSON")
+    command.add_argument("--out", type=Path, help="write the summary and all episodes as JSON")
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 
 
-def _plan(arguments: argparse.Namespace) -> dict:
+def _plan(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partner_study.command import split_name
     from .plan import Robot, make_plan, williams_square
 
@@ -131,25 +131,25 @@ def _plan(arguments: argparse.Namespace) -> dict:
         name, path = split_name(text)
         if not name:
             raise InvalidValueError("NAME=CKPT", "a name for each robot", text)
-        robots.append(Robot.of(name, path))
+        robots.append(Robot.from_checkpoint(name, path))
     folders = [(robot.name, checkpoint_folder(robot.checkpoint)) for robot in robots]
-    protocol = protocol_of(arguments, [(name, training_conditions(folder)) for name, folder in folders])
-    chosen = protocol.task.scenario_set(set_name(protocol.task, arguments.maps, MAPS))
+    protocol = study_protocol(arguments, [(name, training_conditions(folder)) for name, folder in folders])
+    chosen = protocol.task.scenario_set(map_set_name(protocol.task, arguments.maps, DEFAULT_MAPS))
     starts = study_configurations(chosen, arguments.configurations)
-    asked, (stated, unusual) = arguments.episodes_per_robot, stated_settings(protocol.task, protocol.physics)
+    flagged, unusual = recorded_settings(protocol.task, protocol.settings)
     plan = make_plan(
         robots,
         chosen.label,
         starts,
         arguments.participants,
-        min(12, len(starts)) if asked is None else asked,
+        min(12, len(starts)) if arguments.episodes_per_robot is None else arguments.episodes_per_robot,
         arguments.seed,
         actions_per_plan=arguments.n_action_steps,
-        world={**stated, **unusual},
+        world={**flagged, **unusual},
         settings=policy_settings(arguments),
         task_name=protocol.task.spec.name,
     )
-    write_json(arguments.out, plan.to_json())
+    replace_json(arguments.out, plan.to_json(), indent=1)
     orders = len(williams_square(len(robots)))
     return {
         "plan": str(arguments.out),
@@ -164,16 +164,16 @@ def _plan(arguments: argparse.Namespace) -> dict:
     }
 
 
-def _run(arguments: argparse.Namespace) -> dict:
-    from copolicy.collect.play.settings import PilotSpec
+def _run(arguments: argparse.Namespace) -> dict[str, Any]:
+    from copolicy.collect.play.settings import PlayerSpec
 
     from .plan import StudyPlan
 
     checked_licence(arguments.license)
     plan = StudyPlan.read(arguments.plan)
-    plan.of(arguments.participant)
-    human = PilotSpec.parse(arguments.human, plan.task_name)
-    # Deferred: a wrong call should not wait for torch and pygame.
+    plan.trials_of(arguments.participant)
+    human = PlayerSpec.parse(arguments.human, plan.task_name)
+    # Imported here so that argument errors do not wait for torch and pygame.
     from .session import run_session
 
     return run_session(
@@ -193,7 +193,7 @@ def _run(arguments: argparse.Namespace) -> dict:
     )
 
 
-def _summarise(arguments: argparse.Namespace) -> dict:
+def _summarise(arguments: argparse.Namespace) -> dict[str, Any]:
     from .plan import StudyPlan
     from .questionnaire import read_ratings
     from .recordings import study_rows
@@ -202,15 +202,15 @@ def _summarise(arguments: argparse.Namespace) -> dict:
     if arguments.out:
         require_new(arguments.out, overwrite=arguments.overwrite)
     if arguments.ratings and not arguments.plan:
-        raise InvalidValueError("--ratings", "--plan beside it, which tells the robot of each block", "none")
+        raise InvalidValueError("--ratings", "--plan too, which names the robot of each block", "none")
     if not arguments.recordings.is_dir() or not visible_files(arguments.recordings, "*.mcap"):
-        raise FileFormatError(arguments.recordings, "a folder of recordings", kind_of(arguments.recordings))
+        raise FileFormatError(arguments.recordings, "a folder of recordings", describe_path(arguments.recordings))
     plan = StudyPlan.read(arguments.plan) if arguments.plan else None
     ratings = read_ratings(arguments.ratings, plan) if arguments.ratings and plan else []
     rows, left_out = study_rows(arguments.recordings, plan)
     summary = summarise_study(rows, ratings)
     planned = sum(len(trials) for trials in plan.trials.values()) if plan else None
-    about = {"episodes": len(rows), "planned": planned, "left_out": left_out}
+    counts = {"episodes": len(rows), "planned": planned, "left_out": left_out}
     if arguments.out:
         settings = (
             {}
@@ -220,44 +220,42 @@ def _summarise(arguments: argparse.Namespace) -> dict:
                 "plan_id": plan.plan_id,
                 "maps": plan.maps,
                 **plan.map_set,
-                "step_limit": plan.physics.step_limit,
+                "step_limit": plan.world_settings.step_limit,
             }
         )
-        write_json(
-            arguments.out,
-            {"study": "human", "settings": settings, **summary, **about, "rows": rows, "answers": ratings},
-        )
-        about["result"] = str(arguments.out)
+        result = {"study": "human", "settings": settings, **summary, **counts, "rows": rows, "answers": ratings}
+        replace_json(arguments.out, result, indent=1)
+        counts["result"] = str(arguments.out)
     if arguments.json:
-        return {**summary, **about}
-    return {"label": summary["label"], **about, **_lines(summary)}
+        return {**summary, **counts}
+    return {"label": summary["label"], **counts, **_report(summary)}
 
 
-def _lines(summary: dict) -> dict:
+def _report(summary: dict) -> dict[str, Any]:
     robots = {}
-    for name, one in summary["robots"].items():
-        robots[name] = {"success": _value(one["success"], 100, 1, " %"), "time": _value(one["time_s"], 1, 2, " s")}
+    for name, robot in summary["robots"].items():
+        robots[name] = {"success": _value(robot["success"], 100, 1, " %"), "time": _value(robot["time_s"], 1, 2, " s")}
         if "interaction_mean" in summary["tests"]:
-            robots[name]["interaction_force"] = _value(one["interaction_mean"], 1, 4, "")
+            robots[name]["interaction_force"] = _value(robot["interaction_mean"], 1, 4, "")
     tests = {}
     for measure, test in summary["tests"].items():
         f = test["anova"]
         tests[measure] = (
-            "no test: at least two people with a value for every robot, and some spread"
+            "no test: it needs at least two people with a value for every robot, and some spread"
             if f is None
             else f"F({f['df'][0]}, {f['df'][1]}) = {f['F']:.2f}, p = {f['p']:.3g}"
         )
     ratings = {
-        question: {robot: _value(value, 1, 2, "") for robot, value in one["robots"].items()}
-        for question, one in summary.get("ratings", {}).items()
+        question: {robot: _value(rating, 1, 2, "") for robot, rating in answers["robots"].items()}
+        for question, answers in summary.get("ratings", {}).items()
     }
     missing = {name: summary[name] for name in ("not_measured",) if name in summary}
     return {"robots": robots, "anova": tests, **({"ratings": ratings} if ratings else {}), **missing}
 
 
-def _value(one: dict, scale: float, digits: int, unit: str) -> str:
-    if one["mean"] is None:
+def _value(measure: dict, scale: float, digits: int, unit: str) -> str:
+    if measure["mean"] is None:
         return "none"
-    error = one["standard_error"]
+    error = measure["standard_error"]
     spread = "" if error is None else f" ± {scale * error:.{digits}f}"
-    return f"{scale * one['mean']:.{digits}f}{spread}{unit} (of {one['participants']} people)"
+    return f"{scale * measure['mean']:.{digits}f}{spread}{unit} (of {measure['participants']} people)"

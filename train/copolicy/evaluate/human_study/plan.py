@@ -1,4 +1,4 @@
-"""The plan of a human study: who carries with which robot on which start, in which order, and the key to it all."""
+"""The plan of a human study: robots, starts, and the trials of each participant in order; read and written as JSON."""
 
 import hashlib
 import json
@@ -10,26 +10,26 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
-from copolicy.collect.angular_limit import LIMIT
+from copolicy.collect.angular_limit import LIMIT_SETTING
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
 from copolicy.dataset.task import TABLE, PairTask, get_task
 
-from ..study_flags import usual_settings
+from ..study_flags import default_settings
 
 _VERSION = 1
-_WHAT = "a plan of copolicy-eval human plan"
-_WORLD = ("step_limit", LIMIT, "physics")
+_EXPECTED = "a plan of copolicy-eval human plan"
+_WORLD = ("step_limit", LIMIT_SETTING, "physics")
 
 
 @dataclass(frozen=True)
 class Robot:
-    """One of the robots that are compared.
+    """One of the compared robots.
 
     Attributes:
-        checkpoint: as it was named, a path or `pretrained`.
-        weights_sha256: digest of the weights that the study is about.
+        checkpoint: path of the checkpoint, or `pretrained`.
+        weights_sha256: sha256 of its weights when the plan was made.
     """
 
     name: str
@@ -37,21 +37,21 @@ class Robot:
     weights_sha256: str
 
     @classmethod
-    def of(cls, name: str, checkpoint: str) -> "Robot":
+    def from_checkpoint(cls, name: str, checkpoint: str) -> "Robot":
         """
         Raises:
-            FileFormatError: no such checkpoint.
+            FileFormatError: the checkpoint does not exist.
         """
         return cls(name, checkpoint, weights_digest(checkpoint))
 
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """One episode.
+    """One planned episode.
 
     Attributes:
-        code: what the screen and the recording say of the robot, and nothing more.
-        block: from 1; the robot is the same within a block.
+        code: the only name of the robot on the screen and in the recording.
+        block: number of the block, from 1; the robot is the same within a block.
         robot: name of the robot.
         configuration: index of the start.
     """
@@ -64,16 +64,14 @@ class PlannedTrial:
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """All that is decided before the first person comes.
+    """Everything that is fixed before the first session.
 
     Attributes:
-        plan_id: digest of everything else; recordings carry it.
-        robots: that are compared.
-        configurations: starts that are shared out among participants.
-        trials: of each participant, in order.
-        world: its settings, as `stated_settings` gives them; the usual ones where there are none.
-        settings: of the policies, as `--num-inference-steps` gives them.
-        task_name: of what is done together.
+        plan_id: digest of the other fields; recordings contain it.
+        configurations: starts that are dealt to the participants.
+        trials: trials of each participant, in order.
+        world: settings of the world, from `recorded_settings`; defaults for those that are absent.
+        settings: settings of the policies that flags override, such as `num_inference_steps`.
     """
 
     plan_id: str
@@ -89,36 +87,38 @@ class StudyPlan:
 
     @property
     def task(self) -> PairTask:
-        """What is done together."""
+        """The task of the study."""
         return get_task(self.task_name)
 
     @property
-    def physics(self) -> Any:
+    def world_settings(self) -> Any:
         """Settings of the world."""
-        stated = {name: value for name, value in self.world.items() if name != "physics"}
-        return replace(usual_settings(self.task), **self.world.get("physics", stated))
+        flagged = {name: value for name, value in self.world.items() if name != "physics"}
+        return replace(default_settings(self.task), **self.world.get("physics", flagged))
 
     @property
     def map_set(self) -> dict[str, dict[str, str]]:
-        """Name, version and digest of a file that the starts are from, as settings of a result."""
+        """The `map_set` entry of a result: name, version and digest of the scenario file of the starts, if any."""
         name = self.task.name_of(self.configurations[0])
         if not name.digest:
             return {}
         return {"map_set": {"name": self.maps, "version": name.version, "digest": name.digest, "from": "file"}}
 
-    def of(self, participant: str) -> tuple[PlannedTrial, ...]:
+    def trials_of(self, participant: str) -> tuple[PlannedTrial, ...]:
         """The trials of a participant.
 
         Raises:
-            UnknownNameError: nobody of that name is planned.
+            UnknownNameError: the plan has no such participant.
         """
         if participant not in self.trials:
             raise UnknownNameError("participant", participant, self.trials)
         return self.trials[participant]
 
     def to_json(self) -> dict[str, Any]:
-        """The file of the plan."""
-        configurations = [{**_columns(self.task, one), **json.loads(one.to_json())} for one in self.configurations]
+        """The content of the plan's file."""
+        configurations = [
+            {**_columns(self.task, scenario), **json.loads(scenario.to_json())} for scenario in self.configurations
+        ]
         return {
             "study_plan": _VERSION,
             "note": "This file tells which robot is which: whoever runs the sessions should not read it.",
@@ -129,26 +129,26 @@ class StudyPlan:
     def read(cls, path: Path) -> "StudyPlan":
         """
         Raises:
-            FileFormatError: no such file, no plan, or one that was changed since it was made.
+            FileFormatError: the file does not exist, is no plan, or was changed after it was made.
         """
-        content = read_json(path, dict[str, Any], _WHAT)
+        content = read_json(path, dict[str, Any], _EXPECTED)
         try:
             if content["study_plan"] != _VERSION:
-                raise FileFormatError(path, f"{_WHAT}, version {_VERSION}", f"version {content['study_plan']}")
+                raise FileFormatError(path, f"{_EXPECTED}, version {_VERSION}", f"version {content['study_plan']}")
             content["task_name"] = content.pop("task", TABLE)
             content["world"] = {name: content[name] for name in _WORLD if name in content}
             fields = {name: content[name] for name in cls.__dataclass_fields__}
             task = get_task(content["task_name"])
-            fields["robots"] = tuple(Robot(**one) for one in content["robots"])
-            fields["configurations"] = tuple(_configuration(task, one) for one in content["configurations"])
+            fields["robots"] = tuple(Robot(**entry) for entry in content["robots"])
+            fields["configurations"] = tuple(_scenario(task, entry) for entry in content["configurations"])
             fields["trials"] = {
-                name: tuple(PlannedTrial(**one) for one in trials) for name, trials in content["trials"].items()
+                name: tuple(PlannedTrial(**entry) for entry in trials) for name, trials in content["trials"].items()
             }
             plan = cls(**fields)
             digest = _digest(plan)
-            plan.physics  # noqa: B018 (checks the settings)
+            plan.world_settings  # noqa: B018 (checks the settings)
         except (KeyError, TypeError, AttributeError, ValueError, InvalidValueError) as error:
-            raise FileFormatError(path, _WHAT, f"none: {type(error).__name__} {error}") from None
+            raise FileFormatError(path, _EXPECTED, f"none: {type(error).__name__} {error}") from None
         if plan.plan_id != digest:
             raise FileFormatError(path, f"the plan {plan.plan_id} as it was made", f"a changed one, {digest}")
         return plan
@@ -163,17 +163,17 @@ def make_plan(
     seed: int,
     **settings: Any,
 ) -> StudyPlan:
-    """Lays out a within-subject study.
+    """Makes the plan of a within-subject study.
 
-    Every participant carries with every robot on the same `episodes_per_robot` starts, in one block for each robot,
-    so that robots are compared within a person on equal starts and a person can judge each robot by itself. Robots
-    are ordered by a Williams design over participants; starts are dealt out in turn and shuffled in every block.
+    Each participant has one block of `episodes_per_robot` episodes with each robot, on the same starts, so that robots
+    are compared within a person on equal starts and can be rated one by one. The order of robots follows a Williams
+    design over participants. Starts are dealt to participants in turn and shuffled in each block.
 
     Args:
         settings: further fields of the plan.
 
     Raises:
-        InvalidValueError: fewer than two robots, equal names, no participant, or more starts than there are.
+        InvalidValueError: fewer than two robots, equal names, no participant, or more episodes than starts.
     """
     names = [robot.name for robot in robots]
     if len(names) < 2 or len(set(names)) < len(names):
@@ -191,39 +191,39 @@ def make_plan(
         own = [(first + k) % len(configurations) for k in range(episodes_per_robot)]
         planned: list[PlannedTrial] = []
         for block, robot in enumerate(square[person % len(square)], 1):
-            for place in rng.permutation(len(own)):
+            for k in rng.permutation(len(own)):
                 code = f"B{block}T{len(planned) + 1:02d}"
-                planned.append(PlannedTrial(code, block, shuffled[robot], own[int(place)]))
+                planned.append(PlannedTrial(code, block, shuffled[robot], own[int(k)]))
         trials[f"P{person + 1:02d}"] = tuple(planned)
     plan = StudyPlan("", maps, tuple(robots), tuple(configurations), trials, seed, **settings)
     return StudyPlan(**{**vars(plan), "plan_id": _digest(plan)})
 
 
 def weights_digest(checkpoint: str) -> str:
-    """The sha256 of a checkpoint's weights, without loading it.
+    """The sha256 of a checkpoint's weights, computed without loading the policy.
 
     Raises:
-        FileFormatError: no such checkpoint.
+        FileFormatError: the checkpoint does not exist.
     """
     return hashlib.sha256((checkpoint_folder(checkpoint) / "model.safetensors").read_bytes()).hexdigest()
 
 
-def _columns(task: PairTask, config: Any) -> dict[str, Any]:
-    """How the file of the plan names a start; of a map from a file all that recordings say of it."""
-    name = task.name_of(config)
+def _columns(task: PairTask, scenario: Any) -> dict[str, Any]:
+    """The names of a start in the plan's file; for a scenario from a file the same columns as in recordings."""
+    name = task.name_of(scenario)
     return name.columns if name.digest else {"map_id": name.scenario}
 
 
-def _configuration(task: PairTask, entry: dict[str, Any]) -> Any:
+def _scenario(task: PairTask, entry: dict[str, Any]) -> Any:
     columns = ScenarioName("", "").columns
-    config = task.scenario_of_json(json.dumps({name: value for name, value in entry.items() if name not in columns}))
-    if "map_set_digest" not in entry or not hasattr(config, "named"):
-        return config
-    return replace(config, named=ScenarioName(*(entry[name] for name in columns)))
+    scenario = task.scenario_of_json(json.dumps({name: value for name, value in entry.items() if name not in columns}))
+    if "map_set_digest" not in entry or not hasattr(scenario, "named"):
+        return scenario
+    return replace(scenario, named=ScenarioName(*(entry[name] for name in columns)))
 
 
 def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The fields of a plan as its file has them; one that names no task is of the table."""
+    """The fields of a plan as in its file; a file without `task` is of the table."""
     content: dict[str, Any] = {}
     for name, value in asdict(replace(plan, configurations=())).items():
         content |= value if name == "world" else {name: value}
@@ -235,20 +235,21 @@ def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> di
 
 def _digest(plan: StudyPlan) -> str:
     configurations = [
-        asdict(one) if is_dataclass(type(one)) else json.loads(one.to_json()) for one in plan.configurations
+        asdict(scenario) if is_dataclass(type(scenario)) else json.loads(scenario.to_json())
+        for scenario in plan.configurations
     ]
-    for one in configurations:
-        for later in ("obstacle_sizes", "named"):  # of later versions: plans without them keep their digest
-            if later in one and not one[later]:
-                del one[later]
+    for entry in configurations:
+        for name in ("obstacle_sizes", "named"):  # plans made before these fields existed keep their digest
+            if name in entry and not entry[name]:
+                del entry[name]
     content = {**_content(plan, configurations), "plan_id": ""}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]
 
 
 def williams_square(count: int) -> list[list[int]]:
-    """Williams' design (1949): rows are orders of `count` conditions, one for each participant in turn.
+    """Williams' design (1949): each row is an order of `count` conditions, used by participants in turn.
 
-    With an even number, one square of `count` rows; with an odd one, that square and its mirror image.
+    An even `count` gives `count` rows; an odd one gives these and their reversals.
     """
     first = [0]
     low, high = 1, count - 1

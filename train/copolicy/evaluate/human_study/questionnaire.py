@@ -1,4 +1,4 @@
-"""What people said: ratings of each block, from a CSV or JSON file."""
+"""Reads the participants' ratings of each block from a CSV or JSON file."""
 
 import csv
 import json
@@ -12,48 +12,49 @@ from copolicy.dataset.exceptions import FileFormatError
 from .plan import StudyPlan
 
 _KEYS = ("participant", "block")
-_WHAT = "ratings with the columns participant, block and one for each question"
+_EXPECTED = "ratings with the columns participant, block and one for each question"
 
 
 def read_ratings(path: Path, plan: StudyPlan) -> list[dict[str, Any]]:
-    """One dict a rated block: participant, block, robot (from the plan), and the questions with their numbers.
+    """Reads a CSV with a header, or a JSON list of objects; an empty answer is None.
 
-    A CSV with a header, or a JSON list of objects. An empty answer is no answer.
+    Returns:
+        One dict per rated block: participant, block, robot (from the plan), and the answer to each question.
 
     Raises:
-        FileFormatError: no such file, columns missing, an answer that is no number, or a block that is not planned or
-            rated twice.
+        FileFormatError: the file does not exist, a column is missing, an answer is no number, or a block is not planned
+            or rated twice.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
         rows = json.loads(text) if path.suffix == ".json" else list(csv.DictReader(text.splitlines()))
     except OSError as error:
-        raise FileFormatError(path, _WHAT, error.strerror or str(error)) from None
+        raise FileFormatError(path, _EXPECTED, error.strerror or str(error)) from None
     except ValueError as error:
-        raise FileFormatError(path, _WHAT, f"no JSON ({error})") from None
+        raise FileFormatError(path, _EXPECTED, f"no JSON ({error})") from None
     if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
-        raise FileFormatError(path, _WHAT, "no rows")
+        raise FileFormatError(path, _EXPECTED, "no rows")
     robots = {(name, trial.block): trial.robot for name, trials in plan.trials.items() for trial in trials}
-    found: dict[tuple[str, int], dict[str, Any]] = {}
+    ratings: dict[tuple[str, int], dict[str, Any]] = {}
     for number, row in enumerate(rows, 1):
         missing = [key for key in _KEYS if not row.get(key)]
         if missing:
-            raise FileFormatError(path, _WHAT, f"no {' and '.join(missing)} in row {number}")
+            raise FileFormatError(path, _EXPECTED, f"no {' and '.join(missing)} in row {number}")
         block = _number(path, number, "block", row["block"])
-        place = (str(row["participant"]).strip(), int(block or 0))
-        if place not in robots:
+        key = participant, block = str(row["participant"]).strip(), int(block or 0)
+        if key not in robots:
             raise FileFormatError(
-                path, f"blocks of plan {plan.plan_id}", f"{place[0]} block {place[1]} in row {number}"
+                path, f"blocks of plan {plan.plan_id}", f"{participant} block {block} in row {number}"
             )
-        if place in found:
-            raise FileFormatError(path, "each block once", f"{place[0]} block {place[1]} again in row {number}")
+        if key in ratings:
+            raise FileFormatError(path, "each block once", f"{participant} block {block} again in row {number}")
         answers = {
             str(question): _number(path, number, question, answer)
             for question, answer in row.items()
             if question not in _KEYS and question is not None
         }
-        found[place] = {"participant": place[0], "block": place[1], "robot": robots[place], **answers}
-    return list(found.values())
+        ratings[key] = {"participant": participant, "block": block, "robot": robots[key], **answers}
+    return list(ratings.values())
 
 
 def questions(ratings: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The recordings of a study as rows, one an episode."""
+"""Reads the recordings of a study as rows, one per episode."""
 
 import re
 from pathlib import Path
@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.collect.session import recordings
+from copolicy.collect.session import iter_recordings
 from copolicy.dataset.episode import Episode
 from copolicy.dataset.exceptions import FileFormatError, RunError
-from copolicy.dataset.recording.log import Recording, read_recording
+from copolicy.dataset.recording.reader import Recording, read_recording
 from copolicy.dataset.task import get_task
 
 from ..coplan.rollouts import interaction_columns
@@ -17,46 +17,46 @@ from ..study_flags import task_entry
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX
 
-_PLANS = re.compile(r"seat 0: \d+ plans, p50 (\d+) ms")
+_CHUNK_TIMES = re.compile(r"seat 0: \d+ plans, p50 (\d+) ms")
 
 
 def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Kept episodes below a folder, and how many were left out for which reason.
+    """Reads the counted episodes in a folder, and counts the others by the reason for which they are left out.
 
     Args:
-        plan: of the study; None where the robots are named by what the recordings say of the robot's seat.
+        plan: plan of the study; if None, robots are named as in the recordings.
 
     Raises:
-        FileFormatError: a damaged recording, or one that contradicts the plan.
+        FileFormatError: a recording is damaged or contradicts the plan.
         RunError: no episode counts.
     """
     rows: list[dict[str, Any]] = []
     left_out: dict[str, int] = {}
     paths: dict[tuple[str, str], Path] = {}
-    for one in recordings(folder):
-        recording = read_recording(one.path)
-        reason = _left_out(recording.episode, one.counts, plan)
+    for file in iter_recordings(folder):
+        recording = read_recording(file.path)
+        reason = _reason_left_out(recording.episode, file.counts, plan)
         if reason:
             left_out[reason] = left_out.get(reason, 0) + 1
             continue
-        row = _row(one.path, recording, plan)
-        place = (row["participant"], row["trial"])
-        if plan and place in paths:
-            raise FileFormatError(one.path, f"one kept recording of {' '.join(place)}", f"another in {paths[place]}")
-        paths[place] = one.path
+        row = _row(file.path, recording, plan)
+        trial = (row["participant"], row["trial"])
+        if plan and trial in paths:
+            raise FileFormatError(file.path, f"one kept recording of {' '.join(trial)}", f"another in {paths[trial]}")
+        paths[trial] = file.path
         rows.append(row)
     if not rows:
         raise RunError(f"{folder}: expected kept recordings of the study, found none (left out: {left_out or 'none'})")
     return rows, left_out
 
 
-def _left_out(episode: Episode, counts: bool, plan: StudyPlan | None) -> str:
+def _reason_left_out(episode: Episode, counts: bool, plan: StudyPlan | None) -> str:
     meta = episode.meta
     if not counts:
         return "practice, discarded or interrupted"
     if plan and not meta.controller_0.startswith(f"{CODE_PREFIX}:{plan.plan_id}:"):
-        other = meta.controller_1.startswith(f"{CODE_PREFIX}:{plan.plan_id}:")
-        return "seats swapped" if other else "not of this plan"
+        swapped = meta.controller_1.startswith(f"{CODE_PREFIX}:{plan.plan_id}:")
+        return "seats swapped" if swapped else "not of this plan"
     return ""
 
 
@@ -88,21 +88,21 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
     if plan is None:
         return row
     _, _, participant, code = meta.controller_0.split(":", 3)
-    trial = next((one for one in plan.of(participant) if one.code == code), None)
+    trial = next((trial for trial in plan.trials_of(participant) if trial.code == code), None)
     if trial is None or participant != meta.pair_id:
         raise FileFormatError(path, f"a trial of {meta.pair_id} in plan {plan.plan_id}", meta.controller_0)
     planned = plan.configurations[trial.configuration]
     if planned != episode.map_config:
         raise FileFormatError(path, f"the start that plan {plan.plan_id} has for {participant} {code}", meta.map_id)
-    if episode.physics != plan.physics:
+    if episode.physics != plan.world_settings:
         raise FileFormatError(path, f"the physics of plan {plan.plan_id}", str(episode.physics))
     return {**row, "trial": code, "block": trial.block, "robot": trial.robot}
 
 
 def _planning_ms(recording: Recording) -> float | None:
-    """Median of the episode's plans, as the recording tells it; None where it tells nothing."""
+    """Median time of predicting a chunk, ms, from the recording's event; None if it has no such event."""
     for event in recording.events:
-        median = _PLANS.search(event.detail) if event.kind == "plans" else None
+        median = _CHUNK_TIMES.search(event.detail) if event.kind == "plans" else None
         if median:
             return float(median[1])
     return None

@@ -1,4 +1,4 @@
-"""Statistics of a within-subject study: repeated-measures ANOVA, Tukey's comparisons, and their like for ratings."""
+"""Statistics of a within-subject study: repeated-measures ANOVA, Tukey's comparisons, and rank tests for ratings."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from copolicy.dataset.arrays import Array
 
-def anova(values: np.ndarray) -> dict[str, Any] | None:
+
+def anova(values: Array) -> dict[str, Any] | None:
     """One-way repeated-measures ANOVA.
 
     Args:
         values: `(n, k)` participants x conditions.
 
     Returns:
-        F, its degrees of freedom, p, p under Greenhouse and Geisser's correction with its epsilon, and partial eta
-        squared; None with fewer than two participants or conditions, or where nothing varies beside the means.
+        F, its degrees of freedom, p, p with Greenhouse and Geisser's correction and its epsilon, and partial eta
+        squared; None for fewer than two participants or conditions, or if the error sum of squares is zero.
     """
     n, k = values.shape
     if n < 2 or k < 2:
@@ -38,7 +40,7 @@ def anova(values: np.ndarray) -> dict[str, Any] | None:
     }
 
 
-def tukey(values: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
+def tukey(values: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     """Tukey's honestly significant differences on the error term of `anova`, for every pair of conditions."""
     n, k = values.shape
     _, error = _sums_of_squares(values) if n > 1 and k > 1 else (0.0, 0.0)
@@ -46,7 +48,7 @@ def tukey(values: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
     degrees = (n - 1) * (k - 1)
     scale = float(np.sqrt(error / degrees / n)) if degrees and error > 0 else 0.0
     critical = float(stats.studentized_range.ppf(0.95, k, degrees)) if scale else 0.0
-    found = []
+    differences = []
     for a, b in combinations(range(k), 2):
         difference = float(means[a] - means[b])
         test = None
@@ -54,12 +56,12 @@ def tukey(values: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
             p = float(stats.studentized_range.sf(abs(difference) / scale, k, degrees))
             margin = critical * scale
             test = {"p": p, "interval_95": [difference - margin, difference + margin]}
-        found.append({"first": names[a], "second": names[b], "difference": difference, "tukey": test})
-    return found
+        differences.append({"first": names[a], "second": names[b], "difference": difference, "tukey": test})
+    return differences
 
 
-def rank_test(values: np.ndarray) -> dict[str, Any] | None:
-    """For ratings `(n, k)`: Friedman's test, with two conditions Wilcoxon's; None where there is nothing to rank."""
+def rank_test(values: Array) -> dict[str, Any] | None:
+    """Friedman's test of ratings `(n, k)`, or Wilcoxon's for two conditions; None if there is nothing to rank."""
     n, k = values.shape
     if n < 2 or k < 2 or not np.ptp(values, axis=1).any():
         return None
@@ -70,7 +72,7 @@ def rank_test(values: np.ndarray) -> dict[str, Any] | None:
     return {"test": "Friedman", "statistic": float(result.statistic), "p": float(result.pvalue)}
 
 
-def _sums_of_squares(values: np.ndarray) -> tuple[float, float]:
+def _sums_of_squares(values: Array) -> tuple[float, float]:
     n = len(values)
     grand = values.mean()
     conditions = n * float(((values.mean(axis=0) - grand) ** 2).sum())
@@ -78,7 +80,7 @@ def _sums_of_squares(values: np.ndarray) -> tuple[float, float]:
     return conditions, float((residual**2).sum())
 
 
-def _greenhouse_geisser(values: np.ndarray) -> float:
+def _greenhouse_geisser(values: Array) -> float:
     k = values.shape[1]
     covariance = np.cov(values, rowvar=False)
     centred = covariance - covariance.mean(axis=0) - covariance.mean(axis=1, keepdims=True) + covariance.mean()

@@ -1,4 +1,4 @@
-"""One session of the study: a person (or a simulated one) at the human seat, through collect's `play`."""
+"""Runs one session of the study with `copolicy-collect play`, a person or a scripted agent at the human's seat."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -7,7 +7,7 @@ from typing import Any
 
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
-from copolicy.collect.play.settings import PilotSpec
+from copolicy.collect.play.settings import PlayerSpec
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.train.checkpoint import Checkpoint
 
@@ -16,31 +16,31 @@ from .schedule import BlindPolicy, StudySchedule, StudySettings
 
 
 def run_session(
-    plan: StudyPlan, participant: str, human: PilotSpec, out: Path, device: str = "cpu", **play: Any
+    plan: StudyPlan, participant: str, human: PlayerSpec, out: Path, device: str = "cpu", **play: Any
 ) -> dict[str, Any]:
-    """Runs or continues a participant's session until it is complete or somebody ends it.
+    """Runs or continues a participant's session until it is complete or is ended.
 
     Args:
-        human: who sits at the human seat: a joystick, the keyboard, or a simulated player.
+        human: agent at the human's seat: a joystick, the keyboard, or a scripted agent.
         out: folder of all sessions.
-        device: where the robots plan.
-        play: further settings of `play`.
+        device: device of the policies.
+        play: further `PlaySettings`.
 
     Returns:
-        What was recorded, JSON-able.
+        Summary of the recorded episodes; it can be written as JSON.
 
     Raises:
-        CopolicyError: a checkpoint that is not the plan's, or a session that cannot be run.
+        CopolicyError: a checkpoint is not the plan's, or the session cannot be run.
     """
     if human.kind not in ("joystick", "keyboard", "scripted"):
         raise InvalidValueError("--human", "joystick, keyboard or scripted[:PAIR]", f"{human.kind}:{human.detail}")
-    trials = plan.of(participant)
-    # Sits at the robot's seat until the robots of the plan take over.
-    placeholder = PilotSpec.parse("scripted", plan.task_name)
+    trials = plan.trials_of(participant)
+    # At the robot's seat until `set_schedule` replaces it by the plan's robots.
+    placeholder = PlayerSpec.parse("scripted", plan.task_name)
     settings = StudySettings(
         pair=participant,
         out=out,
-        pilots=(placeholder, human),
+        players=(placeholder, human),
         episodes=len(trials),
         seed=plan.seed,
         swap_seats=False,
@@ -55,24 +55,24 @@ def run_session(
         agent = PolicyAgent(policy, plan.task, real_time=True)
         stack.callback(agent.close)
         game = application.game
-        game.play_by(StudySchedule(plan, participant, policy, agent), agent)
+        game.set_schedule(StudySchedule(plan, participant, policy, agent), agent)
         with stopped_by_signals(game):
             application.run()
         return {"participant": participant, "plan": plan.plan_id, **application.summary()}
 
 
 def load_robots(plan: StudyPlan, device: str = "cpu") -> Mapping[str, Checkpoint]:
-    """The plan's checkpoints by name.
+    """Loads the plan's checkpoints by name.
 
     Raises:
-        FileFormatError: one is missing or has other weights than the plan says.
+        FileFormatError: a checkpoint is missing, or its weights are not those of the plan.
     """
     robots = {}
     for robot in plan.robots:
-        found = weights_digest(robot.checkpoint)
-        if found != robot.weights_sha256:
+        digest = weights_digest(robot.checkpoint)
+        if digest != robot.weights_sha256:
             raise FileFormatError(
-                robot.checkpoint, f"the plan's weights {robot.weights_sha256[:12]}", f"weights {found[:12]}"
+                robot.checkpoint, f"the plan's weights {robot.weights_sha256[:12]}", f"weights {digest[:12]}"
             )
         robots[robot.name] = Checkpoint(robot.checkpoint, device, plan.settings)
     return robots

@@ -1,10 +1,11 @@
-"""What a human study found: for each robot and between robots, within persons."""
+"""Summary of a human study: measures of each robot, and tests of differences between robots within persons."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import TABLE, get_task
 
@@ -32,19 +33,17 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     """The content of the study's result, without its episodes.
 
     Raises:
-        RunError: people and simulated players among the rows, or several tasks.
+        RunError: the rows have several sources (such as people and simulated players) or several tasks.
     """
     sources, tasks = sorted({row["source"] for row in rows}), sorted({row.get("task", TABLE) for row in rows})
-    for what, found in (("source", sources), ("task", tasks)):
-        if len(found) > 1:
-            raise RunError(f"recordings: expected one {what}, found {' and '.join(found)}: summarise them apart")
-    task, force = get_task(tasks[0]), {"interaction_force": None}
-    if any(row["interaction_mean"] is not None for row in rows):
-        force = {}
+    for column, values in (("source", sources), ("task", tasks)):
+        if len(values) > 1:
+            raise RunError(f"recordings: expected one {column}, found {' and '.join(values)}: summarise them apart")
+    task, has_force = get_task(tasks[0]), any(row["interaction_mean"] is not None for row in rows)
     robots = list(dict.fromkeys(sorted(row["robot"] for row in rows)))
     people = list(dict.fromkeys(sorted(row["participant"] for row in rows)))
     tests = {}
-    for measure in _TESTED[: 2 if force else 3]:
+    for measure in _TESTED[: 3 if has_force else 2]:
         complete = _complete(people, robots, lambda p, r, measure=measure: _mean(rows, measure, p, r))
         tests[measure] = {"anova": anova(complete), "pairs": tukey(complete, robots) if len(complete) else []}
     result: dict[str, Any] = {
@@ -66,15 +65,17 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     }
     if ratings:
         result["ratings"] = _ratings(ratings)
-    words = task.studies.definitions.get("human_interaction_force", "as the task measures it")
-    robots_text = _ROBOTS if force else f"{_ROBOTS}; interaction force {words}"
-    return {**result, **not_measured(task, force), "definitions": {"robots": robots_text, **_DEFINITIONS}}
+    if not has_force:
+        definitions, missing = {"robots": _ROBOTS, **_DEFINITIONS}, not_measured(task, {"interaction_force": None})
+        return {**result, **missing, "definitions": definitions}
+    force = task.studies.definitions.get("human_interaction_force", "as the task measures it")
+    return {**result, "definitions": {"robots": f"{_ROBOTS}; interaction force {force}", **_DEFINITIONS}}
 
 
 def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     robots = list(dict.fromkeys(sorted(row["robot"] for row in ratings)))
     people = list(dict.fromkeys(sorted(row["participant"] for row in ratings)))
-    found = {}
+    results = {}
     for question in questions(ratings):
 
         def answer(person: str, robot: str, question: str = question) -> float:
@@ -83,11 +84,11 @@ def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                     return row[question]
             return float("nan")
 
-        found[question] = {
+        results[question] = {
             "robots": {robot: _between([answer(person, robot) for person in people]) for robot in robots},
             "test": rank_test(_complete(people, robots, answer)),
         }
-    return found
+    return results
 
 
 def _between(values: Sequence[float]) -> dict[str, Any]:
@@ -96,7 +97,7 @@ def _between(values: Sequence[float]) -> dict[str, Any]:
 
 
 def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str, robot: str) -> float:
-    """A participant's mean with a robot; nan where there is none."""
+    """A participant's mean of a measure with a robot; nan without values."""
     values = [
         float(row[measure])
         for row in rows
@@ -107,7 +108,7 @@ def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str, robot: s
     return float(np.mean(values)) if values else float("nan")
 
 
-def _complete(people: Sequence[str], robots: Sequence[str], value: Callable[[str, str], float]) -> np.ndarray:
-    """`(n, k)` of the participants who have a value with every robot."""
-    table = np.array([[value(person, robot) for robot in robots] for person in people]).reshape(-1, len(robots))
-    return table[np.isfinite(table).all(axis=1)]
+def _complete(people: Sequence[str], robots: Sequence[str], value: Callable[[str, str], float]) -> Array:
+    """Values `(n, k)` of the participants who have a value with every robot."""
+    values = np.array([[value(person, robot) for robot in robots] for person in people]).reshape(-1, len(robots))
+    return values[np.isfinite(values).all(axis=1)]

@@ -1,4 +1,4 @@
-"""The paper's human-in-the-loop protocol with simulated partners at the human seat."""
+"""The paper's human-in-the-loop protocol with simulated partners at the human's seat."""
 
 from .command import add_partner_command
 

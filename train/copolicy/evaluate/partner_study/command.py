@@ -4,87 +4,86 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from copolicy.collect.agents.simulated import simulated_players
-from copolicy.dataset.command_line.commands import add_command, progress_bar
+from copolicy.collect.agents.simulated_players import simulated_players
+from copolicy.dataset.command_line.commands import Commands, add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
-from copolicy.dataset.command_line.maps_flag import add_maps_flag, set_name
+from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
-from copolicy.dataset.files.staging import require_new
+from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
 
-from ..result_file import write_json
-from ..study_flags import add_study_flags, learned_task, policy_of, protocol_of, study_needs, study_settings
+from ..study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol, study_settings
 from ..summary import not_measured, percent
-from .configurations import MAPS, USUAL, all_starts, study_configurations
+from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
 
 if TYPE_CHECKING:
-    from .robots import Robot
+    from .robots import StudyRobot
 
 _LABEL = "human-in-the-loop protocol with SIMULATED partners: "
 _PARTNERS = "scripted players sit at the human seat, no person took part"
 
 
-def add_partner_command(commands: argparse._SubParsersAction) -> None:
+def add_partner_command(commands: Commands) -> None:
     """Adds `partner` to the commands of `copolicy-eval`."""
     command = add_command(
         commands,
         "partner",
         _partner,
-        "the robot's half of a checkpoint with simulated partners of several kinds at the human seat",
+        "a policy acts as the robot, simulated partners of several kinds as the human",
         "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
         study_needs,
     )
-    command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, with a name for the result")
+    command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, and its name in the result")
     command.add_argument(
         "--baseline",
         nargs="+",
         metavar="[NAME=]CKPT",
-        help="other checkpoints, passive (zero force), never-yields (scripted, endless patience) or scripted (a usual "
-        "simulated pilot), on the same starts with the same partners (default: passive, and the first scripted robot "
-        "of the task, for the table never-yields)",
+        help="robots to compare with, on the same starts with the same partners: other checkpoints, passive (zero "
+        "force), never-yields (a scripted agent that never yields) or scripted (a scripted agent with the default "
+        "profile) (default: passive and the task's first scripted robot, which is never-yields for the table)",
     )
-    command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="the checkpoint alone")
-    add_maps_flag(command, MAPS, given=False)
+    command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="use no baselines")
+    add_maps_flag(command, DEFAULT_MAPS, use_default=False)
     add_whole_number(
         command,
         "--configurations",
-        "starts: a quarter as many maps, spread over the set, each in four orientations; of a task without "
-        f"orientations as many maps (default: {USUAL}, or all of a smaller set)",
+        "number of starts: N / 4 maps, spread over the set, in four orientations each; N maps for a task without "
+        f"orientations (default: {DEFAULT_STARTS}, or all of a smaller set)",
         None,
         None,
     )
     kinds = ", ".join(simulated_players(get_task()).partners)
     command.add_argument(
-        "--partners", nargs="+", metavar="KIND", help=f"kinds that the task has, the table {kinds} (default: all)"
+        "--partners", nargs="+", metavar="KIND", help=f"kinds of partner; for the table {kinds} (default: all)"
     )
-    add_whole_number(command, "--repeats", "partners of each kind on each start (default: 1)", 1, 1, 10_000)
+    add_whole_number(command, "--repeats", "partners of each kind for each start (default: 1)", 1, 1, 10_000)
     add_whole_number(command, "--partner-seed", "seed of the partners (default: 0)", 0, None, LARGEST_SEED)
-    command.add_argument("--out", required=True, type=Path, help="where the result goes; the picture stands beside it")
-    add_study_flags(command, actions_per_plan=1)
+    command.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
+    add_study_flags(command, n_action_steps=1)
 
 
-def _partner(arguments: argparse.Namespace) -> dict:
-    picture = arguments.out.with_suffix(".png")
-    require_new(arguments.out, picture, overwrite=arguments.overwrite)
+def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
+    figure = arguments.out.with_suffix(".png")
+    require_new(arguments.out, figure, overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     _, path = split_name(arguments.policy)
-    task = learned_task(path)
+    task = checkpoint_task(path)
     profiles = simulated_players(task).partners
     partners = list(dict.fromkeys(profiles if arguments.partners is None else arguments.partners))
     for kind in partners:
         if kind not in profiles:
             raise UnknownNameError("kind of partner", kind, profiles)
-    chosen = task.scenario_set(set_name(task, arguments.maps, MAPS))
-    # Deferred: `--help` and a wrong call should not wait for torch.
+    chosen = task.scenario_set(map_set_name(task, arguments.maps, DEFAULT_MAPS))
+    # Imported here so that `--help` and argument errors do not wait for torch.
     from .figure import save_partner_figure
     from .robots import scripted_robots
-    from .study import carry_with_partners
+    from .study import run_with_partners
     from .summary import definitions, differences, summarise_with_partners
 
-    maps = study_configurations(chosen, arguments.configurations)
+    scenarios = study_configurations(chosen, arguments.configurations)
     scripted = scripted_robots(task)
     baseline = list(scripted)[:2] if arguments.baseline is None else arguments.baseline
     robots = [make_robot(text, arguments, scripted) for text in (arguments.policy, *baseline)]
@@ -92,39 +91,40 @@ def _partner(arguments: argparse.Namespace) -> dict:
     if len(set(names)) < len(names):
         raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
     policies = [(robot.name, robot.policy.conditions) for robot in robots if robot.policy is not None]
-    protocol = protocol_of(arguments, policies)
-    # Each policy plans at its own rate; a scripted robot acts at every step of the world.
+    protocol = study_protocol(arguments, policies)
+    # Each policy acts at the rate of its training data; a scripted robot acts at every step of the world.
     rates = [
         protocol.fps if arguments.fps is not None or robot.policy is None else robot.policy.fps for robot in robots
     ]
-    found = []
-    episodes = len(maps) * len(partners) * arguments.repeats
-    with progress_bar(episodes * len(robots), "episodes") as bar:
-        for place, (robot, fps) in enumerate(zip(robots, rates, strict=True)):
-            outcomes = carry_with_partners(
+    by_robot = []
+    episodes_per_robot = len(scenarios) * len(partners) * arguments.repeats
+    with progress_bar(episodes_per_robot * len(robots), "episodes") as bar:
+        for index, (robot, fps) in enumerate(zip(robots, rates, strict=True)):
+            episodes = run_with_partners(
                 robot,
-                maps,
+                scenarios,
                 partners,
-                protocol.physics,
+                protocol.settings,
                 task=task,
                 repeats=arguments.repeats,
                 fps=fps,
                 seed=arguments.seed,
                 partner_seed=arguments.partner_seed,
-                on_step=lambda finished, done=place * episodes: bar.update(done + finished - bar.n),
+                on_step=lambda finished, done=index * episodes_per_robot: bar.update(done + finished - bar.n),
             )
-            found.append(outcomes)
-    summaries = [summarise_with_partners(outcomes, robot.policy) for robot, outcomes in zip(robots, found, strict=True)]
+            by_robot.append(episodes)
+    pairs = list(zip(robots, by_robot, strict=True))
+    summaries = [summarise_with_partners(episodes, robot.policy) for robot, episodes in pairs]
     described = [
         {
             "name": robot.name,
             "policy": robot.describe(),
             "summary": summary,
-            "episodes": [o.to_json() for o in outcomes],
+            "episodes": [episode.to_json() for episode in episodes],
         }
-        for robot, summary, outcomes in zip(robots, summaries, found, strict=True)
+        for (robot, episodes), summary in zip(pairs, summaries, strict=True)
     ]
-    paired = {robot.name: differences(found[0], other) for robot, other in zip(robots[1:], found[1:], strict=True)}
+    paired = {name: differences(by_robot[0], baseline) for name, baseline in zip(names[1:], by_robot[1:], strict=True)}
     result = {
         "study": "partner",
         "label": _LABEL + task.studies.definitions.get("partners", _PARTNERS),
@@ -132,14 +132,14 @@ def _partner(arguments: argparse.Namespace) -> dict:
         "settings": {
             "maps": chosen.label,
             "map_set": chosen.describe(),
-            "configurations": len(maps),
-            "map_count": len(maps),
-            "complete_set": len(maps) == len({config.digest for config in all_starts(chosen)}),
+            "configurations": len(scenarios),
+            "map_count": len(scenarios),
+            "complete_set": len(scenarios) == len({scenario.digest for scenario in all_starts(chosen)}),
             "orientations": task.orientations > 1,
             "partners": {kind: asdict(profiles[kind]) for kind in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
-            **study_settings(arguments, protocol, maps),
+            **study_settings(arguments, protocol, scenarios),
         },
         **not_measured(task, summaries[0]),
         "definitions": definitions(task, summaries[0]),
@@ -148,45 +148,46 @@ def _partner(arguments: argparse.Namespace) -> dict:
     }
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     by_name = dict(zip(names, summaries, strict=True))
-    title = f"simulated partners on {chosen.label}: {len(maps)} starts, {episodes} episodes a robot, no person"
-    save_partner_figure(by_name, picture, title)
-    write_json(arguments.out, result)
+    size = f"{len(scenarios)} starts, {episodes_per_robot} episodes per robot"
+    title = f"simulated partners on {chosen.label}: {size}, no person"
+    save_partner_figure(by_name, figure, title)
+    replace_json(arguments.out, result, indent=1)
     return {
         "label": "simulated partners, no person took part",
-        "episodes_per_robot": episodes,
-        "robots": {name: _line(summary) for name, summary in by_name.items()},
+        "episodes_per_robot": episodes_per_robot,
+        "robots": {name: _report(summary) for name, summary in by_name.items()},
         "success_difference": {
-            f"{names[0]} - {name}": _difference(one["all"]["success"]) for name, one in paired.items()
+            f"{names[0]} - {name}": _difference(by_kind["all"]["success"]) for name, by_kind in paired.items()
         },
         "result": str(arguments.out),
-        "picture": str(picture),
+        "picture": str(figure),
         **not_measured(task, summaries[0]),
     }
 
 
-def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "Robot"]) -> "Robot":
-    """The robot behind `[NAME=]CKPT` or one of the scripted names.
+def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "StudyRobot"]) -> "StudyRobot":
+    """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
 
     Raises:
-        FileFormatError: no such checkpoint.
-        InvalidValueError: it plans fewer actions than are to be executed.
+        FileFormatError: the checkpoint does not exist.
+        InvalidValueError: its chunks have fewer actions than are to be executed.
     """
     from .robots import policy_robot
 
     if text in scripted:
         return scripted[text]
     name, path = split_name(text)
-    policy = policy_of(path, arguments)
+    policy = study_policy(path, arguments)
     return policy_robot(name or policy.name, policy)
 
 
 def split_name(text: str) -> tuple[str, str]:
-    """`NAME=PATH` in two; the name is empty where there is none (a path may hold `=` behind a slash)."""
+    """Splits `NAME=PATH`; the name is empty if there is none (a path may contain `=` after a slash)."""
     name, sign, path = text.partition("=")
     return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)
 
 
-def _line(summary: dict) -> dict:
+def _report(summary: dict) -> dict[str, Any]:
     time, force, deadlock = (summary[name] for name in ("time_to_completion_s", "interaction_force", "deadlock"))
     measures = {
         "interaction_force": None if force is None else round(force["mean"], 4),
@@ -201,9 +202,9 @@ def _line(summary: dict) -> dict:
     }
 
 
-def _difference(one: dict) -> str:
-    mean = f"{100 * one['mean']:+.1f} points"
-    if one["bootstrap_95"] is None:
+def _difference(success: dict) -> str:
+    mean = f"{100 * success['mean']:+.1f} points"
+    if success["bootstrap_95"] is None:
         return f"{mean} (one map: no interval)"
-    low, high = (100 * bound for bound in one["bootstrap_95"])
-    return f"{mean} (95 % {low:+.1f} to {high:+.1f}, bootstrap over {one['maps']} maps)"
+    low, high = (100 * bound for bound in success["bootstrap_95"])
+    return f"{mean} (95 % {low:+.1f} to {high:+.1f}, bootstrap over {success['maps']} maps)"

@@ -1,4 +1,4 @@
-"""Which configurations of start, goal and obstacles a study with partners uses."""
+"""Chooses the configurations (start, goal, obstacles) of a study with partners."""
 
 import math
 from itertools import islice
@@ -8,27 +8,27 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import get_task
 
-MAPS, USUAL = "unseen", 60
-"""The set of maps that studies with a partner take, and how many starts: as many as the paper has."""
+DEFAULT_MAPS, DEFAULT_STARTS = "unseen", 60
+"""Default scenario set and number of starts of studies with a partner; the paper has 60 starts."""
 
 _STRIDE = 37
 
 
 def study_configurations(maps: str | ScenarioSet, count: int | None = None) -> tuple[Any, ...]:
-    """`count / 4` maps of a set, each with the four start orientations 0, pi/2, pi and 3 pi/2.
+    """Returns `count / 4` scenarios of a set, each with the four start orientations 0, pi/2, pi and 3 pi/2.
 
-    The paper has 60 configurations and four orientations, and publishes no list. Ours are the maps 0, 37, 74, ...
-    of the set, counted around its end: 37 shares no factor with the 84 maps of a set, with their 12 pairs of start
-    and goal or with their 7 sets of obstacles, so that each of these comes up equally often (to one more or less).
-    A map that the set repeats counts once. A task without orientations has `count` maps.
+    The paper has 60 configurations and four orientations, and publishes no list. We take the scenarios 0, 37, 74, ...
+    modulo the size of the set. 37 is coprime to the 84 maps of a set, to their 12 pairs of start and goal and to their
+    7 sets of obstacles, so each of these occurs equally often (within one). Duplicates in the set count once. For a
+    task without orientations, `count` scenarios are returned.
 
     Args:
-        maps: a set, or what `--maps` says of the table.
-        count: `USUAL`, or all of a smaller set, if None.
+        maps: a scenario set, or the name of a set of the table.
+        count: number of starts; if None `DEFAULT_STARTS`, or all of a smaller set.
 
     Raises:
-        UnknownNameError: no such set.
-        InvalidValueError: a number that is no multiple of the orientations, or more than the set has.
+        UnknownNameError: the set does not exist.
+        InvalidValueError: `count` is no multiple of the orientations, or more than the set has.
     """
     chosen = get_task().scenario_set(maps) if isinstance(maps, str) else maps
     turns = get_task(chosen.task).orientations
@@ -36,19 +36,18 @@ def study_configurations(maps: str | ScenarioSet, count: int | None = None) -> t
     bases = turned[::turns]
     stride = next(s for s in range(_STRIDE, _STRIDE + len(bases) + 1) if math.gcd(s, len(bases)) == 1)
     strided = (bases[k * stride % len(bases)] for k in range(len(bases)))
-    distinct = list({config.digest: config for config in strided}.values())
+    distinct = list({scenario.digest: scenario for scenario in strided}.values())
     most = turns * len(distinct)
-    count = min(USUAL, most) if count is None else count
+    count = min(DEFAULT_STARTS, most) if count is None else count
     if count < turns or count % turns or count > most:
         expected = f"a multiple of {turns} from {turns} to {most}" if turns > 1 else f"1 to {most}"
         raise InvalidValueError("--configurations", expected, count)
-    wanted = {config.digest for config in islice(distinct, count // turns)}
-    places = {config.digest: k for k, config in enumerate(bases)}
-    order = sorted(places[digest] for digest in wanted)
-    return tuple(turned[turns * place + k] for place in order for k in range(turns))
+    index_of = {scenario.digest: k for k, scenario in enumerate(bases)}
+    indices = sorted(index_of[scenario.digest] for scenario in islice(distinct, count // turns))
+    return tuple(turned[turns * index + k] for index in indices for k in range(turns))
 
 
 def all_starts(chosen: ScenarioSet) -> tuple[Any, ...]:
-    """The scenarios of a set, each with every start orientation that its task has."""
+    """The scenarios of a set in all start orientations of its task."""
     task = get_task(chosen.task)
     return (task.turned(chosen) if task.orientations > 1 else chosen).scenarios

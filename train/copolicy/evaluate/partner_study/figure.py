@@ -1,4 +1,4 @@
-"""The picture of a study with partners: one panel a measure, the kinds of partner side by side, robots by colour."""
+"""Figure of a study with partners: one panel per measure, kinds of partner along x, one colour per robot."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from copolicy.dataset.files.staging import replacement
 from copolicy.dataset.outline_figure import SERIES
 
-_MARKERS = "osD^vPX"  # beside the colours
+_MARKERS = "osD^vPX"
 
 _Point = tuple[float, float, float]
-"""Value, length of the bar below and above."""
+"""Value, length of the error bar below, length above."""
 
 
 def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, title: str) -> None:
-    """Draws robots' summaries by name into a PNG; a measure that the task lacks has no panel."""
+    """Draws summaries, by name of robot, into a PNG; a measure that the task lacks has no panel."""
     first = next(iter(summaries.values()))
     kinds = list(first["by_partner"])
     panels = {label: point for label, (measure, point) in _PANELS.items() if first[measure] is not None}
@@ -25,13 +25,13 @@ def save_partner_figure(summaries: Mapping[str, Mapping[str, Any]], path: Path, 
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(1, len(panels), squeeze=False).flat)
     width = 0.7 / max(1, len(summaries))
-    for place, (name, summary) in enumerate(summaries.items()):
-        offset = (place - (len(summaries) - 1) / 2) * width
-        where = [k + offset for k in range(len(kinds))]
-        style = {"color": SERIES[place % len(SERIES)], "marker": _MARKERS[place % len(_MARKERS)]}
+    for index, (name, summary) in enumerate(summaries.items()):
+        offset = (index - (len(summaries) - 1) / 2) * width
+        x = [k + offset for k in range(len(kinds))]
+        style = {"color": SERIES[index % len(SERIES)], "marker": _MARKERS[index % len(_MARKERS)]}
         for axis, point in zip(axes, panels.values(), strict=True):
             values, below, above = zip(*(point(summary["by_partner"][kind]) for kind in kinds), strict=True)
-            axis.errorbar(where, values, yerr=(below, above), linestyle="", capsize=2, label=name, **style)
+            axis.errorbar(x, values, yerr=(below, above), linestyle="", capsize=2, label=name, **style)
     for axis, label in zip(axes, panels, strict=True):
         axis.set_xticks(range(len(kinds)), kinds)
         axis.set_ylabel(label)

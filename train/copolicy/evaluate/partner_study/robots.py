@@ -1,4 +1,4 @@
-"""Who holds the robot's end in a study: a policy, or one of the floors that a policy has to beat."""
+"""Agents at the robot's seat in a study: a policy, or one of the scripted baselines."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.collect.agents import HeldAgent, PolicyAgent, ScriptedAgent
-from copolicy.collect.agents.simulated import simulated_players
-from copolicy.collect.rollout import Agent, Start
+from copolicy.collect.agents import ConstantAgent, PolicyAgent, ScriptedAgent
+from copolicy.collect.agents.simulated_players import simulated_players
+from copolicy.collect.rollout import Agent, EpisodeStart
 from copolicy.dataset.task import PairTask, Player, get_task
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ PASSIVE = "passive"
 
 
 @dataclass(frozen=True)
-class Robot:
+class StudyRobot:
     """A robot of a study.
 
     Attributes:
-        name: in results.
-        agent: that acts for it, from the seed of its random numbers and the frames a second of a policy.
-        describe: what it is, for the result.
-        policy: behind it; None for a scripted one.
+        name: name in results.
+        agent: makes its agent from a seed and the actions per second of a policy.
+        describe: returns its description for the result.
+        policy: its policy; None for a scripted robot.
     """
 
     name: str
@@ -34,32 +34,32 @@ class Robot:
     policy: "Checkpoint | None" = None
 
 
-def policy_robot(name: str, policy: "Checkpoint") -> Robot:
-    """The robot's half of a policy's joint action chunks."""
+def policy_robot(name: str, policy: "Checkpoint") -> StudyRobot:
+    """A robot that executes its half of a policy's joint action chunks."""
     task = get_task(policy.task)
-    return Robot(name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy)
+    return StudyRobot(name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy)
 
 
-def scripted_robots(task: PairTask) -> dict[str, Robot]:
-    """Robots that `--baseline` knows by name: zero force, and the task's own."""
+def scripted_robots(task: PairTask) -> dict[str, StudyRobot]:
+    """The robots that `--baseline` takes by name: zero force, and the task's scripted robots."""
     zero = np.zeros(len(task.spec.action))
-    passive = Robot(
-        PASSIVE, lambda seed, fps: HeldAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
+    passive = StudyRobot(
+        PASSIVE, lambda seed, fps: ConstantAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
     )
     names = task.agents.robots if task.agents is not None else ()
     return {PASSIVE: passive, **{name: _scripted(task, name) for name in names}}
 
 
-def _scripted(task: PairTask, name: str) -> Robot:
+def _scripted(task: PairTask, name: str) -> StudyRobot:
     players = simulated_players(task)
     profile, description = players.robots[name]
 
     def agent(seed: int, fps: int) -> Agent:
-        def make(seat: int, index: int, start: Start) -> Player:
-            # Random numbers apart from the partner's.
-            own = np.random.SeedSequence([start.seed, seed, 0]).generate_state(1)[0]
-            return players.make_robot(start.scenario, name, int(own))
+        def make(seat: int, index: int, start: EpisodeStart) -> Player:
+            # Independent of the partner's random numbers, which come from `start.seed` alone.
+            robot_seed = np.random.SeedSequence([start.seed, seed, 0]).generate_state(1)[0]
+            return players.make_robot(start.scenario, name, int(robot_seed))
 
         return ScriptedAgent(name, make)
 
-    return Robot(name, agent, lambda: {"type": "scripted", "description": description, "habits": asdict(profile)})
+    return StudyRobot(name, agent, lambda: {"type": "scripted", "description": description, "habits": asdict(profile)})

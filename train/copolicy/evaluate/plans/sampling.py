@@ -1,4 +1,4 @@
-"""Many plans from one state: which ways does a co-policy see there?"""
+"""Samples many action chunks in one state and continues the episode from each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,118 +9,124 @@ import numpy as np
 from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.outline import Outline, Pose
 from copolicy.dataset.task import PairTask, World, get_task
 
-from ..coplan.rollouts import Outcome, measured, together
+from ..coplan.rollouts import EpisodeResult, coplanning_rollout, episode_measures
 
 
 @dataclass(frozen=True)
-class PlanSample:
-    """One plan, and where it led.
+class ChunkSample:
+    """One action chunk and the episode that continues with it.
 
     Attributes:
-        plan: `(frames, m)` joint actions, robot first.
-        planned_path: `(n, 2)` of the body while the whole plan is executed, and nothing else, in the outline's unit.
-        outcome: the episode from its start to its end; after the plan's first actions the policy planned on.
-        route: the strategy label of its path, empty of a task without any; None where it did not succeed, since that
-            label is not decided.
+        chunk: `(frames, m)` joint actions, robot first.
+        planned_path: `(n, 2)` of the body while the whole chunk is executed without replanning, in the outline's unit.
+        episode: the episode from its start to its end, continued with new chunks after n_action_steps actions.
+        route: strategy label of the episode's path, empty if the task has no labels; None if the episode failed, since
+            its label is undefined.
     """
 
-    plan: np.ndarray
-    planned_path: np.ndarray
-    outcome: Outcome
+    chunk: Array
+    planned_path: Array
+    episode: EpisodeResult
     route: str | None
 
 
 @dataclass(frozen=True)
-class Decision:
-    """A state and the plans sampled in it.
+class BranchPoint:
+    """A state and the action chunks sampled in it.
 
     Attributes:
-        pose: of the body.
-        way: `(steps + 1, 2)` how it came there from the start, in the unit of the outline.
-        task: that they are of.
+        pose: pose of the body in that state.
+        approach: `(steps + 1, 2)` path of the body from the start to that state, in the unit of the outline.
     """
 
-    map_config: Any
+    scenario: Any
     pose: Pose
-    way: np.ndarray
-    samples: tuple[PlanSample, ...]
+    approach: Array
+    samples: tuple[ChunkSample, ...]
     task: PairTask
 
     @property
     def outline(self) -> Outline:
-        """Of the task."""
+        """The task's outline."""
         return self.task.required_outline
 
 
-def sample_plans(
+def sample_chunks(
     policy: Any,
-    config: Any,
-    physics: Any,
+    scenario: Any,
+    settings: Any,
     *,
     samples: int,
     seconds: float = 0.0,
     fps: int | None = None,
     seed: int = 0,
-) -> Decision:
-    """Samples plans in one state and lets the policy carry on from each, as in co-planning.
+) -> BranchPoint:
+    """Samples action chunks in one state and continues the co-planning episode from each.
 
     Args:
-        policy: whose `wanted` actions of a chunk are predicted everywhere else than in that state.
-        samples: number of plans.
-        seconds: how long the policy carries before, to the nearest frame.
-        fps: rate at which its actions are held; that of the data set that it was trained on if None.
+        policy: `Checkpoint`; in the state it predicts whole chunks, elsewhere `n_predicted_actions` of each.
+        settings: settings of the world.
+        samples: number of chunks.
+        seconds: time of the state in an episode of the policy, rounded to the nearest frame.
+        fps: actions per second; the rate of the policy's training data if None.
 
     Raises:
         CopolicyError: the policy's task has no outline.
-        RunError: the episode ended before `seconds`, or the policy cannot go on from there in several ways.
+        RunError: the episode ended before `seconds`, or the policy keeps its own history, which cannot be copied.
     """
     rate = fps or policy.fps
     task = get_task(policy.task)
     outline, record_hz = task.required_outline, task.spec.record_hz
     hold = clock.stride(rate, record_hz)
     agent = PolicyAgent(policy, task, fps=rate, seed=seed)
-    rollout = together(agent, [config], physics)
+    rollout = coplanning_rollout(agent, [scenario], settings)
     trace = Trace(rollout)
     rollout.run(round(seconds * rate) * hold)
     if rollout.outcomes[0].done:
-        raise RunError(f"--seconds: expected a moment before the end, found one at {rollout.ends[0] / record_hz:.1f} s")
+        expected = f"less than {rollout.ends[0] / record_hz:.1f}, when the episode ended"
+        raise RunError(f"--seconds: expected {expected}, found {seconds:g}")
     if seconds and policy.keeps_history:
         raise RunError(f"--seconds: expected 0 for {policy.name}, which keeps its history itself, found {seconds:g}")
-    here, configs = rollout.worlds[0], [config] * samples
+    world, scenarios = rollout.worlds[0], [scenario] * samples
     agent = agent.branch(samples)
-    branch = _branched(task, here, (agent, agent.other_half()), configs, physics, begin=False)
-    whole = Trace(branch, trace)
-    policy.wanted, wanted = None, policy.wanted
+    branch = _copied_rollout(task, world, (agent, agent.human_half()), scenarios, settings, begin=False)
+    branch_trace = Trace(branch, trace)
+    policy.n_predicted_actions, n_predicted_actions = None, policy.n_predicted_actions
     branch.step()
-    policy.wanted = wanted
-    plans = list(agent.predicted)
-    # The body while each plan is executed and nothing else.
-    held = [np.repeat(plan, hold, axis=0) for plan in plans]
-    alone = _branched(task, here, (RecordedAgent(held), RecordedAgent(held)), configs, physics, begin=True)
-    paths = Trace(alone)
-    alone.run(len(held[0]))
+    policy.n_predicted_actions = n_predicted_actions
+    chunks = list(agent.predicted)
+    # Execute each chunk to its end without replanning.
+    actions = [np.repeat(chunk, hold, axis=0) for chunk in chunks]
+    players = RecordedAgent(actions), RecordedAgent(actions)
+    planned = _copied_rollout(task, world, players, scenarios, settings, begin=True)
+    planned_trace = Trace(planned)
+    planned.run(len(actions[0]))
     branch.run()
 
-    def path(recorded: np.ndarray) -> np.ndarray:
+    def path(recorded: Array) -> Array:
         return outline.poses(task.states_of(recorded))[:, :2]
 
-    drawn = []
-    for k, plan in enumerate(plans):
-        outcome = Outcome(0, config, k, *measured(branch, whole, agent, k), task=task, end=branch.ends[k])
-        label = task.strategy(config, task.states_of(whole.states(k))) if outcome.success else None
-        drawn.append(PlanSample(plan, path(paths.states(k)), outcome, label))
-    (pose,) = outline.poses(here.observation[None]).tolist()
-    return Decision(config, tuple(pose), path(trace.states(0)), tuple(drawn), task)
+    chunk_samples = []
+    for k, chunk in enumerate(chunks):
+        measures = episode_measures(branch, branch_trace, agent, k)
+        episode = EpisodeResult(0, scenario, k, *measures, task=task, end=branch.ends[k])
+        route = task.strategy(scenario, task.states_of(branch_trace.states(k))) if episode.success else None
+        chunk_samples.append(ChunkSample(chunk, path(planned_trace.states(k)), episode, route))
+    (pose,) = outline.poses(world.observation[None]).tolist()
+    return BranchPoint(scenario, tuple(pose), path(trace.states(0)), tuple(chunk_samples), task)
 
 
-def _branched(task: PairTask, here: World, agents: Any, configs: Sequence[Any], physics: Any, begin: bool) -> Rollout:
-    """A rollout that goes on from a world, in as many copies as there are scenarios."""
-    worlds = [task.make_world(config, physics) for config in configs]
+def _copied_rollout(
+    task: PairTask, source: World, agents: Any, scenarios: Sequence[Any], settings: Any, begin: bool
+) -> Rollout:
+    """Creates a rollout whose worlds are copies of the source's present state, one for each scenario."""
+    worlds = [task.make_world(scenario, settings) for scenario in scenarios]
     for world in worlds:
-        world.restore(here.recorded)
-        world.step_count = here.step_count
-    return Rollout(task, configs, agents, worlds=worlds, begin=begin)
+        world.restore(source.recorded)
+        world.step_count = source.step_count
+    return Rollout(task, scenarios, agents, worlds=worlds, begin=begin)

@@ -1,1 +1,1 @@
-"""The same action chunks in less time: packed weights, ONNX Runtime, numba."""
+"""Fast sampling of action sequences: precomputed parts of the networks, ONNX Runtime, numba kernels."""

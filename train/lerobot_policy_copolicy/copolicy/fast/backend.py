@@ -1,4 +1,4 @@
-"""What can run the network of a plan, and what it needs."""
+"""Backends that run the network in inference, and the packages that they need."""
 
 from copolicy.dataset.command_line.extras import BACKEND_PACKAGES, require_packages
 
@@ -10,6 +10,6 @@ def require_backend(backend: str) -> None:
     """Checks that the packages of a backend are installed.
 
     Raises:
-        MissingExtraError: one is not.
+        MissingExtraError: a package is missing.
     """
     require_packages(*BACKENDS[backend])

@@ -1,4 +1,4 @@
-"""The residual perceptron for planning: what no step of a plan changes, and what only its step changes, once."""
+"""The residual perceptron for fast sampling: parts that do not depend on the noisy actions are precomputed."""
 
 from collections.abc import Callable
 
@@ -9,15 +9,15 @@ from ..denoiser_mlp import MlpDenoiser
 
 
 class FastMlp:
-    """An `MlpDenoiser` that knows the diffusion steps it will be asked for.
+    """An `MlpDenoiser` for known diffusion steps.
 
-    The first layer is linear in actions and history, so the part of the history is computed once a plan; the encoded
-    steps are a table of biases. Every input of a perceptron reaches every output, so no token can be left out.
+    The first layer is linear in actions and history, so the history's part is computed once per sampling. The encoded
+    steps are precomputed as biases. Every input reaches every output, so all tokens are denoised.
 
     Attributes:
-        tokens: how many tokens it denoises: all of them.
-        actions: `(width, T * action_size)`, columns of the first layer.
-        blocks, norm, head: the rest of the network.
+        tokens: number of denoised tokens, always T.
+        actions: `(width, T * action_size)` weights of the first layer for the actions.
+        blocks, norm, head: the other layers of the network.
     """
 
     def __init__(self, denoiser: MlpDenoiser, timesteps: Tensor, tokens: int):
@@ -30,16 +30,16 @@ class FastMlp:
         self._steps = denoiser.step_encoder(timesteps)[:, None] + biases  # (steps, n_layers, width)
 
     def begin(self, condition: Tensor) -> Callable[[int], tuple[Tensor, ...]]:
-        """What `denoise` reads at each index of a plan with this history, `(B, To, condition_size)`."""
+        """Returns a function of the step's index that gives the `inputs` of `denoise` for `(B, To, condition_size)`."""
         history = nn.functional.linear(condition.flatten(1), self._history, self._bias)
         return lambda index: (history, self._steps[index])
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
-        """One evaluation.
+        """Evaluates the network.
 
         Args:
             noisy_actions: `(B, T, action_size)`.
-            inputs: what the first layer makes of the history, `(B, width)`; and the bias of each block,
+            inputs: the first layer's output for the history, `(B, width)`, and the bias of each block,
                 `(n_layers, width)`.
 
         Returns:

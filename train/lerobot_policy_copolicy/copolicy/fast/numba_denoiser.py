@@ -1,10 +1,12 @@
-"""The denoisers for planning in machine code that numba compiles: one plan at a time, on one thread."""
+"""The fast denoisers in kernels compiled by numba, for small batches on one thread."""
 
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
+
+from copolicy.dataset.arrays import Array
 
 from . import numba_kernels as kernels
 from .mlp import FastMlp
@@ -13,10 +15,10 @@ from .transformer import FastTransformer
 
 
 class NumbaDenoiser:
-    """A denoiser whose steps run in compiled kernels; takes and gives what `denoise` of the fast networks does.
+    """A denoiser whose steps run in compiled kernels, with the interface of `FastTransformer.denoise`.
 
-    Twice as fast as ONNX Runtime for one table, slower for many; see `numba_kernels`. It compiles at the first plan,
-    in some ten seconds, and keeps the result in numba's cache for the next process.
+    Twice as fast as ONNX Runtime for one sequence, slower for many; see `numba_kernels`. The first evaluation compiles
+    the kernels in about ten seconds; numba caches them for later processes.
     """
 
     def __init__(self, denoiser: FastTransformer | FastMlp):
@@ -24,8 +26,8 @@ class NumbaDenoiser:
         self._evaluate = _transformer(denoiser) if isinstance(denoiser, FastTransformer) else _perceptron(denoiser)
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
-        """One evaluation, see `FastTransformer.denoise` and `FastMlp.denoise`."""
-        # Of another layout in memory an array would be another type, and the kernels compiled anew.
+        """Evaluates the network, see `FastTransformer.denoise` and `FastMlp.denoise`."""
+        # For an array of another memory layout, the kernels would be compiled again.
         actions = noisy_actions.contiguous().numpy()
         return torch.from_numpy(self._evaluate(actions, *(tensor.numpy() for tensor in inputs)))
 
@@ -41,7 +43,7 @@ def _transformer(denoiser: FastTransformer) -> Any:
     position, norm = _array(denoiser.position), Norm(*map(_array, denoiser.norm))
     heads = denoiser.n_heads
 
-    def evaluate(noisy: np.ndarray, keys: np.ndarray, scores: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def evaluate(noisy: Array, keys: Array, scores: Array, values: Array) -> Array:
         return kernels.transformer(noisy, embedding, position, layers, norm, head, heads, keys, scores, values)
 
     return evaluate
@@ -57,7 +59,7 @@ def _perceptron(denoiser: FastMlp) -> Any:
     actions, head = pack(_array(denoiser.actions)), _single(denoiser.head)
     norm = Norm(_array(denoiser.norm.weight), _array(denoiser.norm.bias))
 
-    def evaluate(noisy: np.ndarray, history: np.ndarray, biases: np.ndarray) -> np.ndarray:
+    def evaluate(noisy: Array, history: Array, biases: Array) -> Array:
         return kernels.perceptron(noisy.reshape(len(noisy), -1), actions, packed, norm, head, history, biases).reshape(
             noisy.shape
         )
@@ -69,7 +71,7 @@ def _linear(layers: Any) -> PackedLinear:
     return PackedLinear(_packed([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
-def _packed(weights: list[Tensor]) -> np.ndarray:
+def _packed(weights: list[Tensor]) -> Array:
     return np.stack([pack(_array(weight)) for weight in weights])
 
 
@@ -81,9 +83,9 @@ def _norm(layers: Any) -> Norm:
     return Norm(_stacked([layer.weight for layer in layers]), _stacked([layer.bias for layer in layers]))
 
 
-def _stacked(tensors: Any) -> np.ndarray:
+def _stacked(tensors: Any) -> Array:
     return np.stack([_array(tensor) for tensor in tensors])
 
 
-def _array(tensor: Tensor) -> np.ndarray:
+def _array(tensor: Tensor) -> Array:
     return np.ascontiguousarray(tensor.detach().numpy())

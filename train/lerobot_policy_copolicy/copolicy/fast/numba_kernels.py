@@ -1,12 +1,12 @@
-"""The networks of a plan as machine code for a few rows: what `NumbaDenoiser` calls.
+"""Kernels of the fast networks for few rows, compiled by numba and called by `NumbaDenoiser`.
 
-With the three tokens of one action, a step of the paper's network is 25 MB of weights, each used three times. General
-matrix products are slow there (ONNX Runtime reads them at 13 GB/s where the cache gives 55): they are made for many
-rows. Here the weights lie in the order in which they are read, four outputs side by side, and each is multiplied with
-three rows as it comes by; and a whole step is one call, where ONNX Runtime starts two hundred operators.
+With the three tokens of one action, a step of the paper's network reads 25 MB of weights and uses each three times.
+General matrix products are made for many rows and slow here: ONNX Runtime reads weights at 13 GB/s where the cache
+gives 55. These kernels read packed weights in order, four outputs side by side, and multiply each with three rows. A
+whole step is one call, where ONNX Runtime starts two hundred operators.
 
-All functions that numba caches are in this file, because it looks for changes in no other: who changes the layout in
-`packed_weights` changes this file with it.
+All functions that numba caches are in this file, because it checks no other file for changes: a change of the layout in
+`packed_weights` needs a change in this file.
 """
 
 import math
@@ -22,25 +22,26 @@ from numba.extending import intrinsic
 
 from .packed_weights import LANES, OUTPUTS, padded_size
 
-_ROWS = 3  # multiplied at once: with four outputs, twelve sums, three inputs and a weight fill AVX2's registers
+_ROWS = 3  # rows multiplied at once: twelve sums, three inputs and a weight fill AVX2's registers
 _BYTES = 4  # of a float32
 
-# Sums in any order and fused products; but infinities stay, because the masks are made of them.
+# Sums in any order and fused products, but no assumption of finite values, because masks are infinite.
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp", "afn"}
 
 
 def _jit(function: Any) -> Any:
     compiled = njit(nogil=True, error_model="numpy", fastmath=_FASTMATH)(function)
-    with suppress(RuntimeError):  # there is no folder to write to: it compiles in each process
+    with suppress(RuntimeError):  # without a writable folder it compiles in each process
         compiled.enable_caching()  # pyright: ignore[reportAttributeAccessIssue]
     return compiled
 
 
 def _block(rows: int) -> Any:
-    """`(weights, inputs, outputs, chunks, input_stride, output_stride)`: adds products to `rows` rows of outputs.
+    """Makes `multiply(weights, inputs, outputs, chunks, input_stride, output_stride)` for a number of rows.
 
-    The first three are addresses: of one block of packed weights, of the rows of inputs, and of the block's outputs in
-    the first row. Written in LLVM's terms, because compiled loops over four times three sums spill them.
+    It adds products to the outputs. The first three arguments are addresses: of one block of packed weights, of the
+    first row of inputs, and of the block's outputs in the first row. It is written in LLVM's intermediate language,
+    because numba's loops keep the four times three sums in memory instead of registers.
     """
     vector, number = ir.VectorType(ir.FloatType(), LANES), ir.FloatType()
 
@@ -52,17 +53,17 @@ def _block(rows: int) -> Any:
             weights, inputs, outputs, chunks, input_stride, output_stride = arguments
 
             def function(result, name, *parameters):
-                kind = ir.FunctionType(result, parameters)
-                return cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f32")
+                function_type = ir.FunctionType(result, parameters)
+                return cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.v{LANES}f32")
 
-            def moved(address, count, stride):
+            def offset(address, count, stride):
                 return builder.add(address, builder.mul(ir.Constant(address.type, count), stride))
 
-            def at(address, kind):
-                return builder.inttoptr(address, kind.as_pointer())
+            def pointer(address, element):
+                return builder.inttoptr(address, element.as_pointer())
 
-            def loaded(address):
-                load = builder.load(at(address, vector))
+            def load_vector(address):
+                load = builder.load(pointer(address, vector))
                 load.align = _BYTES  # pyright: ignore[reportAttributeAccessIssue]
                 return load
 
@@ -71,24 +72,24 @@ def _block(rows: int) -> Any:
             total = function(number, "vector.reduce.fadd", number, vector)
             zero = ir.Constant(vector, [0.0] * LANES)
             sums = [[cgutils.alloca_once(builder, vector) for _ in range(rows)] for _ in range(OUTPUTS)]
-            for place in chain(*sums):
-                builder.store(zero, place)
+            for accumulator in chain(*sums):
+                builder.store(zero, accumulator)
             with cgutils.for_range(builder, chunks) as loop:
-                values = moved(inputs, LANES * _BYTES, loop.index)
-                row_values = [loaded(moved(values, row, input_stride)) for row in range(rows)]
-                chunk = moved(weights, OUTPUTS * LANES * _BYTES, loop.index)
+                values = offset(inputs, LANES * _BYTES, loop.index)
+                row_values = [load_vector(offset(values, row, input_stride)) for row in range(rows)]
+                chunk = offset(weights, OUTPUTS * LANES * _BYTES, loop.index)
                 for output in range(OUTPUTS):
-                    weight = loaded(builder.add(chunk, ir.Constant(size, output * LANES * _BYTES)))
+                    weight = load_vector(builder.add(chunk, ir.Constant(size, output * LANES * _BYTES)))
                     for row in range(rows):
-                        so_far = builder.load(sums[output][row])
-                        added = builder.call(multiply_add, [weight, row_values[row], so_far])
+                        partial = builder.load(sums[output][row])
+                        added = builder.call(multiply_add, [weight, row_values[row], partial])
                         builder.store(added, sums[output][row])
             for output in range(OUTPUTS):
                 for row in range(rows):
-                    place = moved(builder.add(outputs, ir.Constant(size, output * _BYTES)), row, output_stride)
-                    start = builder.load(at(place, number))
+                    address = offset(builder.add(outputs, ir.Constant(size, output * _BYTES)), row, output_stride)
+                    start = builder.load(pointer(address, number))
                     parts = [start, builder.load(sums[output][row])]
-                    builder.store(builder.call(total, parts, fastmath=("reassoc",)), at(place, number))
+                    builder.store(builder.call(total, parts, fastmath=("reassoc",)), pointer(address, number))
             return context.get_dummy_value()
 
         return signature, generate
@@ -103,14 +104,14 @@ _padded_size = _jit(padded_size)
 
 
 @_jit
-def _room(rows, size):
-    """Zeros for rows of a size, padded to whole chunks."""
+def _padded_zeros(rows, size):
+    """Zeros `(rows, size)` with the size padded to whole chunks."""
     return np.zeros((rows, _padded_size(size, LANES)), np.float32)
 
 
 @_jit
 def _add_product(values, weight, out):
-    """Adds `values @ W.T` to `out`, for rows of padded length."""
+    """Adds `values @ W.T` to `out`; rows have padded length."""
     rows, chunks = values.shape[0], weight.shape[1]
     block = weight.ctypes.data
     for index in range(weight.shape[0]):
@@ -161,10 +162,10 @@ def _float32(*values: float) -> tuple:
     return tuple(np.float32(value) for value in values)
 
 
-# Of erf(x) / x in x squared, from the highest power down; fitted to within 1.5e-8 on [0, 3.9] by least squares,
-# reweighted towards the largest error.
-_ERF_ABOVE = _float32(2.05038518e-06, 2.87457968e-04, 3.83689993e-03, 5.29669905e-02, 1.91941539e-01, 1.12837903e00)
-_ERF_BELOW = _float32(3.82307582e-05, 1.18174059e-03, 1.51092511e-02, 1.14758423e-01, 5.03435538e-01, 1.0)
+# Polynomials in x squared whose quotient is erf(x) / x, highest power first; fitted to within 1.5e-8 on [0, 3.9] by
+# least squares, reweighted towards the largest error.
+_ERF_NUMERATOR = _float32(2.05038518e-06, 2.87457968e-04, 3.83689993e-03, 5.29669905e-02, 1.91941539e-01, 1.12837903e00)
+_ERF_DENOMINATOR = _float32(3.82307582e-05, 1.18174059e-03, 1.51092511e-02, 1.14758423e-01, 5.03435538e-01, 1.0)
 
 
 @_jit
@@ -174,16 +175,13 @@ def _polynomial(y, a, b, c, d, e, f):
 
 @_jit
 def gelu(values):
-    """The exact GELU, in place.
-
-    `erf` is a quotient of polynomials: the library's takes as long as the products.
-    """
+    """Applies the exact GELU in place; `erf` is a quotient of polynomials, since the library's is slow."""
     for row in range(values.shape[0]):
         for index in range(values.shape[1]):
             value = values[row, index]
             x = min(max(value * np.float32(0.70710678), np.float32(-3.9)), np.float32(3.9))
             y = x * x
-            erf = x * _polynomial(y, *_ERF_ABOVE) / _polynomial(y, *_ERF_BELOW)
+            erf = x * _polynomial(y, *_ERF_NUMERATOR) / _polynomial(y, *_ERF_DENOMINATOR)
             values[row, index] = np.float32(0.5) * value * (np.float32(1) + erf)
 
 
@@ -216,46 +214,46 @@ def _add_scaled(values, scale, out):
 
 @_jit
 def _attend(projected, width, heads, tokens, out):
-    """Self-attention of each table's tokens, from queries, keys and values side by side; none sees a later one."""
+    """Causal self-attention of the tokens of each sequence, from queries, keys and values side by side."""
     size = width // heads
     scale = np.float32(1) / np.sqrt(np.float32(size))
-    shares = np.empty(tokens, np.float32)
+    buffer = np.empty(tokens, np.float32)
     out[:] = 0
     for row in range(projected.shape[0]):
         first = row - row % tokens
-        seen = shares[: row - first + 1]
+        attention = buffer[: row - first + 1]
         for head in range(heads):
             begin, end = head * size, (head + 1) * size
             query = projected[row, begin:end]
-            for index in range(len(seen)):
-                seen[index] = scale * _dot(query, projected[first + index, width + begin : width + end])
-            _softmax(seen)
-            for index in range(len(seen)):
+            for index in range(len(attention)):
+                attention[index] = scale * _dot(query, projected[first + index, width + begin : width + end])
+            _softmax(attention)
+            for index in range(len(attention)):
                 values = projected[first + index, 2 * width + begin : 2 * width + end]
-                _add_scaled(values, seen[index], out[row, begin:end])
+                _add_scaled(values, attention[index], out[row, begin:end])
 
 
 @_jit
 def _memory(normed, keys, scores, values, heads, tokens):
-    """What each row takes from its table's memory, see `FastTransformer.denoise`: `(B * tokens, width)`."""
+    """Cross-attention of each row to its sequence's memory, see `FastTransformer.denoise`: `(B * tokens, width)`."""
     rows, width = keys.shape[1], keys.shape[2]
     memory = rows // heads
     added = np.zeros((normed.shape[0], width), np.float32)
-    shares = np.empty(rows, np.float32)
+    attention = np.empty(rows, np.float32)
     for row in range(normed.shape[0]):
-        table, token = row // tokens, row % tokens
+        sequence, token = row // tokens, row % tokens
         for index in range(rows):
-            shares[index] = scores[table, token, index] + _dot(normed[row, :width], keys[table, index])
+            attention[index] = scores[sequence, token, index] + _dot(normed[row, :width], keys[sequence, index])
         for head in range(heads):
-            _softmax(shares[head * memory : (head + 1) * memory])
+            _softmax(attention[head * memory : (head + 1) * memory])
         for index in range(rows):
-            _add_scaled(values[table, index], shares[index], added[row])
+            _add_scaled(values[sequence, index], attention[index], added[row])
     return added
 
 
 @_jit
 def transformer(noisy, embedding, position, layers, norm, head, heads, keys, scores, values):
-    """One evaluation of a `FastTransformer`.
+    """Evaluates a `FastTransformer`.
 
     Args:
         noisy: `(B, tokens, action_size)` float32 and contiguous, as all arrays here.
@@ -263,19 +261,19 @@ def transformer(noisy, embedding, position, layers, norm, head, heads, keys, sco
         position: `(tokens, width)`.
         layers: `PackedLayers`.
         norm, head: `Norm` and `PackedLinear` after the last layer.
-        heads: of the attention.
+        heads: number of attention heads.
         keys, scores, values: the memory of each layer: `(n_layers, B, rows, width)`, `(n_layers, B, tokens, rows)`
-            and as the keys.
+            and `(n_layers, B, rows, width)`.
 
     Returns:
         `(B, tokens, action_size)`.
     """
-    tables, tokens, size = noisy.shape
-    rows, width = tables * tokens, position.shape[1]
-    actions = _room(rows, size)
+    batch, tokens, size = noisy.shape
+    rows, width = batch * tokens, position.shape[1]
+    actions = _padded_zeros(rows, size)
     actions[:, :size] = noisy.reshape(rows, size)
-    stream, normed, attended = _room(rows, width), _room(rows, width), _room(rows, width)
-    projected, inner = _room(rows, 3 * width), _room(rows, layers.inner.bias.shape[1])
+    stream, normed, attended = _padded_zeros(rows, width), _padded_zeros(rows, width), _padded_zeros(rows, width)
+    projected, inner = _padded_zeros(rows, 3 * width), _padded_zeros(rows, layers.inner.bias.shape[1])
     for row in range(rows):
         stream[row, :width] = position[row % tokens]
     _add_linear(actions, embedding.weight, embedding.bias, stream)
@@ -293,31 +291,31 @@ def transformer(noisy, embedding, position, layers, norm, head, heads, keys, sco
         gelu(inner)
         _add_linear(inner, layers.outer.weight[index], layers.outer.bias[index], stream)
     _normalise(stream, norm.weight, norm.bias, normed)
-    prediction = _room(rows, size)
+    prediction = _padded_zeros(rows, size)
     _linear(normed, head.weight, head.bias, prediction)
-    return prediction[:, :size].copy().reshape(tables, tokens, size)
+    return prediction[:, :size].copy().reshape(batch, tokens, size)
 
 
 @_jit
 def perceptron(noisy, actions, blocks, norm, head, history, biases):
-    """One evaluation of a `FastMlp`.
+    """Evaluates a `FastMlp`.
 
     Args:
         noisy: `(B, T * action_size)` float32 and contiguous, as all arrays here.
         actions: packed weight of the actions in the first layer.
         blocks: `PackedBlocks`.
         norm, head: `Norm` and `PackedLinear` after the last block.
-        history: what the first layer makes of the history, `(B, width)`.
-        biases: of each block, `(n_layers, width)`.
+        history: the first layer's output for the history, `(B, width)`.
+        biases: `(n_layers, width)`, one bias per block.
 
     Returns:
         `(B, T * action_size)`.
     """
     rows, size = noisy.shape
     width = history.shape[1]
-    values = _room(rows, size)
+    values = _padded_zeros(rows, size)
     values[:, :size] = noisy
-    stream, normed, inner = _room(rows, width), _room(rows, width), _room(rows, width)
+    stream, normed, inner = _padded_zeros(rows, width), _padded_zeros(rows, width), _padded_zeros(rows, width)
     stream[:, :width] = history
     _add_product(values, actions, stream)
     for index in range(biases.shape[0]):
@@ -329,6 +327,6 @@ def perceptron(noisy, actions, blocks, norm, head, history, biases):
                 inner[row, column] = value / (np.float32(1) + math.exp(-value))
         _add_linear(inner, blocks.outer.weight[index], blocks.outer.bias[index], stream)
     _normalise(stream, norm.weight, norm.bias, normed)
-    prediction = _room(rows, size)
+    prediction = _padded_zeros(rows, size)
     _linear(normed, head.weight, head.bias, prediction)
     return prediction[:, :size].copy()

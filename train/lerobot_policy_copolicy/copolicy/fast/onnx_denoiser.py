@@ -1,7 +1,6 @@
-"""The denoisers for planning as ONNX graphs, run by ONNX Runtime on one thread.
+"""The fast denoisers as ONNX graphs, run by ONNX Runtime on one thread.
 
-The graphs are written down here operator by operator: exporting the torch module gives the same plan but takes seven
-seconds, where this takes a tenth of one.
+The graphs are built operator by operator in 0.1 s; exporting the torch module gives the same result but takes 7 s.
 """
 
 from typing import Any
@@ -17,9 +16,9 @@ _OPSET, _IR_VERSION = 20, 10
 
 
 class OnnxDenoiser:
-    """A denoiser whose steps run in ONNX Runtime; takes and gives what `denoise` of the fast networks does.
+    """A denoiser whose steps run in ONNX Runtime, with the interface of `FastTransformer.denoise`.
 
-    One thread that does not spin: a second one, or one that waits busily, fights with the loop that the plan is for.
+    It uses one thread without busy waiting: more threads compete with the control loop for the CPU.
     """
 
     def __init__(self, denoiser: FastTransformer | FastMlp):
@@ -34,14 +33,14 @@ class OnnxDenoiser:
         self._names = [entry.name for entry in self._session.get_inputs()]
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
-        """One evaluation, see `FastTransformer.denoise` and `FastMlp.denoise`."""
+        """Evaluates the network, see `FastTransformer.denoise` and `FastMlp.denoise`."""
         tensors = zip(self._names, (noisy_actions, *_by_layer(inputs)), strict=True)
         (prediction,) = self._session.run(None, {name: tensor.numpy() for name, tensor in tensors})
         return torch.from_numpy(prediction)
 
 
 def _by_layer(inputs: tuple[Tensor, ...]) -> list[Tensor]:
-    """Each layer's parts of a transformer's memory: cutting them out in the graph would copy them."""
+    """Splits a transformer's memory by layer, since slices in the graph would be copied."""
     return [part for stacked in inputs for part in (stacked.unbind() if stacked.ndim == 4 else [stacked])]
 
 
@@ -52,7 +51,7 @@ def denoiser_graph(denoiser: FastTransformer | FastMlp) -> bytes:
 
 
 class _Graph:
-    """Nodes of a graph in the order in which they are added; every value has a name."""
+    """Builder of an ONNX graph; values are referred to by name."""
 
     def __init__(self):
         from onnx import helper, numpy_helper
@@ -107,25 +106,25 @@ def _transformer(denoiser: FastTransformer) -> _Graph:
     ]
     causal = graph.constant(denoiser.causal_mask)
     by_head = graph.constant([0, 0, 3, heads, width // heads])
-    merged, by_row, rows_merged = (graph.constant([0, 0, *rest]) for rest in ([width], [heads, -1], [rows]))
+    merged, by_row, rows_merged = (graph.constant([0, 0, *sizes]) for sizes in ([width], [heads, -1], [rows]))
     first, second, third = (graph.constant(index) for index in range(3))
 
     def attended(projected: str) -> str:
         split = graph.add("Transpose", graph.add("Reshape", projected, by_head), perm=[2, 0, 3, 1, 4])
         query, key, value = (graph.add("Gather", split, index, axis=0) for index in (first, second, third))
         scores = graph.add("MatMul", query, graph.add("Transpose", key, perm=[0, 1, 3, 2]))
-        shares = graph.add("Softmax", graph.add("Add", scores, causal), axis=-1)
-        heads_first = graph.add("MatMul", shares, value)
+        attention = graph.add("Softmax", graph.add("Add", scores, causal), axis=-1)
+        heads_first = graph.add("MatMul", attention, value)
         return graph.add("Reshape", graph.add("Transpose", heads_first, perm=[0, 2, 1, 3]), merged)
 
     value = graph.add("Add", graph.linear(noisy, denoiser.embedding), graph.constant(denoiser.position))
     for layer, keys, scores, values in zip(denoiser.layers, *memory, strict=True):
         projected = graph.linear(graph.norm(value, layer.norm1), _scaled_queries(layer.self_in, width // heads))
         value = graph.add("Add", value, graph.linear(attended(projected), layer.self_out))
-        seen = graph.add("MatMul", graph.norm(value, layer.norm2), graph.add("Transpose", keys, perm=[0, 2, 1]))
-        seen = graph.add("Reshape", graph.add("Add", seen, scores), by_row)
-        shares = graph.add("Reshape", graph.add("Softmax", seen, axis=-1), rows_merged)
-        crossed = graph.add("Add", graph.add("MatMul", shares, values), graph.constant(layer.cross_bias))
+        logits = graph.add("MatMul", graph.norm(value, layer.norm2), graph.add("Transpose", keys, perm=[0, 2, 1]))
+        logits = graph.add("Reshape", graph.add("Add", logits, scores), by_row)
+        attention = graph.add("Reshape", graph.add("Softmax", logits, axis=-1), rows_merged)
+        crossed = graph.add("Add", graph.add("MatMul", attention, values), graph.constant(layer.cross_bias))
         value = graph.add("Add", value, crossed)
         hidden = graph.add("Gelu", graph.linear(graph.norm(value, layer.norm3), layer.inner))
         value = graph.add("Add", value, graph.linear(hidden, layer.outer))
@@ -134,7 +133,7 @@ def _transformer(denoiser: FastTransformer) -> _Graph:
 
 
 def _scaled_queries(projection: Affine, head_size: int) -> Affine:
-    """The self-attention's projection with the scale of its scores, which torch's attention applies by itself."""
+    """The self-attention's projection with the scale of its scores, which torch's attention applies itself."""
     scale = torch.ones(len(projection.bias))
     scale[: len(scale) // 3] = head_size**-0.5
     return Affine(projection.weight * scale[:, None], projection.bias * scale)

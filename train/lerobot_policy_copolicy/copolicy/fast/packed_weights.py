@@ -1,13 +1,15 @@
-"""Weights in the order in which the kernels of `numba_kernels` read them."""
+"""Packs weights in the memory order of `numba_kernels`."""
 
 from typing import NamedTuple
 
 import numpy as np
 from llvmlite import binding
 
-# Values of a vector register: sixteen in AVX-512; elsewhere eight, which fit in two of NEON's.
+from copolicy.dataset.arrays import Array
+
+# float32 values per vector register: 16 for AVX-512, else 8 (AVX2, or two registers of NEON).
 LANES = 16 if binding.get_host_cpu_features().get("avx512f") else 8
-OUTPUTS = 4  # side by side in packed weights
+OUTPUTS = 4  # outputs side by side in packed weights
 
 
 class PackedLinear(NamedTuple):
@@ -18,40 +20,40 @@ class PackedLinear(NamedTuple):
         bias: `(blocks * OUTPUTS,)` float32.
     """
 
-    weight: np.ndarray
-    bias: np.ndarray
+    weight: Array
+    bias: Array
 
 
 class Norm(NamedTuple):
     """Weight and bias of a layer normalisation, `(size,)` float32 each."""
 
-    weight: np.ndarray
-    bias: np.ndarray
+    weight: Array
+    bias: Array
 
 
 class PackedLayers(NamedTuple):
-    """The decoder layers of a `FastTransformer`, stacked: the parts in the order in which they act."""
+    """The stacked decoder layers of a `FastTransformer`, in the order of evaluation."""
 
     norm1: Norm
     self_in: PackedLinear
     self_out: PackedLinear
     norm2: Norm
-    cross_bias: np.ndarray
+    cross_bias: Array
     norm3: Norm
     inner: PackedLinear
     outer: PackedLinear
 
 
 class PackedBlocks(NamedTuple):
-    """The residual blocks of a `FastMlp`, stacked; the bias of `inner` depends on the step and is an input."""
+    """The stacked residual blocks of a `FastMlp`; the bias of `inner` depends on the step and is an input."""
 
     norm: Norm
-    inner: np.ndarray
+    inner: Array
     outer: PackedLinear
 
 
-def pack(weight: np.ndarray) -> np.ndarray:
-    """A weight matrix `(outputs, inputs)` in the order in which the kernels read it, padded with zeros.
+def pack(weight: Array) -> Array:
+    """Packs a weight matrix `(outputs, inputs)`, padded with zeros.
 
     Returns:
         `(blocks, chunks, OUTPUTS, LANES)` float32: element `[b, c, o, l]` is `weight[b * OUTPUTS + o, c * LANES + l]`.

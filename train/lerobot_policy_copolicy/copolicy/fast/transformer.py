@@ -1,4 +1,4 @@
-"""The transformer for planning: conditioning once a plan, the diffusion step from a table, no token too many."""
+"""The transformer for fast sampling: the memory is precomputed, and only the needed tokens are denoised."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ class Affine(NamedTuple):
 
 
 class DecoderLayer(NamedTuple):
-    """What is left of a decoder layer once it knows its memory; the parts in the order in which they act."""
+    """A decoder layer without the projections that are precomputed with the memory, in the order of evaluation."""
 
     norm1: Affine
     self_in: Affine  # to queries, keys and values
@@ -30,24 +30,24 @@ class DecoderLayer(NamedTuple):
 
 
 class FastTransformer:
-    """A `TransformerDenoiser` that knows the diffusion steps and the number of tokens it will be asked for.
+    """A `TransformerDenoiser` for known diffusion steps and a number of tokens.
 
-    Three savings that change nothing but the rounding:
+    Three optimisations, with equal results up to rounding:
 
-    - Memory tokens are encoded one by one, so those of the history are constant in a plan and that of the diffusion
-      step comes from a table.
-    - Cross-attention compares a key k with the query of a token x, k (Q x + q) = (k Q) x + k q, sums values and
-      projects the sum. With a constant memory both projections become a part of it, and leave the loop.
-    - No action sees a later one, so the actions after the last one that is wanted are not denoised.
+    - Memory tokens are encoded independently, so those of the history are constant during sampling, and that of the
+      diffusion step is precomputed for all steps.
+    - Cross-attention multiplies a key k with the query of a token x, k (Q x + q) = (k Q) x + k q, sums values and
+      projects the sum. With a constant memory both projections are applied to the memory once, outside the loop.
+    - No action attends to a later one, so only the first `tokens` actions are denoised.
 
     Attributes:
-        tokens: how many tokens it denoises.
-        n_heads: of the attention.
-        embedding, position: of the actions, `(tokens, width)`.
+        tokens: number of denoised tokens.
+        n_heads: number of attention heads.
+        embedding, position: embedding of the actions, and their positions `(tokens, width)`.
         layers: the decoder.
-        norm, head: after the last layer.
-        causal_mask: `(tokens, tokens)`, minus infinity where a token must not look.
-        rows: heads times memory tokens, what each token compares itself with in a layer.
+        norm, head: the layers after the decoder.
+        causal_mask: `(tokens, tokens)`, minus infinity for later tokens.
+        rows: number of heads times memory tokens.
     """
 
     def __init__(self, denoiser: TransformerDenoiser, timesteps: Tensor, tokens: int):
@@ -65,36 +65,36 @@ class FastTransformer:
         self._steps = self._absorbed(denoiser.condition_encoder(encoded)[:, None])  # with the steps as the batch
 
     def begin(self, condition: Tensor) -> Callable[[int], tuple[Tensor, ...]]:
-        """What `denoise` reads at each index of a plan with this history, `(B, To, condition_size)`.
+        """Returns a function of the step's index that gives the `inputs` of `denoise` for `(B, To, condition_size)`.
 
-        The tensors are the same for all indices and are written over when the next one is asked for.
+        The tensors are overwritten at the next call of the function.
         """
         embedded = self._denoiser.condition_embedding(condition) + self._denoiser.condition_position[:, 1:]
         keys, bias, values = (
-            # The step is the first token of the memory; its place is filled in at each index.
+            # The step is the first token of the memory; its rows are filled in at each index.
             nn.functional.pad(part, (0, 0, 1, 0))
             for part in self._absorbed(self._denoiser.condition_encoder(embedded))
         )
         scores = bias.flatten(2)[:, :, None] + self._hidden  # (n_layers, B, tokens, heads * memory)
-        places = keys[:, :, :, 0], scores.unflatten(-1, (self.n_heads, -1))[..., 0], values[:, :, :, 0]
+        step_rows = keys[:, :, :, 0], scores.unflatten(-1, (self.n_heads, -1))[..., 0], values[:, :, :, 0]
         inputs = keys.flatten(2, 3), scores, values.flatten(2, 3)
 
-        def at(index: int) -> tuple[Tensor, ...]:
+        def inputs_at(index: int) -> tuple[Tensor, ...]:
             key, score, value = (part[:, index, :, 0] for part in self._steps)
-            for place, row in zip(places, (key[:, None], score[:, None, None, :, 0], value[:, None]), strict=True):
-                place.copy_(row)
+            for rows, new in zip(step_rows, (key[:, None], score[:, None, None, :, 0], value[:, None]), strict=True):
+                rows.copy_(new)
             return inputs
 
-        return at
+        return inputs_at
 
     def denoise(self, noisy_actions: Tensor, inputs: tuple[Tensor, ...]) -> Tensor:
-        """One evaluation.
+        """Evaluates the network.
 
         Args:
             noisy_actions: `(B, tokens, action_size)`.
-            inputs: of each layer, with one row for each head and memory token: what to multiply a token with for its
-                score, `(n_layers, B, rows, width)`; the rest of the score, `(n_layers, B, tokens, rows)`; and what
-                the row adds to the output of the attention, `(n_layers, B, rows, width)`.
+            inputs: for each layer, with one row per head and memory token: keys that a token is multiplied with,
+                `(n_layers, B, rows, width)`; scores to add, `(n_layers, B, tokens, rows)`; and projected values,
+                `(n_layers, B, rows, width)`.
 
         Returns:
             `(B, tokens, action_size)`, the prediction.
@@ -105,9 +105,9 @@ class FastTransformer:
             tokens = tokens + linear(
                 self._attended(linear(_norm(tokens, layer.norm1), *layer.self_in)), *layer.self_out
             )
-            seen = torch.baddbmm(scores, _norm(tokens, layer.norm2), keys.mT)
-            shares = seen.unflatten(-1, (self.n_heads, -1)).softmax(dim=-1).flatten(-2)
-            tokens = tokens + torch.bmm(shares, values) + layer.cross_bias
+            logits = torch.baddbmm(scores, _norm(tokens, layer.norm2), keys.mT)
+            attention = logits.unflatten(-1, (self.n_heads, -1)).softmax(dim=-1).flatten(-2)
+            tokens = tokens + torch.bmm(attention, values) + layer.cross_bias
             hidden = nn.functional.gelu(linear(_norm(tokens, layer.norm3), *layer.inner))
             tokens = tokens + linear(hidden, *layer.outer)
         return linear(_norm(tokens, self.norm), *self.head)
@@ -118,7 +118,7 @@ class FastTransformer:
         return attended.transpose(1, 2).flatten(-2)
 
     def _absorb_projections(self) -> None:
-        """The cross-attention weights of all layers side by side, because the memory is the same for all."""
+        """Joins the cross-attention weights of all layers, since all layers have the same memory."""
         attention: list[Any] = [layer.multihead_attn for layer in self._denoiser.layers]
         width = attention[0].embed_dim
         weights = torch.stack([part.in_proj_weight for part in attention]).unflatten(1, (3, width))
@@ -131,10 +131,10 @@ class FastTransformer:
         self._out = out.reshape(heads, -1, width)
 
     def _absorbed(self, memory: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Memory tokens `(B, M, width)` as the tokens of each layer see them, with the projections around them.
+        """Projects memory tokens `(B, M, width)` for each layer, including the query and output projections.
 
         Returns:
-            Keys `(n_layers, B, heads, M, width)`, scores with 1 in place of width, and values as the keys.
+            Keys `(n_layers, B, heads, M, width)`, scores `(n_layers, B, heads, M, 1)`, and values like the keys.
         """
         projected = nn.functional.linear(memory.flatten(0, 1), *self._key_value)  # (B M, 2 n_layers width)
         key, value = projected.unflatten(-1, (2, len(self._query), -1)).permute(1, 2, 0, 3)
@@ -163,7 +163,7 @@ def _affine(layer) -> Affine:
 
 
 def _input_major(layer, weight: str = "weight", bias: str = "bias") -> Affine:
-    """The same matrix with the inputs as its rows in memory: for few tokens a third faster to multiply with."""
+    """The same matrix in column-major memory order, which is a third faster for few tokens."""
     return Affine(getattr(layer, weight).T.contiguous().T, getattr(layer, bias))
 
 

@@ -1,11 +1,12 @@
-"""Simulated pilots: each holds one end of the table and sees nothing but its motion.
+"""Scripted players: each acts at one end of the table and observes only the table's state.
 
-What finds routes (`scripted`) is loaded with the first of them: flags, which list the habits, need none of it.
+`scripted_player` and with it scipy are imported when a player is made, so that command-line flags can list names.
 """
 
 from .players import scripted_robot, simulated_pair, simulated_partner
-from .profiles import NEVER_YIELDS, PAIRS, PARTNERS, ROBOTS, Habits
+from .profiles import NEVER_YIELDS, PAIRS, PARTNERS, ROBOTS, PlayerProfile
 
 __all__ = [
-    "NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS", "Habits", "scripted_robot", "simulated_pair", "simulated_partner",
+    "NEVER_YIELDS", "PAIRS", "PARTNERS", "ROBOTS", "PlayerProfile",
+    "scripted_robot", "simulated_pair", "simulated_partner",
 ]  # fmt: skip

@@ -1,11 +1,13 @@
-"""How far the table is from obstacles and walls on a grid of poses."""
+"""Distance of the table from obstacles and walls, for arrays of poses."""
 
 import numpy as np
 
-from ..map_config import WINDOW
-from ..outline import BOARD, BOARD_CORNER_RADIUS, CIRCLE_RADIUS, IMAGE_SIZE
+from copolicy.dataset.arrays import Array
 
-# Discs (u, v, r) that cover the table, made symmetric under half a turn: the plan does not care which end leads.
+from ..geometry import BOARD, BOARD_CORNER_RADIUS, CIRCLE_RADIUS, IMAGE_SIZE
+from ..map_config import WINDOW
+
+# Discs (u, v, r) that cover the table, symmetric under half a turn, since either end may lead.
 _INNER_U = (BOARD[2] - BOARD[0]) / 2 - BOARD_CORNER_RADIUS + 2.5
 _INNER_V = BOARD[3] - BOARD_CORNER_RADIUS
 DISCS = np.array(
@@ -15,9 +17,7 @@ DISCS = np.array(
 )
 
 
-def square_clearance(
-    x: np.ndarray, y: np.ndarray, theta: np.ndarray, centre: tuple[float, float], size: float
-) -> np.ndarray:
+def square_clearance(x: Array, y: Array, theta: Array, centre: tuple[float, float], size: float) -> Array:
     """Distance between the table at poses (x, y, theta) and a square, px; negative where they overlap."""
     cos, sin = np.cos(theta), np.sin(theta)
     nearest = np.full(np.broadcast_shapes(x.shape, y.shape, theta.shape), np.inf)
@@ -28,11 +28,11 @@ def square_clearance(
     return nearest
 
 
-def wall_clearance(x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """Distance between the box of the turned image and the edge of the window, px; negative where it leaves it."""
+def wall_clearance(x: Array, y: Array, theta: Array) -> Array:
+    """Distance between the box of the rotated table image and the edge of the window, px; negative outside."""
     width, height = IMAGE_SIZE
     cos, sin = np.abs(np.cos(theta)), np.abs(np.sin(theta))
     half_width, half_height = (width * cos + height * sin) / 2, (width * sin + height * cos) / 2
-    sideways = np.minimum(x, WINDOW[0] - x) - half_width
-    upright = np.minimum(y, WINDOW[1] - y) - half_height
-    return np.minimum(sideways, upright)
+    horizontal = np.minimum(x, WINDOW[0] - x) - half_width
+    vertical = np.minimum(y, WINDOW[1] - y) - half_height
+    return np.minimum(horizontal, vertical)

@@ -1,4 +1,4 @@
-"""Habits of simulated players: of five pairs, of kinds of partner to judge a robot with, and of scripted robots."""
+"""Profiles of scripted players: of five simulated pairs, of kinds of partner in studies, and of scripted robots."""
 
 import math
 from dataclasses import dataclass, fields
@@ -7,87 +7,87 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 
 @dataclass(frozen=True)
-class Habits:
-    """How one simulated player carries."""
+class PlayerProfile:
+    """Parameters of one scripted player."""
 
     speed: float = 48.0
-    """Speed that it aims for on a free path, px/s; two full forces reach 50."""
+    """Target speed on a free path, px/s; two full forces reach 50."""
     effort: float = 1.0
-    """Share of its half of the force: above 1 it leads, below 1 it leaves work to the other."""
+    """Factor on its half of the joint force: above 1 it leads, below 1 it leaves work to the partner."""
     delay_steps: int = 4
-    """Reaction time, steps of 1/30 s: it acts on what it saw so long ago."""
+    """Reaction time, steps of 1/30 s: it acts on the state of so many steps ago."""
     noise: float = 0.1
-    """Standard deviation of the slow noise on its force (Ornstein-Uhlenbeck, 0.5 s), of a full force."""
+    """Standard deviation of the additive noise (Ornstein-Uhlenbeck, 0.5 s), of a full force."""
     impulsiveness: float = 0.4
-    """It pushes in pulses of about a second, each weaker by up to this share of its force; 0 is steady."""
+    """It applies its force in pulses of about 1 s; each is weaker by up to this proportion. 0 is steady."""
     effort_drift: float = 0.2
-    """How much its effort wanders over some seconds, in logarithms of the force: who leads changes."""
+    """Standard deviation of the logarithm of its effort, which drifts over some seconds, so that the leader changes."""
     pauses_per_min: float = 2.0
-    """How often it rests, for 0.4 to 1.2 s."""
+    """Rate of pauses of 0.4 to 1.2 s."""
     slips_per_min: float = 1.0
-    """How often it slips: pushes somewhere for 0.2 to 0.5 s, with 0.4 to 0.9 of a full force."""
+    """Rate of slips: forces in a random direction for 0.2 to 0.5 s, of 0.4 to 0.9 of a full force."""
     route_temperature: float = 90.0
-    """How freely it chooses its route, px: a route longer by so much is e times less likely."""
+    """Temperature of the softmax over route lengths, px: a route that is longer by so much is e times less likely."""
     left_bias: float = 0.0
-    """Detour that it takes for passing one obstacle on side L (below it, when going right), px; negative for R."""
+    """Detour that it accepts to pass one obstacle on side L (below it, when going right), px; negative for R."""
     patience_s: float = 1.0
-    """How long it insists on its route while the other pulls towards another one, s."""
+    """Time until it gives up its route while the partner pulls towards another one, s."""
     clearance: float = 1.7
-    """How wide it keeps from obstacles: 1 hugs them, 2.6 is wider than people go (they: 1.6 to 1.8)."""
+    """Factor on the distance it keeps from obstacles: 1 passes closely, people 1.6 to 1.8, 2.6 is wider than people."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in (field.name for field in fields(self)):
             value = getattr(self, name)
             if not math.isfinite(value) or (value < 0 and name != "left_bias"):
-                raise InvalidValueError(f"Habits.{name}", "a finite number, not negative", value)
+                raise InvalidValueError(f"PlayerProfile.{name}", "a finite number, not negative", value)
         for name in ("speed", "route_temperature", "clearance"):
             if not getattr(self, name) > 0:
-                raise InvalidValueError(f"Habits.{name}", "a positive number", getattr(self, name))
+                raise InvalidValueError(f"PlayerProfile.{name}", "a positive number", getattr(self, name))
         if not isinstance(self.delay_steps, int):
-            raise InvalidValueError("Habits.delay_steps", "a whole number", self.delay_steps)
+            raise InvalidValueError("PlayerProfile.delay_steps", "a whole number", self.delay_steps)
         if self.impulsiveness > 1:
-            raise InvalidValueError("Habits.impulsiveness", "at most 1", self.impulsiveness)
+            raise InvalidValueError("PlayerProfile.impulsiveness", "at most 1", self.impulsiveness)
 
 
-PAIRS: dict[str, tuple[Habits, Habits]] = {
-    # Two of a kind.
-    "S01": (Habits(), Habits(delay_steps=3, patience_s=1.4)),
-    # The robot seat leads: quick, strong, slow to give in; the other follows.
+PAIRS: dict[str, tuple[PlayerProfile, PlayerProfile]] = {
+    # Two of the same kind.
+    "S01": (PlayerProfile(), PlayerProfile(delay_steps=3, patience_s=1.4)),
+    # The robot's seat leads: fast, strong, slow to yield; the human's follows.
     "S02": (
-        Habits(speed=49.0, effort=1.08, delay_steps=3, patience_s=2.5, impulsiveness=0.2),
-        Habits(speed=46.0, effort=0.92, delay_steps=5, patience_s=0.5),
+        PlayerProfile(speed=49.0, effort=1.08, delay_steps=3, patience_s=2.5, impulsiveness=0.2),
+        PlayerProfile(speed=46.0, effort=0.92, delay_steps=5, patience_s=0.5),
     ),
-    # The human seat leads and likes to pass below.
+    # The human's seat leads and prefers to pass below.
     "S03": (
-        Habits(speed=46.0, effort=0.92, delay_steps=5, patience_s=0.5),
-        Habits(speed=49.0, effort=1.08, delay_steps=3, patience_s=2.5, left_bias=15.0),
+        PlayerProfile(speed=46.0, effort=0.92, delay_steps=5, patience_s=0.5),
+        PlayerProfile(speed=49.0, effort=1.08, delay_steps=3, patience_s=2.5, left_bias=15.0),
     ),
     # Both impulsive, with opposite preferences and little patience.
     "S04": (
-        Habits(impulsiveness=0.5, noise=0.12, left_bias=20.0, patience_s=0.7),
-        Habits(impulsiveness=0.5, noise=0.12, left_bias=-20.0, patience_s=0.9, delay_steps=2),
+        PlayerProfile(impulsiveness=0.5, noise=0.12, left_bias=20.0, patience_s=0.7),
+        PlayerProfile(impulsiveness=0.5, noise=0.12, left_bias=-20.0, patience_s=0.9, delay_steps=2),
     ),
-    # Both careful: slow, steady, late to react, in agreement on the shorter way.
+    # Both careful: slow, steady, late to react, mostly on the shorter route.
     "S05": (
-        Habits(speed=44.0, noise=0.06, impulsiveness=0.2, delay_steps=6, route_temperature=60.0, patience_s=1.5),
-        Habits(speed=45.0, noise=0.06, impulsiveness=0.2, delay_steps=5, route_temperature=60.0, patience_s=1.0),
+        PlayerProfile(speed=44.0, noise=0.06, impulsiveness=0.2, delay_steps=6, route_temperature=60.0, patience_s=1.5),
+        PlayerProfile(speed=45.0, noise=0.06, impulsiveness=0.2, delay_steps=5, route_temperature=60.0, patience_s=1.0),
     ),
 }
-"""Habits of five simulated pairs: (robot seat, human seat)."""
+"""Profiles of five simulated pairs: (robot's seat, human's seat)."""
 
-PARTNERS: dict[str, Habits] = {
-    # Goes its own way, longer ones too, pulls hard and all but never gives in: come along, or both stand.
-    "stubborn": Habits(effort=1.15, delay_steps=3, route_temperature=250.0, patience_s=60.0, impulsiveness=0.2),
-    # Leaves most of the work and every decision to the other.
-    "follower": Habits(speed=44.0, effort=0.5, delay_steps=5, patience_s=0.25, impulsiveness=0.3),
-    # Goes at half the pace and takes a third of a second to react.
-    "slow": Habits(speed=26.0, delay_steps=10, patience_s=2.0, noise=0.06, impulsiveness=0.2),
-    # Pushes in bursts, wanders and slips, picks routes by whim and drops them as quickly.
-    "erratic": Habits(noise=0.3, impulsiveness=0.9, slips_per_min=6.0, route_temperature=400.0, patience_s=0.4),
+PARTNERS: dict[str, PlayerProfile] = {
+    # Follows its own route, even a longer one, with a strong force, and hardly ever yields.
+    "stubborn": PlayerProfile(effort=1.15, delay_steps=3, route_temperature=250.0, patience_s=60.0, impulsiveness=0.2),
+    # Leaves most of the work and the choice of route to the partner.
+    "follower": PlayerProfile(speed=44.0, effort=0.5, delay_steps=5, patience_s=0.25, impulsiveness=0.3),
+    # Half the speed, and a reaction time of a third of a second.
+    "slow": PlayerProfile(speed=26.0, delay_steps=10, patience_s=2.0, noise=0.06, impulsiveness=0.2),
+    # Strong pulses, noise and slips; chooses routes almost at random and changes them soon.
+    "erratic": PlayerProfile(noise=0.3, impulsiveness=0.9, slips_per_min=6.0, route_temperature=400.0, patience_s=0.4),
 }
-"""Habits by kind. They differ in what a robot has to cope with, not in skill: all see the map and know every way."""
+"""Profiles by kind of partner. All know the map and every route; they differ in what a robot must adapt to."""
 
-NEVER_YIELDS = Habits(
+NEVER_YIELDS = PlayerProfile(
     noise=0.0,
     impulsiveness=0.0,
     effort_drift=0.0,
@@ -96,11 +96,14 @@ NEVER_YIELDS = Habits(
     delay_steps=2,
     patience_s=1e6,
 )
-"""A player who carries cleanly along its own route and has endless patience: the floor of a robot that never adapts."""
+"""A player without motor noise that never changes its route: the lower reference of a robot that does not adapt."""
 
-ROBOTS: dict[str, tuple[Habits, str]] = {
-    "never-yields": (NEVER_YIELDS, "a clean scripted pilot with endless patience for its own route"),
+ROBOTS: dict[str, tuple[PlayerProfile, str]] = {
+    "never-yields": (NEVER_YIELDS, "a scripted agent without motor noise that never changes its route"),
     # What a policy that learned from simulated people could reach.
-    "scripted": (Habits(), "a usual simulated pilot, who gives way: a reference, no floor"),
+    "scripted": (
+        PlayerProfile(),
+        "a scripted agent of the usual profile, which yields: a reference, not a lower bound",
+    ),
 }
-"""Scripted players for the robot seat of a study by name: habits, and what a result says of them."""
+"""Scripted players for the robot's seat of a study, by name: profile, and description for results."""

@@ -1,1 +1,1 @@
-"""Draws the table on its map: on a surface, and as a scene of Foxglove and Rerun."""
+"""Draws the table on its map: on a pygame surface, and as scenes for Foxglove and Rerun."""

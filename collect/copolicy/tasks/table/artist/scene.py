@@ -1,7 +1,7 @@
-"""The scene that Foxglove draws: table, players, forces, obstacles and goal as `foxglove.SceneUpdate`.
+"""The scene for Foxglove: table, players, forces, obstacles and goal as `foxglove.SceneUpdate`.
 
 Scene units are metres, 1 px = 0.01 m, and y points up: (x, y) px is at (0.01 x, 0.01 (600 - y)) m.
-Angles stay as they are, since theta is counter-clockwise on screen.
+Angles are the same, since theta is counter-clockwise on screen.
 """
 
 import math
@@ -12,26 +12,26 @@ from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from copolicy.dataset.outline import placed
+from copolicy.dataset.outline import to_scene
 from copolicy.dataset.recording.topics import Topic
 from copolicy.dataset.task_spec import PLAYERS
 
+from ..geometry import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import WINDOW, MapConfig
-from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 
-FRAME_WORDS = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
-SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": FRAME_WORDS})
-SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": FRAME_WORDS})
+FRAME_DESCRIPTION = "world: x right, y up, z out of the screen; 1 px = 0.01 m"
+SCENE_MAP = Topic("/scene/map", SceneUpdate, {"units": "m", "frame": FRAME_DESCRIPTION})
+SCENE = Topic("/scene", SceneUpdate, {"units": "m", "frame": FRAME_DESCRIPTION})
 
 FRAME = "world"
 METRES_PER_PIXEL = 0.01
 
-HEIGHT = 0.2  # m, of everything that stands on the floor
+HEIGHT = 0.2  # m, of all solids
 _FORCE_LENGTH = 1.0  # m, shaft of a player's full force
-_HEAD_LENGTH = 0.15  # m
+_HEAD_LENGTH = 0.15  # m, head of its arrow
 BOARD_CENTRE = ((BOARD[0] + BOARD[2]) / 2, (BOARD[1] + BOARD[3]) / 2)
-# Where a player's force is drawn: the middle of the triangle and of the circle, image coordinates in px.
+# Origin of a player's force: the centre of the triangle and of the circle, image coordinates in px.
 _SEATS = ((75.5, 6.0), CIRCLE_CENTRE)
 COLOURS = {
     "table": Color(r=0.55, g=0.40, b=0.25, a=1.0),
@@ -46,17 +46,17 @@ Pose = tuple[float, float, float]
 
 
 def map_scene(map_config: MapConfig, time_ns: int) -> bytes:
-    """What stands still on a map: the goal, the obstacles and the border of the window, as a serialised SceneUpdate.
+    """The fixed parts: goal, obstacles and border of the window, as a serialised SceneUpdate.
 
-    It has a topic of its own, written once: a viewer that jumps to a time shows the last message of each topic.
+    They have their own topic, written once, since a viewer that seeks shows the last message of each topic.
     """
     update = SceneUpdate()
     squares = [("goal", "goal", map_config.goal, GOAL_SIZE)]
     for index, (centre, size) in enumerate(map_config.squares):
         squares.append((f"obstacle_{index}", "obstacle", centre, size))
-    for name, kind, centre, size in squares:
-        cube = _entity(update, name, time_ns).cubes.add(color=COLOURS[kind])
-        _place(cube.pose, *metres(centre), z=HEIGHT / 2)
+    for name, colour, centre, size in squares:
+        cube = _entity(update, name, time_ns).cubes.add(color=COLOURS[colour])
+        _set_position(cube.pose, *metres(centre), z=HEIGHT / 2)
         cube.pose.orientation.w = 1.0
         _size(cube.size, size, size)
     border = _entity(update, "window", time_ns).lines.add(
@@ -70,10 +70,10 @@ def map_scene(map_config: MapConfig, time_ns: int) -> bytes:
 
 
 class TableScene:
-    """What moves: the table's board, the two ends where the players hold it, and their forces.
+    """The moving parts: the table's board, its two ends, and the forces of the players.
 
-    The message is built once and only its poses and lengths change from step to step, which costs less than half
-    of building it anew.
+    The message is built once and only its poses and lengths change from step to step, which takes less than half the
+    time of building it.
     """
 
     def __init__(self):
@@ -90,7 +90,7 @@ class TableScene:
         for u, v in reversed(TRIANGLE):  # counter-clockwise from above once v points up
             triangle.points.append(Point3(x=u * METRES_PER_PIXEL, y=-v * METRES_PER_PIXEL, z=0.0))
         triangle.indices.extend((0, 1, 2, 0, 2, 3))
-        # The triangle's points are relative to the middle of the table, the other parts have their own middle.
+        # The triangle's points are relative to the centre of the table, the other parts to their own centres.
         self._parts = (
             (board.pose, BOARD_CENTRE, HEIGHT / 2),
             (circle.pose, CIRCLE_CENTRE, HEIGHT / 2),
@@ -106,17 +106,17 @@ class TableScene:
         seconds, nanos = divmod(time_ns, 10**9)
         for timestamp in self._timestamps:
             timestamp.seconds, timestamp.nanos = seconds, nanos
-        z, w = half_turn(pose[2])
+        z, w = quaternion_zw(pose[2])
         for part, point, height in self._parts:
-            _place(part, *_of_table(pose, point), height)
+            _set_position(part, *_to_scene(pose, point), height)
             part.orientation.z, part.orientation.w = z, w
         for player, arrow in enumerate(self._arrows):
             fx, fy = action[2 * player], -action[2 * player + 1]
             strength, yaw = math.hypot(fx, fy), math.atan2(fy, fx)
-            _place(arrow.pose, *_of_table(pose, _SEATS[player]), HEIGHT)
-            arrow.pose.orientation.z, arrow.pose.orientation.w = half_turn(yaw)
-            arrow.shaft_length = coarse(_FORCE_LENGTH * strength)
-            arrow.head_length = coarse(_HEAD_LENGTH * strength)
+            _set_position(arrow.pose, *_to_scene(pose, _SEATS[player]), HEIGHT)
+            arrow.pose.orientation.z, arrow.pose.orientation.w = quaternion_zw(yaw)
+            arrow.shaft_length = rounded(_FORCE_LENGTH * strength)
+            arrow.head_length = rounded(_HEAD_LENGTH * strength)
         return self._update.SerializeToString()
 
 
@@ -127,26 +127,27 @@ def _entity(update: Any, name: str, time_ns: int) -> Any:
 
 
 def metres(point: tuple[float, float]) -> tuple[float, float]:
+    """Scene coordinates, m, of a point on screen, px."""
     return METRES_PER_PIXEL * point[0], METRES_PER_PIXEL * (WINDOW[1] - point[1])
 
 
-def _of_table(pose: Pose, point: tuple[float, float]) -> tuple[float, float]:
-    """Where a point (u, v) of the table is in the scene."""
-    x, y = metres(placed(pose, point))
-    return coarse(x), coarse(y)
+def _to_scene(pose: Pose, point: tuple[float, float]) -> tuple[float, float]:
+    """Scene coordinates, m, of a point (u, v) of the table at a pose, px."""
+    x, y = metres(to_scene(pose, point))
+    return rounded(x), rounded(y)
 
 
-def half_turn(yaw: float) -> tuple[float, float]:
+def quaternion_zw(yaw: float) -> tuple[float, float]:
     """z and w of the quaternion that turns by `yaw` (rad)."""
-    return coarse(math.sin(yaw / 2)), coarse(math.cos(yaw / 2))
+    return rounded(math.sin(yaw / 2)), rounded(math.cos(yaw / 2))
 
 
-def coarse(value: float) -> float:
-    """To 1/4096, a fortieth of a pixel: enough to look at, and the empty digits compress to nothing."""
+def rounded(value: float) -> float:
+    """Rounded to 1/4096, a fortieth of a pixel, so that messages compress well."""
     return round(value * 4096) / 4096
 
 
-def _place(pose: Any, x: float, y: float, z: float) -> None:
+def _set_position(pose: Any, x: float, y: float, z: float) -> None:
     position = pose.position
     position.x, position.y, position.z = x, y, z
 

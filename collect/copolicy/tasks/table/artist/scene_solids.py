@@ -1,7 +1,7 @@
-"""The same scene for viewers that map no SceneUpdate, Rerun among them: boxes as VoxelGrid, the table as a frame.
+"""The same scene for viewers that do not support SceneUpdate, such as Rerun: boxes as VoxelGrid, the table as a frame.
 
-A box is a `foxglove.VoxelGrid` of one cell, written once: goal and obstacles stand in the frame `world`, the table and
-its two ends in the frame `table`. What moves is a `foxglove.FrameTransform` from `world` to `table`, one a step.
+A box is a `foxglove.VoxelGrid` of one cell, written once: goal and obstacles in the frame `world`, the table and its
+two ends in the frame `table`. A `foxglove.FrameTransform` from `world` to `table` is written each step.
 Units and axes are those of `scene`.
 """
 
@@ -12,27 +12,27 @@ from foxglove_schemas_protobuf.VoxelGrid_pb2 import VoxelGrid
 from copolicy.dataset.recording.topics import Record, Topic
 from copolicy.dataset.task_spec import PLAYERS
 
+from ..geometry import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import MAX_OBSTACLES, MapConfig
-from ..outline import BOARD, CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from .scene import (
     BOARD_CENTRE,
     COLOURS,
     FRAME,
-    FRAME_WORDS,
+    FRAME_DESCRIPTION,
     HEIGHT,
     METRES_PER_PIXEL,
     Pose,
-    coarse,
-    half_turn,
     metres,
+    quaternion_zw,
+    rounded,
 )
 
 TABLE_FRAME_ID = "table"
 
-TABLE_FRAME = Topic("/scene/transform", FrameTransform, {"units": "m", "frame": FRAME_WORDS})
+TABLE_FRAME = Topic("/scene/transform", FrameTransform, {"units": "m", "frame": FRAME_DESCRIPTION})
 MAP_SOLIDS = tuple(
-    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": FRAME_WORDS})
+    Topic(f"/scene/solid/{name}", VoxelGrid, {"units": "m", "frame": FRAME_DESCRIPTION})
     for name in ("goal", *(f"obstacle_{slot}" for slot in range(MAX_OBSTACLES)))
 )
 TABLE_SOLIDS = tuple(
@@ -40,7 +40,7 @@ TABLE_SOLIDS = tuple(
     for name in ("table", *PLAYERS)
 )
 
-_INSET = 0.002  # m: inside the solids of the SceneUpdate, so that a viewer which draws both shows no flicker
+_INSET = 0.002  # m, inside the solids of the SceneUpdate, so that a viewer that draws both does not flicker
 _CHANNELS = ("red", "green", "blue", "alpha")
 # Left, top, right, bottom, px.
 _TRIANGLE_BOX = tuple(choose(point[axis] for point in TRIANGLE) for choose in (min, max) for axis in (0, 1))
@@ -48,11 +48,11 @@ _TRIANGLE_BOX = tuple(choose(point[axis] for point in TRIANGLE) for choose in (m
 
 def solid_records(map_config: MapConfig, time_ns: int) -> list[Record]:
     """Goal, obstacles, table and both ends as serialised VoxelGrids with their topics."""
-    places = [(map_config.goal, GOAL_SIZE, "goal")]
-    places += [(centre, size, "obstacle") for centre, size in map_config.squares]
+    squares = [(map_config.goal, GOAL_SIZE, "goal")]
+    squares += [(centre, size, "obstacle") for centre, size in map_config.squares]
     records = [
         (topic, _box(FRAME, metres(centre), (size, size), colour, time_ns))
-        for topic, (centre, size, colour) in zip(MAP_SOLIDS, places, strict=False)
+        for topic, (centre, size, colour) in zip(MAP_SOLIDS, squares, strict=False)
     ]
     left, top, right, bottom = BOARD
     u0, v0, u1, v1 = _TRIANGLE_BOX
@@ -69,7 +69,7 @@ def solid_records(map_config: MapConfig, time_ns: int) -> list[Record]:
 
 
 class TableFrame:
-    """Where the table's frame is; the message is built once and only its numbers change from step to step."""
+    """Writes the table's frame; the message is built once and only its numbers change from step to step."""
 
     def __init__(self):
         self._transform = FrameTransform(parent_frame_id=FRAME, child_frame_id=TABLE_FRAME_ID)
@@ -78,13 +78,13 @@ class TableFrame:
         """The serialised FrameTransform of a pose (px, px, rad), with its topic."""
         transform = self._transform
         transform.timestamp.seconds, transform.timestamp.nanos = divmod(time_ns, 10**9)
-        transform.translation.x, transform.translation.y = map(coarse, metres(pose[:2]))
-        transform.rotation.z, transform.rotation.w = half_turn(pose[2])
+        transform.translation.x, transform.translation.y = map(rounded, metres(pose[:2]))
+        transform.rotation.z, transform.rotation.w = quaternion_zw(pose[2])
         return TABLE_FRAME, transform.SerializeToString()
 
 
 def _box(frame: str, centre: tuple[float, float], size: tuple[float, float], colour: str, time_ns: int) -> bytes:
-    """A box that stands on the floor.
+    """A box on the floor as a serialised VoxelGrid.
 
     Args:
         centre: x, y in the frame, m.

@@ -1,4 +1,4 @@
-"""How the table and its maps look on the screen."""
+"""Draws the table and its maps on the screen."""
 
 from copolicy.collect.screen.outline_view import OutlineView, shrunk
 from copolicy.collect.screen.palette import (
@@ -17,14 +17,14 @@ from copolicy.collect.screen.patch import Point, SmoothPatch
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.outline import Pose
 
+from ..geometry import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..map_config import MapConfig
-from ..outline import CIRCLE_CENTRE, CIRCLE_RADIUS, TRIANGLE
 from ..physics import GOAL_SIZE
 from ..scene_outline import TableOutline, board_outline
 
 
 class TableView(OutlineView):
-    """Draws one map and the table on it: the outline, with rings in the goal, stripes, and boards of wood."""
+    """Draws a map and the table as outlines, with rings in the goal, striped obstacles and a wooden board."""
 
     def __init__(self, map_config: MapConfig):
         super().__init__(TableOutline(), map_config)
@@ -43,9 +43,9 @@ class TableView(OutlineView):
     def _draw_body(self, surface: pygame.Surface, pose: Pose) -> None:
         scale = self._scale
         edge = 2.5 * scale
-        board = self._of_body(pose, board_outline())
-        triangle = self._of_body(pose, TRIANGLE)
-        (circle,) = self._of_body(pose, [CIRCLE_CENTRE])
+        board = self._body_points(pose, board_outline())
+        triangle = self._body_points(pose, TRIANGLE)
+        (circle,) = self._body_points(pose, [CIRCLE_CENTRE])
         radius = CIRCLE_RADIUS * scale
         drop = 5 * scale
         with SmoothPatch(surface, [*board, *triangle, circle], radius + drop + 2 * edge) as patch:
@@ -59,7 +59,7 @@ class TableView(OutlineView):
                 patch.polygon(colour, outline)
                 patch.outline(rim, shrunk(outline, edge / 2), edge)
             for v in (-14.0, 0.0, 14.0):
-                start, end = self._of_body(pose, [(-44.0, v), (39.0, v)])
+                start, end = self._body_points(pose, [(-44.0, v), (39.0, v)])
                 patch.line(mix(WOOD, WOOD_EDGE, 0.3), start, end, 1.6 * scale)
             patch.circle(SEATS[1], circle, radius)
             patch.circle(mix(SEATS[1], INK, 0.4), circle, radius, edge)
@@ -70,8 +70,8 @@ def _draw_goal(surface: pygame.Surface, centre: Point, size: float) -> None:
     square.center = (round(centre[0]), round(centre[1]))
     pygame.draw.rect(surface, mix(GREEN, FLOOR, 0.62), square)
     with SmoothPatch(surface, [centre], size / 2) as patch:
-        for share, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
-            patch.circle(colour, centre, share * size)
+        for radius, colour in ((0.42, GREEN), (0.31, FLOOR), (0.2, GREEN), (0.08, FLOOR)):
+            patch.circle(colour, centre, radius * size)
     pygame.draw.rect(surface, GREEN, square, max(2, round(size / 28)))
 
 

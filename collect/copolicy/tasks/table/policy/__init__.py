@@ -1,11 +1,11 @@
-"""What the table offers to policies beside the generic input: torch modules, imported by `TableTask.features` alone."""
+"""Observation encoders and symmetries of the table for policies; torch, imported by `TableTask.features` only."""
 
 from copolicy.dataset.task import PolicyFeatures
 
 from .encoders import RelativeFeatures, ScanFeatures
 from .symmetries import mirror_half, permute_obstacles
 
-FEATURES = PolicyFeatures(
+POLICY_FEATURES = PolicyFeatures(
     encoders={"relative": RelativeFeatures, "scan": ScanFeatures},
     symmetries={"mirror": mirror_half, "permute_obstacles": permute_obstacles},
 )

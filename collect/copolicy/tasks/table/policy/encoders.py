@@ -1,4 +1,4 @@
-"""What the network may see of the table and its map: columns in physical units, as seen from the table."""
+"""Observation encoders: from columns in physical units to network inputs relative to the table."""
 
 import torch
 from torch import Tensor, nn
@@ -13,18 +13,18 @@ from .range_scan import RAYS, RangeScan
 _GOAL = ENVIRONMENT_NAMES.index("goal_x")
 _OBSTACLES = ENVIRONMENT_NAMES.index("obstacle_0_x")
 
-# Two copies of each distance: a far one that reaches across the window, and a near one that resolves the last
-# centimetres around the table. Scale in px, and where the scaled distance is clipped.
+# Each distance is encoded twice: over the whole window, and finely around the table. Scale in px, and bound at which
+# the scaled distance is clipped.
 _FAR = (300.0, 3.0)
 _NEAR = (120.0, 1.5)
 
 
 class RelativeFeatures(nn.Module):
-    """The map as seen from the table.
+    """Encodes the state, and the map relative to the table.
 
-    The table's state scaled to [-1, 1] (7 values); the goal relative to the table, far and near copy (4); for each of
-    the three obstacles the same and whether it stands there at all (5 each, zeros where it does not); and the human's
-    past action (2) where it is used. The start pose is left out. Axes stay those of the window, as the forces do.
+    The table's state scaled to [-1, 1] (7 values); the goal relative to the table at both scales (4); for each of the
+    three obstacles the same and whether it exists (5 each, zeros where it does not); and the human's past action (2)
+    where it is used. The start pose is left out. Axes are those of the window, as for the forces.
     """
 
     scale: Tensor
@@ -45,16 +45,16 @@ class RelativeFeatures(nn.Module):
         present = (points[..., 1:, :] != 0).any(dim=-1, keepdim=True).to(points.dtype)  # (..., 3, 1)
         distance = points - position
         copies = [(distance / scale).clamp(-limit, limit) for scale, limit in (_FAR, _NEAR)]
-        seen = torch.cat(copies, dim=-1)  # (..., 4, 4)
-        obstacles = torch.cat((seen[..., 1:, :] * present, present), dim=-1)  # (..., 3, 5)
-        parts = [state * self.scale + self.offset, seen[..., 0, :], obstacles.flatten(-2)]
+        encoded = torch.cat(copies, dim=-1)  # (..., 4, 4)
+        obstacles = torch.cat((encoded[..., 1:, :] * present, present), dim=-1)  # (..., 3, 5)
+        parts = [state * self.scale + self.offset, encoded[..., 0, :], obstacles.flatten(-2)]
         if self.past_human_action:
             parts.append(observation[HUMAN_ACTION])
         return torch.cat(parts, dim=-1)
 
 
 class ScanFeatures(RelativeFeatures):
-    """The map as seen from the table (`RelativeFeatures`), and a range scan of obstacles and walls (`RangeScan`)."""
+    """`RelativeFeatures`, and a range scan of obstacles and walls (`RangeScan`)."""
 
     def __init__(self, past_human_action: bool):
         super().__init__(past_human_action)

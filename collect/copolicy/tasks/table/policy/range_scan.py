@@ -1,4 +1,4 @@
-"""A range scan of the map, as a laser scanner at the table's centre would see it."""
+"""A range scan of the map from the table's centre, as of a laser scanner."""
 
 import math
 
@@ -11,17 +11,17 @@ RAYS = 36
 """Directions of the scan, 10 degrees apart, the first along x."""
 
 RANGE = 400.0
-"""How far the scan reaches, px."""
+"""Range of the scan, px."""
 
-_HALF = 25.0  # px, half the side of an obstacle; its size is not among the observations, people's were 50 px
-_PARALLEL = 1e-4  # a direction's smallest component, so that rays along an axis divide by something
+_HALF = 25.0  # px, half the side of an obstacle; sizes are not observed, and those of people's data were 50 px
+_PARALLEL = 1e-4  # smallest component of a direction, so that rays along an axis do not divide by zero
 
 
 class RangeScan(nn.Module):
     """Distances from the table's centre to the nearest obstacle or wall, in directions fixed to the window.
 
-    Coordinates of obstacle centres leave it to the network to work out what lies in the way, for every number and
-    order of obstacles anew; a scan says it, and looks alike for layouts that no demonstration had.
+    From coordinates of obstacle centres the network must learn what is in the way for every number and order of
+    obstacles; a scan contains it directly, and generalises to layouts that no demonstration had.
     """
 
     direction: Tensor
@@ -45,13 +45,13 @@ class RangeScan(nn.Module):
         Returns:
             `(..., RAYS)`: 1 at contact, -1 at `RANGE` and beyond.
         """
-        here = position[..., None, :]  # (..., 1, 2)
-        wall = ((self.wall - here) / self.direction).amin(dim=-1)  # (..., R)
-        offset = (obstacles - here)[..., None, :]  # (..., 3, 1, 2)
-        # Where the ray enters and leaves the square: after its last entry, and before its first exit, of the two axes.
-        one, other = (offset - _HALF) / self.direction, (offset + _HALF) / self.direction  # (..., 3, R, 2)
-        entry, leave = torch.minimum(one, other).amax(dim=-1), torch.maximum(one, other).amin(dim=-1)
+        origin = position[..., None, :]  # (..., 1, 2)
+        wall = ((self.wall - origin) / self.direction).amin(dim=-1)  # (..., R)
+        offset = (obstacles - origin)[..., None, :]  # (..., 3, 1, 2)
+        # A ray is in the square between its last entry and its first exit over the two axes (slab method).
+        low, high = (offset - _HALF) / self.direction, (offset + _HALF) / self.direction  # (..., 3, R, 2)
+        entry, leave = torch.minimum(low, high).amax(dim=-1), torch.maximum(low, high).amin(dim=-1)
         present = (obstacles != 0).any(dim=-1)[..., None]  # (..., 3, 1)
-        seen = present & (entry <= leave) & (leave > 0)
-        obstacle = torch.where(seen, entry, torch.inf).amin(dim=-2)  # (..., R)
+        hit = present & (entry <= leave) & (leave > 0)
+        obstacle = torch.where(hit, entry, torch.inf).amin(dim=-2)  # (..., R)
         return 1 - 2 * (torch.minimum(wall, obstacle) / RANGE).clamp(0, 1)

@@ -1,6 +1,6 @@
-"""The symmetries of the table, applied to training samples: mirror in y, and the order of the obstacles.
+"""Symmetries of the table for data augmentation: mirror in y, and permutation of the obstacles.
 
-Both act on batches in physical units, `{column: (B, T, n)}`, and leave padding (obstacles at zero) where it is.
+Both act on batches in physical units, `{column: (B, T, n)}`, and leave padding (obstacles at zero) unchanged.
 """
 
 import math
@@ -15,8 +15,8 @@ from ..map_config import MAX_OBSTACLES, WINDOW
 
 _HEIGHT = float(WINDOW[1])
 _OBSTACLES = ENVIRONMENT_NAMES.index("obstacle_0_x")
-# What turns over when y does: y itself (about the middle of the window), and every y component, angle and spin.
-_TURNED = {
+# What a mirror in y negates: y itself (about the middle of the window), and every y component, angle and spin.
+_NEGATED = {
     STATE: [name in ("y", "sin_theta", "vy", "omega") for name in STATE_NAMES],
     ENVIRONMENT_STATE: [name.endswith(("_y", "_theta")) for name in ENVIRONMENT_NAMES],
     HUMAN_ACTION: [False, True],
@@ -24,37 +24,37 @@ _TURNED = {
 }
 
 
-def mirror(batch: dict[str, Tensor], chosen: Tensor) -> dict[str, Tensor]:
-    """The chosen samples mirrored in y: the window, the table and the dynamics are symmetric about its middle row.
+def mirror(batch: dict[str, Tensor], mask: Tensor) -> dict[str, Tensor]:
+    """Mirrors samples in y; the window, the table and the dynamics are symmetric about the middle row of the window.
 
     Args:
         batch: columns `(B, T, n)`; only those of the task are touched.
-        chosen: `(B,)` bool.
+        mask: `(B,)` bool, the samples to mirror.
     """
     mirrored = dict(batch)
-    for key in _TURNED.keys() & batch.keys():
+    for key in _NEGATED.keys() & batch.keys():
         values = batch[key]
-        turned = torch.where(torch.tensor(_TURNED[key], device=values.device), -values, values)
+        negated = torch.where(torch.tensor(_NEGATED[key], device=values.device), -values, values)
         if key == STATE:
-            turned[..., 1] += _HEIGHT
+            negated[..., 1] += _HEIGHT
         elif key == ENVIRONMENT_STATE:
-            turned[..., 2] %= 2 * math.pi
-            turned[..., 1] += _HEIGHT
-            turned[..., 4] += _HEIGHT
+            negated[..., 2] %= 2 * math.pi
+            negated[..., 1] += _HEIGHT
+            negated[..., 4] += _HEIGHT
             centres = values[..., _OBSTACLES:].unflatten(-1, (MAX_OBSTACLES, 2))
-            turned[..., _OBSTACLES + 1 :: 2] += _HEIGHT * (centres != 0).any(dim=-1)
-        mirrored[key] = torch.where(chosen[:, None, None], turned, values)
+            negated[..., _OBSTACLES + 1 :: 2] += _HEIGHT * (centres != 0).any(dim=-1)
+        mirrored[key] = torch.where(mask[:, None, None], negated, values)
     return mirrored
 
 
 def mirror_half(batch: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Each sample mirrored with a probability of one half."""
+    """Mirrors each sample with probability 1/2."""
     state = batch[STATE]
     return mirror(batch, torch.rand(len(state), device=state.device) < 0.5)
 
 
 def permute_obstacles(batch: dict[str, Tensor], generator: torch.Generator | None = None) -> dict[str, Tensor]:
-    """The obstacles of each sample in a random order, the same in all its frames; empty slots stay last."""
+    """Permutes the obstacles of each sample at random, equally in all its frames; empty slots stay last."""
     environment = batch[ENVIRONMENT_STATE]
     centres = environment[..., _OBSTACLES:].unflatten(-1, (MAX_OBSTACLES, 2))  # (B, T, 3, 2)
     empty = (centres[:, 0] == 0).all(dim=-1)  # (B, 3)

@@ -1,4 +1,4 @@
-"""Rules of `copolicy-dataset check` that know the table: its map, its motion, and what it touches."""
+"""Rules of `copolicy-dataset check` for the table: maps, motion and contacts."""
 
 from copolicy.dataset.task_parts import Limit, TaskRules
 
@@ -12,13 +12,13 @@ LIMITS = {
     "drift.error": Limit(10.0, "px", "a third of the table's width: the replay passes obstacles differently"),
     "state_range": None,
     "unit_circle": Limit(1e-3, "1", "cos^2 + sin^2 is 1 up to single precision"),
-    "idle_run": Limit(5.0, "s", "people pause to negotiate, but rarely this long with the table in hand"),
+    "idle_run": Limit(5.0, "s", "people pause to negotiate, but rarely this long while they carry"),
     "stuck_speed": Limit(2.0, "px/s", "4 % of the table's terminal speed"),
-    "stuck": Limit(5.0, "s", "a table that rests this long is blocked, or nobody is there"),
+    "stuck": Limit(5.0, "s", "a table at rest for this long is blocked, or the players are absent"),
     "unmoved": Limit(20.0, "px", "a tenth of the table's length: nothing was carried"),
     "map_position": Limit(1.0, "px", "maps are stored in single precision"),
-    "map_start": Limit(5.0, "px", "a table at rest moves less in the first frame, whatever is stored first"),
-    "contact_margin": Limit(2.0, "px", "two pixel grids, and the picture's rounded corners"),
+    "map_start": Limit(5.0, "px", "a table at rest moves less than this in the first frame"),
+    "contact_margin": Limit(2.0, "px", "two pixel grids, and the image's rounded corners"),
 }
 
 RULES = TaskRules((*motion.RULES, *maps.RULES, *contacts.RULES), LIMITS)

@@ -1,16 +1,17 @@
-"""Whether pairs split where they have to decide: Hartigan's dip test of the steering before the first obstacle."""
+"""Multimodality of the steering before the first obstacle, by Hartigan's dip test."""
 
 import numpy as np
 from diptest import dipstat
 from diptest.consts import Consts
 from scipy.stats import false_discovery_control
 
+from copolicy.dataset.arrays import Array
 from copolicy.dataset.statistics.estimate import Estimate, Null
 from copolicy.dataset.statistics.resampling import Bootstrap
 from copolicy.dataset.statistics.trajectories import Trajectories
 
 MIN_EPISODES = 8
-"""Episodes that a dip test takes; below about twenty it finds only modes that lie far apart."""
+"""Fewest episodes for a dip test; below about 20 it detects only modes that are far apart."""
 
 MAX_QUERIES = 2_000
 RADIUS_PX = 50.0
@@ -24,33 +25,33 @@ _STEERING = (
 )
 
 
-def decision_zone(data: Trajectories) -> np.ndarray:
-    """`(N,)` whether a frame lies in the decision zone, that is, before the first obstacle's station.
+def decision_zone(data: Trajectories) -> Array:
+    """`(N,)` whether a frame is in the decision zone, that is, before the first obstacle's station.
 
-    The station is the projection on the line from start to goal; once the table has entered the obstacle's side the
-    episode has left the zone for good. Maps without obstacles have none.
+    The station is the projection on the line from start to goal. An episode leaves the zone when the table first
+    reaches the near side of the obstacle. Maps without obstacles have no zone.
     """
     zone = np.zeros(len(data.states), dtype=bool)
     for index, row in enumerate(data.rows):
-        if not row.map_config.obstacles:
+        if not row.scenario.obstacles:
             continue
-        origin, along = _axis(row.map_config)
-        squares = row.map_config.squares
+        origin, along = _axis(row.scenario)
+        squares = row.scenario.squares
         first = min(float((np.array(centre) - origin) @ along) - size / 2 for centre, size in squares)
         station = (data.path(index) - origin) @ along
         zone[data.starts[index] : data.ends[index]] = np.maximum.accumulate(station) < first
     return zone
 
 
-def steering(data: Trajectories) -> np.ndarray:
+def steering(data: Trajectories) -> Array:
     """`(N,)` joint force across the line from start to goal, positive to its right on screen, in full forces."""
     total = data.actions[:, :2] + data.actions[:, 2:]
-    across = np.array([(-along[1], along[0]) for along in (_axis(row.map_config)[1] for row in data.rows)])
+    across = np.array([(-along[1], along[0]) for along in (_axis(row.scenario)[1] for row in data.rows)])
     return (total * across[data.episode]).sum(axis=1)
 
 
 def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
-    """The dip test at the places of the decision zone, and once a configuration."""
+    """Dip tests at positions of the decision zone, and one for each configuration."""
     zone, sideways = decision_zone(data), steering(data)
     return {
         "steering_dip": _local(data, zone, _ahead(data, sideways), bootstrap, rng),
@@ -60,42 +61,43 @@ def dip_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Gene
 
 def _local(data: Trajectories, zone, ahead, bootstrap: Bootstrap, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Share of its states at which the steering over the next {AHEAD_S} s of other episodes with the "
-        f"same goal and obstacles, at their place nearest to it within {RADIUS_PX:g} px, one value an episode, is not "
-        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of its states at which the steering over the next {AHEAD_S} s of other episodes with "
+        f"the same goal and obstacles, at their position nearest to it within {RADIUS_PX:g} px, one value an episode, "
+        f"is not unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
-    per_query: list[tuple[int, np.ndarray]] = []
+    per_query: list[tuple[int, Array]] = []
     inside = np.flatnonzero(zone)
-    share = min(1.0, MAX_QUERIES / max(len(inside), 1))
+    proportion = min(1.0, MAX_QUERIES / max(len(inside), 1))
     for group in data.groups(with_goal=True):
         if len(group) <= MIN_EPISODES:
             continue
         frames = inside[np.isin(data.episode[inside], group)]
-        for query in rng.permutation(frames)[: max(1, round(share * len(frames)))] if len(frames) else ():
+        for query in rng.permutation(frames)[: max(1, round(proportion * len(frames)))] if len(frames) else ():
             sample = _sample(data, frames, query, ahead)
             if len(sample) >= MIN_EPISODES:
                 per_query.append((int(data.episode[query]), sample))
     if not per_query:
-        note = f"no place of a decision zone with {MIN_EPISODES} other episodes within {RADIUS_PX:g} px"
+        note = f"no position in a decision zone with {MIN_EPISODES} other episodes within {RADIUS_PX:g} px"
         return Estimate(None, "1", definition, 0, note=note)
     rejected = _rejected([sample for _, sample in per_query])
-    hits, asked = np.zeros(len(data.rows)), np.zeros(len(data.rows))
-    np.add.at(asked, [episode for episode, _ in per_query], 1)
+    hits, queries = np.zeros(len(data.rows)), np.zeros(len(data.rows))
+    np.add.at(queries, [episode for episode, _ in per_query], 1)
     np.add.at(hits, [episode for episode, _ in per_query], rejected)
-    value, bounds = bootstrap.ratio(hits, asked)
+    value, bounds = bootstrap.ratio(hits, queries)
     null_shares = [
         _rejected([rng.standard_normal(len(sample)) for _, sample in per_query]).mean() for _ in range(_NULL_DRAWS)
     ]
-    null = Null.of("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
+    null = Null.from_draws("one Gaussian of as many episodes at each place", value or 0.0, np.array(null_shares))
     sizes = [len(sample) for _, sample in per_query]
     details = {"places": len(per_query), "median_episodes_at_a_place": float(np.median(sizes))}
-    return Estimate(value, "1", definition, int((asked > 0).sum()), bounds, bootstrap.resampled, null, details=details)
+    episodes = int((queries > 0).sum())
+    return Estimate(value, "1", definition, episodes, bounds, bootstrap.resampled, null, details=details)
 
 
 def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     definition = (
-        f"{_STEERING} Share of configurations in which its mean over the zone, one value an episode, is not unimodal "
-        f"(dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
+        f"{_STEERING} Proportion of configurations in which its mean over the zone, one value an episode, is not "
+        f"unimodal (dip test, false discovery rate {FALSE_DISCOVERY_RATE})."
     )
     frames = data.per_episode(zone)
     mean = np.divide(data.per_episode(zone * sideways), frames, out=np.full(len(frames), np.nan), where=frames > 0)
@@ -117,30 +119,30 @@ def _by_configuration(data: Trajectories, zone, sideways, rng) -> Estimate:
     value = float(rejected.mean())
     resampled = rng.binomial(len(rejected), value, size=1000) / len(rejected)
     bounds = (float(np.quantile(resampled, 0.025)), float(np.quantile(resampled, 0.975)))
-    null = Null.of("one Gaussian of as many episodes in each configuration", value, np.array(draws))
+    null = Null.from_draws("one Gaussian of as many episodes in each configuration", value, np.array(draws))
     episodes = sum(test["episodes"] for test in tests.values())
     details = {"configurations": tests}
     return Estimate(value, "1", definition, episodes, bounds, "configurations", null, details=details)
 
 
-def dip_tests(samples: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The dip of each sample, and its p, interpolated in Hartigan's table: those of `diptest.diptest`, all at once.
+def dip_tests(samples: list[Array]) -> tuple[Array, Array]:
+    """Dips of the samples and p-values by Hartigan's table, as of `diptest.diptest`, which takes one sample.
 
     Args:
-        samples: of at least four values each.
+        samples: at least four values each.
     """
     sizes = np.array([len(sample) for sample in samples])
     dips = np.array([dipstat(sample) for sample in samples])
     p = np.empty(len(samples))
     for size in np.unique(sizes):
-        chosen = sizes == size
+        of_size = sizes == size
         critical = _critical(int(size))
-        p[chosen] = 1.0 - np.interp(np.sqrt(size) * dips[chosen], critical, Consts._ALPHA)
+        p[of_size] = 1.0 - np.interp(np.sqrt(size) * dips[of_size], critical, Consts._ALPHA)
     return dips, np.clip(p, 0.0, 1.0)
 
 
-def _critical(size: int) -> np.ndarray:
-    """Hartigan's critical values of sqrt(n) times the dip of `size` values, between those of the sizes in the table."""
+def _critical(size: int) -> Array:
+    """Hartigan's critical values of sqrt(n) times the dip of n = `size` values, interpolated between table rows."""
     sizes, values = Consts._SAMPLE_SIZE, Consts._CRIT_VALS
     above = min(int(sizes.searchsorted(size)), len(sizes) - 1)
     below = max(0, above - 1) if size <= sizes[-1] else above
@@ -151,12 +153,12 @@ def _critical(size: int) -> np.ndarray:
     return low + fraction * (np.sqrt(sizes[above]) * values[above] - low)
 
 
-def _rejected(samples: list[np.ndarray]) -> np.ndarray:
+def _rejected(samples: list[Array]) -> Array:
     return false_discovery_control(dip_tests(samples)[1]) < FALSE_DISCOVERY_RATE
 
 
-def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarray) -> np.ndarray:
-    """Steering of each other episode at its frame nearest to a query's place, where that is near enough."""
+def _sample(data: Trajectories, frames: Array, query: int, ahead: Array) -> Array:
+    """Steering of each other episode at its frame nearest to the query's position, within `RADIUS_PX`."""
     distance = np.linalg.norm(data.states[frames, :2] - data.states[query, :2], axis=1)
     near = (distance <= RADIUS_PX) & (data.episode[frames] != data.episode[query])
     frames, distance = frames[near], distance[near]
@@ -166,8 +168,8 @@ def _sample(data: Trajectories, frames: np.ndarray, query: int, ahead: np.ndarra
     return ahead[frames[first]]
 
 
-def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
-    """Mean of a value over the next half second of each frame, within its episode."""
+def _ahead(data: Trajectories, values: Array) -> Array:
+    """Mean of a value over the next `AHEAD_S` of each frame, within its episode."""
     window = max(1, round(AHEAD_S * data.fps))
     total = np.concatenate(([0.0], np.cumsum(values)))
     begin = np.arange(len(values))
@@ -175,7 +177,7 @@ def _ahead(data: Trajectories, values: np.ndarray) -> np.ndarray:
     return (total[end] - total[begin]) / (end - begin)
 
 
-def _axis(config) -> tuple[np.ndarray, np.ndarray]:
+def _axis(config) -> tuple[Array, Array]:
     origin = np.array(config.start[:2])
     line = np.array(config.goal) - origin
     return origin, line / max(float(np.linalg.norm(line)), 1e-9)

@@ -1,1 +1,1 @@
-"""A part of a data set as a data set of its own: what is read, what is written, and how it takes its place."""
+"""Reads a stored data set and writes some of its episodes as a new data set."""

@@ -1,4 +1,4 @@
-"""The statistics of some episodes together, by LeRobot's formulas, from those of each in meta/episodes."""
+"""Aggregates the statistics of episodes in meta/episodes by LeRobot's formulas."""
 
 from collections import defaultdict
 from pathlib import Path
@@ -6,67 +6,68 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...exceptions import FileFormatError
 from ...files.meta_files import EPISODES_FOLDER, STATS_FILE
-from ...files.staging import write_as_lerobot
+from ...files.staging import write_lerobot_json
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_PREFIX = "stats/"
+_COLUMN_PREFIX = "stats/"
 
-Statistics = dict[str, dict[str, np.ndarray]]
-"""By feature and kind: `min`, `max`, `mean`, `std`, `count`, and quantiles such as `q01`."""
+Statistics = dict[str, dict[str, Array]]
+"""Arrays by feature and name of the statistic: `min`, `max`, `mean`, `std`, `count`, quantiles such as `q01`."""
 
 
-def aggregated_statistics(episodes: "pa.Table") -> Statistics:
-    """What LeRobot's `aggregate_stats` gives for the rows of meta/episodes.
+def aggregate_statistics(episodes: "pa.Table") -> Statistics:
+    """Aggregates rows of meta/episodes like LeRobot's `aggregate_stats`.
 
-    Least and largest value; mean and quantiles weighted by the number of values; the deviation of all values. An
-    episode without statistics of a feature is passed over for that feature.
+    Minimum and maximum; mean and quantiles weighted by the number of values; standard deviation of all values.
+    Episodes without statistics of a feature are ignored for that feature.
 
     Raises:
         FileFormatError: statistics of a feature that differ in shape.
     """
     columns: dict[str, dict[str, list[Any]]] = defaultdict(dict)
     for name in episodes.column_names:
-        if name.startswith(_PREFIX):
-            feature, _, kind = name.removeprefix(_PREFIX).rpartition("/")
-            columns[feature][kind] = episodes.column(name).to_pylist()
+        if name.startswith(_COLUMN_PREFIX):
+            feature, _, statistic = name.removeprefix(_COLUMN_PREFIX).rpartition("/")
+            columns[feature][statistic] = episodes.column(name).to_pylist()
     result: Statistics = {}
-    for feature, kinds in columns.items():
-        present = [row for row in range(episodes.num_rows) if all(values[row] is not None for values in kinds.values())]
-        if present and {"min", "max", "mean", "std", "count"} <= kinds.keys():
+    for feature, lists in columns.items():
+        rows = [row for row in range(episodes.num_rows) if all(values[row] is not None for values in lists.values())]
+        if rows and {"min", "max", "mean", "std", "count"} <= lists.keys():
             try:
-                stacked = {kind: np.array([values[row] for row in present]) for kind, values in kinds.items()}
-                result[feature] = _aggregated(stacked)
+                stacked = {name: np.array([values[row] for row in rows]) for name, values in lists.items()}
+                result[feature] = _aggregate_feature(stacked)
             except (TypeError, ValueError):
                 raise FileFormatError(EPISODES_FOLDER, f"statistics of {feature} of one shape", "others") from None
     return result
 
 
 def write_statistics(statistics: Statistics, folder: Path) -> None:
-    """Writes `meta/stats.json` of a folder in the making."""
+    """Writes `meta/stats.json` of a new data set."""
     nested = {
-        feature: {kind: values.tolist() for kind, values in kinds.items()} for feature, kinds in statistics.items()
+        feature: {name: values.tolist() for name, values in arrays.items()} for feature, arrays in statistics.items()
     }
-    write_as_lerobot(folder / STATS_FILE, nested)
+    write_lerobot_json(folder / STATS_FILE, nested)
 
 
-def _aggregated(stacked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Statistics of one feature, `(E, ...)` each, over the first axis."""
+def _aggregate_feature(stacked: dict[str, Array]) -> dict[str, Array]:
+    """Aggregates the statistics of one feature, `(E, ...)` each, over the first axis."""
     means, counts = stacked["mean"], stacked["count"]
     total = counts.sum(axis=0)
     while counts.ndim < means.ndim:
         counts = np.expand_dims(counts, axis=-1)
     mean = (means * counts).sum(axis=0) / total
     variance = ((stacked["std"] ** 2 + (means - mean) ** 2) * counts).sum(axis=0) / total
-    quantiles = [kind for kind in stacked if kind.startswith("q") and kind[1:].isdigit()]
+    quantiles = [name for name in stacked if name.startswith("q") and name[1:].isdigit()]
     return {
         "min": stacked["min"].min(axis=0),
         "max": stacked["max"].max(axis=0),
         "mean": mean,
         "std": np.sqrt(variance),
         "count": total,
-        **{kind: (stacked[kind] * counts).sum(axis=0) / total for kind in quantiles},
+        **{name: (stacked[name] * counts).sum(axis=0) / total for name in quantiles},
     }

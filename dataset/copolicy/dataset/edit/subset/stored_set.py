@@ -1,4 +1,4 @@
-"""A data set as the edits need it: verified, with every row of meta/episodes and the record of its conversion."""
+"""A verified data set with all rows of meta/episodes and the record of its conversion, for edits."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -22,8 +22,9 @@ from ...versions.content import read_content
 from ...versions.digests import Content
 from ...versions.manifest import data_set_files
 
-_ELSEWHERE = ("data/", "meta/", "videos/", "stats/")  # columns of meta/episodes that say where an episode lies
-_PLACES = ("episode_index", "length", "dataset_from_index", "dataset_to_index", "data/chunk_index", "data/file_index")
+_STORAGE_PREFIXES = ("data/", "meta/", "videos/", "stats/")  # columns of meta/episodes about storage
+_LOCATIONS = ("episode_index", "length", "dataset_from_index", "dataset_to_index",
+              "data/chunk_index", "data/file_index")  # fmt: skip
 _WRITTEN = {INFO_FILE, STATS_FILE, TASKS_FILE, RECORD_FILE}
 _WRITTEN_FOLDERS = ("data/", "meta/episodes/", "videos/")
 _LICENCES = ("LICENSE", "LICENCE", "COPYING", "NOTICE")
@@ -31,13 +32,13 @@ _LICENCES = ("LICENSE", "LICENCE", "COPYING", "NOTICE")
 
 @dataclass(frozen=True, repr=False)
 class StoredSet:
-    """A LeRobot v3 data set of this project that was read completely.
+    """A LeRobot v3 data set written by copolicy, read and verified.
 
     Attributes:
         info: `meta/info.json`.
-        episodes: the rows of meta/episodes, statistics among them, in the order of `episode_index`.
-        content: what it holds, by digests.
-        record: `meta/copolicy.json`, empty where there is none.
+        episodes: the rows of meta/episodes with their statistics, in the order of `episode_index`.
+        content: digests of the content.
+        record: `meta/copolicy.json`, empty if there is none.
     """
 
     root: Path
@@ -48,14 +49,14 @@ class StoredSet:
 
     @classmethod
     def read(cls, root: Path) -> "StoredSet":
-        """Reads a data set, which also verifies that its files agree with each other.
+        """Reads a data set and verifies that its files are consistent.
 
         Raises:
-            FileFormatError: no data set of this project, or one that contradicts itself.
+            FileFormatError: not a data set of copolicy, or an inconsistent one.
         """
         folder = require_loadable(root)
         info = folder.info
-        tables = episode_tables(root, _PLACES)
+        tables = episode_tables(root, _LOCATIONS)
         try:
             episodes = pa.concat_tables(list(tables.values()), promote_options="permissive").sort_by("episode_index")
         except (pa.ArrowException, KeyError) as error:
@@ -70,68 +71,68 @@ class StoredSet:
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
-        """For each episode its number, length and episode columns; None where nothing is known."""
-        names = [name for name in self.episodes.column_names if not name.startswith(_ELSEWHERE)]
+        """Number, length and episode columns of each episode; None for unknown values."""
+        names = [name for name in self.episodes.column_names if not name.startswith(_STORAGE_PREFIXES)]
         return [{**dict.fromkeys(EPISODE_COLUMNS), **row} for row in self.episodes.select(names).to_pylist()]
 
     @cached_property
     def column_types(self) -> dict[str, str]:
-        """`str`, `int`, `float` or `bool` of each column of `rows` that has one."""
+        """Type of the columns of `rows`: `str`, `int`, `float` or `bool`."""
         types: dict[str, str] = {}
         for field in self.episodes.schema:
-            kinds = {
+            matches = {
                 "str": pa.types.is_string(field.type) or pa.types.is_large_string(field.type),
                 "int": pa.types.is_integer(field.type),
                 "float": pa.types.is_floating(field.type),
                 "bool": pa.types.is_boolean(field.type),
             }
-            kind = next((name for name, matches in kinds.items() if matches), EPISODE_COLUMNS.get(field.name))
-            if kind is not None and not field.name.startswith(_ELSEWHERE):
-                types[field.name] = kind
+            column_type = next((name for name, matched in matches.items() if matched), EPISODE_COLUMNS.get(field.name))
+            if column_type is not None and not field.name.startswith(_STORAGE_PREFIXES):
+                types[field.name] = column_type
         return types
 
-    def left_behind(self, licences_too: bool = False) -> list[str]:
-        """Files about this very data set, which a new one does not take along: card, releases, findings, ...
+    def uncopied_files(self, licences: bool = False) -> list[str]:
+        """Files that describe this data set and are not copied to a new one: card, releases, findings, ...
 
         Args:
-            licences_too: files that state licences stay, too, as in a merge.
+            licences: include licence files, which a merge does not copy.
         """
         minimal = {CARD_FILE} if is_minimal_card(self.root / CARD_FILE) else set()
-        taken = _WRITTEN | minimal | (set() if licences_too else set(self.licences()))
+        copied = _WRITTEN | minimal | (set() if licences else set(self.licences()))
         names = [
-            name for name in data_set_files(self.root) if name not in taken and not name.startswith(_WRITTEN_FOLDERS)
+            name for name in data_set_files(self.root) if name not in copied and not name.startswith(_WRITTEN_FOLDERS)
         ]
         return names + [f"{folder}/" for folder in ("raw",) if (self.root / folder).is_dir()]
 
     def licences(self) -> list[str]:
-        """Files at the top that state licences."""
+        """Licence files in the folder itself."""
         return sorted(path.name for path in self.root.iterdir() if path.is_file() and path.name.startswith(_LICENCES))
 
 
-def without_episodes(record: Mapping[str, Any], uuids: Iterable[str]) -> dict[str, Any]:
-    """The record of a conversion without the notes on some episodes."""
-    gone = set(uuids)
+def drop_notes(record: Mapping[str, Any], uuids: Iterable[str]) -> dict[str, Any]:
+    """Removes the notes on some episodes from the record of a conversion."""
+    removed = set(uuids)
     shortened = {**record}
     if isinstance(record.get("notes"), dict):
-        shortened["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in gone}
+        shortened["notes"] = {uuid: notes for uuid, notes in record["notes"].items() if uuid not in removed}
     return shortened
 
 
 def write_record(folder: Path, record: Mapping[str, Any]) -> None:
-    """Writes `meta/copolicy.json` of a folder in the making."""
+    """Writes `meta/copolicy.json` of a new data set."""
     (folder / RECORD_FILE).write_text(record_text(record), encoding="utf-8")
 
 
 def stored_record(root: Path) -> dict[str, Any]:
-    """The record of a conversion, `meta/copolicy.json`; empty where there is none.
+    """Reads the record of a conversion, `meta/copolicy.json`; empty if there is none.
 
     Raises:
-        FileFormatError: no JSON object.
+        FileFormatError: not a JSON object.
     """
     path = root / RECORD_FILE
     return dict(read_json(path, ConversionRecord, "the record of a conversion")) if path.is_file() else {}
 
 
 def record_text(record: Mapping[str, Any]) -> str:
-    """The text of `meta/copolicy.json`."""
+    """The record as the JSON text of `meta/copolicy.json`."""
     return json.dumps(record, indent=2) + "\n"

@@ -1,1 +1,1 @@
-"""Episodes of a consent id deleted from recordings, data sets and the records of releases."""
+"""Deletes the episodes of a consent id from recordings, data sets and records of releases."""

@@ -1,4 +1,4 @@
-"""A data set without withdrawn episodes: built beside it, with every trace of them taken out, and put in its place."""
+"""Replaces a data set by a copy without withdrawn episodes and without their names in any file."""
 
 import os
 import shutil
@@ -30,16 +30,16 @@ from ...files.replace_folder import delete_folder, is_unfinished, replaced_folde
 from ...versions.digests import EpisodeContent
 from ...versions.manifest import Manifest
 from ...versions.release_record import ReleaseRecord
-from ...versions.withdrawals import anonymised, read_withdrawals, withdrawals_text
+from ...versions.withdrawals import anonymise, read_withdrawals, withdrawals_text
 from ..amend import today
-from ..subset.stored_set import StoredSet, without_episodes, write_record
-from ..subset.writing import kept_splits, write_subset
+from ..subset.stored_set import StoredSet, drop_notes, write_record
+from ..subset.writing import remaining_splits, write_subset
 from .traces import Traces
 
-PEOPLE = ("pair_id", "player_0_id", "player_1_id", "session_id")
-"""The episode columns whose pseudonyms go where nobody else has them."""
+PEOPLE_COLUMNS = ("pair_id", "player_0_id", "player_1_id", "session_id")
+"""Episode columns with pseudonyms, which are removed if no remaining episode has them."""
 
-MADE_ANEW = {
+REGENERATED = {
     CARD_FILE: "copolicy-cards dataset",
     "figures": "copolicy-cards dataset",
     CROISSANT_FILE: "copolicy-cards dataset --croissant",
@@ -48,9 +48,9 @@ MADE_ANEW = {
     STATISTICS_FILE: "copolicy-dataset stats",
     MANIFEST_FILE: "copolicy-dataset release",
 }
-"""Files that count, draw or name every episode, and the command that makes each anew."""
+"""Files about all episodes, and the command that writes each again."""
 
-_REWRITTEN = {"data", "videos", "images", ".cache", EPISODES_FOLDER} | {
+_WRITTEN = {"data", "videos", "images", ".cache", EPISODES_FOLDER} | {
     INFO_FILE,
     STATS_FILE,
     TASKS_FILE,
@@ -60,12 +60,12 @@ _REWRITTEN = {"data", "videos", "images", ".cache", EPISODES_FOLDER} | {
 
 
 @dataclass(frozen=True)
-class FoundSet:
-    """A data set, and what of it is withdrawn.
+class AffectedDataSet:
+    """A data set with withdrawn episodes.
 
     Attributes:
-        numbers: of the withdrawn episodes.
-        recordings: withdrawn recordings in it, below `raw/`, by their path in the folder.
+        numbers: numbers of the withdrawn episodes.
+        recordings: withdrawn recordings below `raw/`, as paths relative to the folder.
     """
 
     stored: StoredSet
@@ -77,108 +77,107 @@ class FoundSet:
         return self.stored.root
 
 
-def without_withdrawn(found: FoundSet, traces: Traces, episodes: int) -> dict[str, Any]:
-    """Rewrites a data set; where no episode is left, it goes altogether.
+def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -> dict[str, Any]:
+    """Rewrites a data set without its withdrawn episodes, or deletes it if no episode remains.
 
     Args:
         episodes: number of episodes for the record of the withdrawal.
 
     Returns:
-        What was deleted and has to be made anew, and which files still name something.
+        Deleted files with the command that writes them again, and files that still contain a name.
     """
-    root, source = found.root, found.stored
-    gone = set(found.numbers)
-    numbers = [row["episode_index"] for row in source.rows if row["episode_index"] not in gone]
-    _delete_left_over(root)
+    root, source = data_set.root, data_set.stored
+    withdrawn = set(data_set.numbers)
+    numbers = [row["episode_index"] for row in source.rows if row["episode_index"] not in withdrawn]
+    _delete_unfinished(root)
     if not numbers:
         delete_folder(root)
         return {"removed": "the whole data set: no episode is left"}
     with replaced_folder(root) as partial:
-        write_subset(source, numbers, partial, kept_splits(source.info, numbers))
-        _carry(root, partial, set(found.recordings))
-        uuids = {source.rows[number]["episode_uuid"] for number in gone}
-        write_record(partial, traces.without_json(without_episodes(source.record, uuids)))
-        _clean_releases(partial, traces, [source.content.episodes[number] for number in sorted(gone)])
+        write_subset(source, numbers, partial, remaining_splits(source.info, numbers))
+        _link_other_files(root, partial, set(data_set.recordings))
+        uuids = {source.rows[number]["episode_uuid"] for number in withdrawn}
+        write_record(partial, traces.redact_json(drop_notes(source.record, uuids)))
+        _clean_releases(partial, traces, [source.content.episodes[number] for number in sorted(withdrawn)])
         entries = [*read_withdrawals(root), *([{"date": today(), "episodes": episodes}] if episodes else [])]
         if entries:
             (partial / WITHDRAWALS_FILE).write_text(withdrawals_text(entries), encoding="utf-8")
-        named = [path.relative_to(partial).as_posix() for path in traces.files_with(partial)]
-        anew = {name: command for name, command in MADE_ANEW.items() if os.path.lexists(root / name)}
-    return {"make_anew": anew, **({"still_named_in": named} if named else {})}
+        files_with_names = [path.relative_to(partial).as_posix() for path in traces.matching_files(partial)]
+        regenerate = {name: command for name, command in REGENERATED.items() if os.path.lexists(root / name)}
+    return {"make_anew": regenerate, **({"still_named_in": files_with_names} if files_with_names else {})}
 
 
-def _carry(root: Path, partial: Path, withdrawn: set[str]) -> None:
-    """Takes every other file along, as it is: only withdrawn recordings and what is rewritten or made anew stay."""
-
+def _link_other_files(root: Path, partial: Path, withdrawn: set[str]) -> None:
+    """Links all files except withdrawn recordings and files that are rewritten or regenerated."""
     side_files = {Path(name).with_name(f"._{Path(name).name}").as_posix() for name in withdrawn}
-    dropped = withdrawn | side_files | _REWRITTEN | MADE_ANEW.keys()
+    dropped = withdrawn | side_files | _WRITTEN | REGENERATED.keys()
 
-    def left(folder: str, names: list[str]) -> set[str]:
-        inside = Path(folder).relative_to(root)
-        return {name for name in names if (inside / name).as_posix() in dropped}
+    def ignored(folder: str, names: list[str]) -> set[str]:
+        relative_folder = Path(folder).relative_to(root)
+        return {name for name in names if (relative_folder / name).as_posix() in dropped}
 
-    shutil.copytree(root, partial, symlinks=True, ignore=left, copy_function=_link, dirs_exist_ok=True)
+    shutil.copytree(root, partial, symlinks=True, ignore=ignored, copy_function=_link, dirs_exist_ok=True)
     manifest = root / RAW_MANIFEST_FILE
     if manifest.is_file():
         try:
             entries = Manifest.read(manifest).files
         except CopolicyError:
-            return  # named below, where it still names a recording
-        rest = Manifest({name: entry for name, entry in entries.items() if name not in withdrawn})
-        _rewrite(partial / RAW_MANIFEST_FILE, rest.to_text())
+            return  # the caller reports it if it still names a recording
+        remaining = Manifest({name: entry for name, entry in entries.items() if name not in withdrawn})
+        _rewrite(partial / RAW_MANIFEST_FILE, remaining.to_text())
     for folder in sorted((partial / RAW_FOLDER).rglob("*"), reverse=True):
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
 
 
-def _clean_releases(partial: Path, traces: Traces, gone: Sequence[EpisodeContent]) -> None:
-    """Takes the episodes out of the records of releases and out of the change log."""
-    uuids = {episode.episode_uuid for episode in gone} | traces.names
+def _clean_releases(partial: Path, traces: Traces, withdrawn: Sequence[EpisodeContent]) -> None:
+    """Removes the episodes from the records of releases and from the change log."""
+    uuids = {episode.episode_uuid for episode in withdrawn} | traces.names
     paths = [partial / RELEASE_FILE, *sorted((partial / EARLIER_FOLDER).glob("*.json"))]
     for path in (path for path in paths if path.is_file()):
         record = ReleaseRecord.read(path)
         record = replace(
             record,
-            notes=traces.without(record.notes),
-            changes=[traces.without(text) for text in record.changes],
-            content=anonymised(record.content, lambda episode: episode.episode_uuid in uuids),
+            notes=traces.redact(record.notes),
+            changes=[traces.redact(text) for text in record.changes],
+            content=anonymise(record.content, lambda episode: episode.episode_uuid in uuids),
         )
         _rewrite(path, record.to_text())
     changelog = partial / CHANGELOG_FILE
     if changelog.is_file():
-        _rewrite(changelog, traces.without(changelog.read_text(encoding="utf-8")))
+        _rewrite(changelog, traces.redact(changelog.read_text(encoding="utf-8")))
 
 
 def _rewrite(path: Path, text: str) -> None:
-    path.unlink()  # a link: writing into it would change the data set in use
+    path.unlink()  # a hard link: writing to it would change the old data set
     path.write_text(text, encoding="utf-8")
 
 
-def _delete_left_over(root: Path) -> None:
-    """Deletes what killed commands left of the data set under hidden names beside it."""
-    place = root.resolve()
-    for path in place.parent.iterdir():
-        if path.name.startswith(f".{place.name}.") and is_unfinished(path.name) and path.is_dir():
+def _delete_unfinished(root: Path) -> None:
+    """Deletes hidden folders beside the data set that killed commands left."""
+    target = root.resolve()
+    for path in target.parent.iterdir():
+        if path.name.startswith(f".{target.name}.") and is_unfinished(path.name) and path.is_dir():
             shutil.rmtree(path)
 
 
 def _link(source: str, target: str) -> None:
     if os.path.lexists(target):
-        return  # written already, such as a licence
+        return  # already written, such as a licence
     try:
         os.link(source, target, follow_symlinks=False)
     except OSError:  # a file system without hard links
         shutil.copy2(source, target, follow_symlinks=False)
 
 
-def describe(found: FoundSet) -> dict[str, Any]:
-    """What would be taken out, for a summary."""
+def describe(data_set: AffectedDataSet) -> dict[str, Any]:
+    """Counts of what is withdrawn, for a summary."""
     return {
-        "episodes": f"{len(found.numbers)} of {len(found.stored.rows)}",
-        **({"raw_recordings": len(found.recordings)} if found.recordings else {}),
+        "episodes": f"{len(data_set.numbers)} of {len(data_set.stored.rows)}",
+        **({"raw_recordings": len(data_set.recordings)} if data_set.recordings else {}),
     }
 
 
-def people_of(row: dict[str, Any]) -> set[str]:
+def people_in(row: dict[str, Any]) -> set[str]:
     """The pseudonyms and the session of an episode."""
-    return {row.get(name) or "" for name in PEOPLE} - {""}
+    return {row.get(name) or "" for name in PEOPLE_COLUMNS} - {""}

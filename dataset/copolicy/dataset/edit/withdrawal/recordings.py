@@ -1,4 +1,4 @@
-"""The recordings of withdrawn episodes: found by their metadata, whatever their state, and deleted."""
+"""Finds recordings of withdrawn episodes by their metadata, even damaged ones, and deletes them."""
 
 import os
 from collections.abc import Iterable
@@ -7,24 +7,24 @@ from pathlib import Path
 
 from ...exceptions import CopolicyError, ForeignRecordingError
 from ...files.staging import replace_text, sync_folder
-from ...recording import log
-from ..selection import consents_of
+from ...recording import reader
+from ..selection import consent_ids
 from .traces import Traces
 
 _PEOPLE = ("pair_id", "player_0_id", "player_1_id")
 _SESSION = "session.json"
 _JOURNAL = "journal.jsonl"
-_OF_A_SESSION = (_SESSION, _JOURNAL, ".copolicy.lock")
+_SESSION_FILES = (_SESSION, _JOURNAL, ".copolicy.lock")
 
 
 @dataclass(frozen=True)
-class FoundRecording:
-    """What a recording says of itself.
+class ScannedRecording:
+    """Metadata of a recording.
 
     Attributes:
-        consents: consent ids; None where the file cannot be read.
-        people: pair, players and session, as far as they are named.
-        foreign: the file is whole and another project's.
+        consents: consent ids; None if the file cannot be read.
+        people: ids of pair, players and session, as far as recorded.
+        foreign: the file is an intact MCAP file of another project.
     """
 
     path: Path
@@ -35,35 +35,35 @@ class FoundRecording:
 
 
 def is_recording(name: str) -> bool:
-    """Whether a file is a recording: finished, broken off (`.part`), undone, or left hidden by a killed program."""
+    """Whether a file is a recording: finished, unfinished (`.part`), undone, or left hidden by a killed process."""
     return ".mcap" in name and not name.startswith("._")
 
 
-def read_recording(path: Path) -> FoundRecording:
-    """The metadata of a recording that may have broken off."""
+def read_recording(path: Path) -> ScannedRecording:
+    """Reads the metadata of a recording, which may be unfinished."""
     try:
-        records = log.read_metadata(path)
+        records = reader.read_metadata(path)
     except CopolicyError:
-        return FoundRecording(path)
+        return ScannedRecording(path)
     if "consent" not in records and "episode" not in records:
-        return FoundRecording(path, foreign=_is_foreign(path))
+        return ScannedRecording(path, foreign=_is_foreign(path))
     players, session = records.get("players", {}), records.get("session", {})
     people = {players.get(name, "") for name in _PEOPLE} | {session.get("session_id", "")}
-    consents = consents_of(records.get("consent", {}))
+    consents = consent_ids(records.get("consent", {}))
     uuid = records.get("episode", {}).get("episode_uuid", "")
-    return FoundRecording(path, uuid, frozenset(consents), frozenset(people - {""}))
+    return ScannedRecording(path, uuid, frozenset(consents), frozenset(people - {""}))
 
 
 def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
-    """Deletes recordings, what macOS keeps beside them, and what is said of them in the files of their sessions.
+    """Deletes recordings, their macOS side files, and their lines in the journals of their sessions.
 
-    A linked file is deleted where it lies. A session without a recording left goes with its folder, whose name is
-    the pair's.
+    The target of a link is deleted too. A session without recordings is deleted with its folder, whose name is that
+    of the pair.
 
     Returns:
-        What else lies where no recording is left, such as a film of one: somebody has to look at it.
+        Other files in folders without recordings, such as videos, which the user has to check.
     """
-    beside: list[Path] = []
+    other_files: list[Path] = []
     folders: set[Path] = set()
     for path in paths:
         folders.add(path.parent)
@@ -76,25 +76,25 @@ def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
             continue
         if not any(is_recording(entry.name) for entry in folder.iterdir()):
             if (folder / _SESSION).exists():
-                for name in _OF_A_SESSION:
+                for name in _SESSION_FILES:
                     (folder / name).unlink(missing_ok=True)
                 if not any(folder.iterdir()):
                     folder.rmdir()
                     sync_folder(folder.parent)
                     continue
-            beside += sorted(folder.iterdir())
+            other_files += sorted(folder.iterdir())
         journal = folder / _JOURNAL
         if journal.is_file():
             text = journal.read_text(encoding="utf-8")
-            if (rest := traces.without_lines(text)) != text:
-                replace_text(journal, rest)
+            if (remaining := traces.drop_lines(text)) != text:
+                replace_text(journal, remaining)
         sync_folder(folder)
-    return beside
+    return other_files
 
 
 def _is_foreign(path: Path) -> bool:
     try:
-        log.read_recording(path)
+        reader.read_recording(path)
     except ForeignRecordingError:
         return True
     except CopolicyError:
@@ -103,5 +103,5 @@ def _is_foreign(path: Path) -> bool:
 
 
 def hard_links(path: Path) -> int:
-    """How many other names a file has, under which it stays on the disk."""
+    """Number of other hard links to a file, through which its content remains on disk."""
     return os.stat(path).st_nlink - 1

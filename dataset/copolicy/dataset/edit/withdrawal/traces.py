@@ -1,4 +1,4 @@
-"""Names of withdrawn episodes and people in texts and JSON files, and how they are taken out."""
+"""Finds and removes the names of withdrawn episodes and people in texts and JSON files."""
 
 import json
 import re
@@ -8,87 +8,87 @@ from pathlib import Path
 from typing import Any
 
 REMOVED = "(withdrawn)"
-_BINARY = {".parquet", ".mp4", ".mcap", ".png", ".jpg", ".jpeg", ".gif", ".safetensors", ".hdf5", ".npz"}
-_PART = 1 << 20
-"""Characters of a file that are searched at a time."""
+_NOT_TEXT = {".parquet", ".mp4", ".mcap", ".png", ".jpg", ".jpeg", ".gif", ".safetensors", ".hdf5", ".npz"}
+_CHUNK_SIZE = 1 << 20
+"""Number of characters of a file that are searched at a time."""
 
 
 @dataclass(frozen=True)
 class Traces:
-    """Names that may not remain after a withdrawal.
+    """Names that must not remain after a withdrawal.
 
     Attributes:
-        names: the consent id, `episode_uuid`s, digests of recordings, and pseudonyms that nobody else has.
-        files: names of deleted recordings; they count within a list of names and in a journal only, because another
-            session has files of the same names.
+        names: the consent id, `episode_uuid`s, digests of recordings, and pseudonyms of no remaining episode.
+        files: names of deleted recordings; only searched in JSON lists and journals, because other sessions have
+            files of the same names.
     """
 
     names: frozenset[str]
     files: frozenset[str] = frozenset()
 
-    def in_text(self, text: str) -> bool:
-        """Whether a text names one of them."""
+    def matches(self, text: str) -> bool:
+        """Whether a text contains one of the names."""
         return self._pattern is not None and self._pattern.search(text) is not None
 
-    def without(self, text: str) -> str:
-        """The text with `(withdrawn)` in the place of every name."""
+    def redact(self, text: str) -> str:
+        """Replaces every name in a text by `(withdrawn)`."""
         return text if self._pattern is None else self._pattern.sub(REMOVED, text)
 
-    def without_json(self, value: Any) -> Any:
-        """The same for a JSON value: entries of lists and keys of objects go, texts lose the names in them."""
-        gone = self.names | self.files
+    def redact_json(self, value: Any) -> Any:
+        """Removes list entries and keys that are names from a JSON value, and replaces names in texts."""
+        removed = self.names | self.files
         if isinstance(value, dict):
-            return {key: self.without_json(item) for key, item in value.items() if key not in self.names}
+            return {key: self.redact_json(item) for key, item in value.items() if key not in self.names}
         if isinstance(value, list):
-            return [self.without_json(item) for item in value if not (isinstance(item, str) and item in gone)]
+            return [self.redact_json(item) for item in value if not (isinstance(item, str) and item in removed)]
         if isinstance(value, str):
-            return REMOVED if value in self.names else self.without(value)
+            return REMOVED if value in self.names else self.redact(value)
         return value
 
-    def without_lines(self, text: str) -> str:
-        """A journal, one JSON object a line, without the lines that name one of them or a deleted recording."""
-        return "".join(line for line in text.splitlines(keepends=True) if not self._in_line(line))
+    def drop_lines(self, text: str) -> str:
+        """Removes the lines of a journal (one JSON object per line) that contain a name or a deleted recording."""
+        return "".join(line for line in text.splitlines(keepends=True) if not self._line_matches(line))
 
-    def files_with(self, folder: Path) -> Iterable[Path]:
-        """Files below a folder that still name one of them, whatever their length; a file of bytes is none of text."""
+    def matching_files(self, folder: Path) -> Iterable[Path]:
+        """Yields the text files below a folder that still contain a name; reads files in chunks."""
         for path in sorted(folder.rglob("*")):
-            if path.is_file() and path.suffix not in _BINARY and not _is_binary(path) and self._in_file(path):
+            if path.is_file() and path.suffix not in _NOT_TEXT and not _is_binary(path) and self._file_matches(path):
                 yield path
 
-    def _in_file(self, path: Path) -> bool:
+    def _file_matches(self, path: Path) -> bool:
         pattern = self._pattern
         if pattern is None:
             return False
-        overlap = max(len(name) for name in self.names) + 1  # and the character before it
+        overlap = max(len(name) for name in self.names) + 1  # and the preceding character
         with path.open(encoding="utf-8", errors="replace") as file:
-            text, first = file.read(_PART), True
+            text, at_start = file.read(_CHUNK_SIZE), True
             while text:
-                more = file.read(_PART)
+                next_text = file.read(_CHUNK_SIZE)
                 for match in pattern.finditer(text):
-                    # At an edge that is not the file's, the character beyond may make it a part of a longer name.
-                    if (match.start() or first) and (match.end() < len(text) or not more):
+                    # At the edge of a chunk the next character may be part of a longer name.
+                    if (match.start() or at_start) and (match.end() < len(text) or not next_text):
                         return True
-                if not more:
+                if not next_text:
                     return False
-                text, first = text[-overlap - 1 :] + more, False
+                text, at_start = text[-overlap - 1 :] + next_text, False
         return False
 
     @property
     def _pattern(self) -> re.Pattern[str] | None:
-        # A consent id such as 12 is no name in a text: it would be found in every number.
+        # A numeric consent id such as 12 is not searched in texts: it would match other numbers.
         names = sorted((name for name in self.names if re.search(r"[^\W\d]", name)), key=len, reverse=True)
         return re.compile(rf"(?<![\w-])(?:{'|'.join(map(re.escape, names))})(?![\w-])") if names else None
 
-    def _in_line(self, line: str) -> bool:
+    def _line_matches(self, line: str) -> bool:
         try:
             values = set(_texts(json.loads(line)))
         except ValueError:
-            return self.in_text(line)
-        return bool(values & (self.names | self.files)) or any(self.in_text(value) for value in values)
+            return self.matches(line)
+        return bool(values & (self.names | self.files)) or any(self.matches(value) for value in values)
 
 
 def _is_binary(path: Path) -> bool:
-    """By a zero byte near its beginning, as git tells."""
+    """Whether a file has a zero byte near its beginning, git's test for binary files."""
     with path.open("rb") as file:
         return b"\0" in file.read(8000)
 

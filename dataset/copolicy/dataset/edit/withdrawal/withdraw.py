@@ -1,4 +1,4 @@
-"""`withdraw`: every episode of a consent id out of recordings, data sets, raw copies and the records of releases."""
+"""`withdraw`: deletes the episodes of a consent id from recordings, data sets, raw copies and records of releases."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -12,13 +12,13 @@ from ...files.meta_files import INFO_FILE
 from ...files.replace_folder import finish_all_interrupted, finish_interrupted, is_unfinished
 from ...lerobot_folder.folder import LeRobotFolder
 from ...lerobot_folder.info import stripped_hint
-from ..selection import consents_of
+from ..selection import consent_ids
 from ..subset.stored_set import StoredSet
-from .data_set import PEOPLE, FoundSet, describe, people_of, without_withdrawn
-from .recordings import FoundRecording, delete_recordings, hard_links, is_recording, read_recording
+from .data_set import PEOPLE_COLUMNS, AffectedDataSet, describe, people_in, remove_withdrawn
+from .recordings import ScannedRecording, delete_recordings, hard_links, is_recording, read_recording
 from .traces import Traces
 
-OUT_OF_REACH = (
+COPIES_ELSEWHERE = (
     "copies elsewhere: backups, exports (zarr, robomimic, minari), checkpoints trained on the episodes, caches of "
     "LeRobot and the Hub's client (~/.cache/huggingface), and what others have downloaded"
 )
@@ -30,37 +30,37 @@ ON_THE_HUB = (
 
 
 @dataclass
-class _Below:
-    """What lies below the paths.
+class _Scan:
+    """Data sets and recordings below the paths.
 
     Attributes:
-        sets: the rows of each data set.
+        sets: rows of meta/episodes by data set.
         foreign: data sets and recordings of other projects.
         unfinished: folders that a running or killed command has not finished.
     """
 
     sets: dict[Path, list[dict[str, Any]]] = field(default_factory=dict)
-    recordings: dict[Path, FoundRecording] = field(default_factory=dict)
+    recordings: dict[Path, ScannedRecording] = field(default_factory=dict)
     foreign: list[Path] = field(default_factory=list)
     unfinished: list[Path] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
-class Survey:
-    """Everything below some paths that is tied to a consent id.
+class WithdrawalScope:
+    """Data sets and recordings with episodes of a consent id.
 
     Attributes:
-        sets: the data sets that lose something.
-        recordings: the recordings to delete, apart from those in `raw/` of a data set.
-        unreadable: recordings that do not tell whose they are.
+        sets: data sets with episodes or recordings to delete.
+        recordings: recordings to delete, except those in `raw/` of a data set.
+        unreadable: recordings whose consent ids cannot be read.
         foreign: data sets and recordings of other projects, which have no consent ids.
-        unfinished: folders that a running or killed command has not finished, and nobody looked into.
-        traces: the names that must not be found any more.
-        direct: whether a path's own consent ids led to it, by data set or recording.
+        unfinished: folders that a running or killed command has not finished; they were not searched.
+        traces: names that must not remain.
+        direct: data sets and recordings that contain the consent id themselves.
     """
 
-    sets: tuple[FoundSet, ...]
-    recordings: tuple[FoundRecording, ...]
+    sets: tuple[AffectedDataSet, ...]
+    recordings: tuple[ScannedRecording, ...]
     unreadable: tuple[Path, ...]
     foreign: tuple[Path, ...]
     unfinished: tuple[Path, ...]
@@ -69,141 +69,141 @@ class Survey:
 
     @property
     def episodes(self) -> int:
-        """Different episodes, wherever they lie."""
-        uuids = {found.stored.rows[number]["episode_uuid"] for found in self.sets for number in found.numbers}
+        """Number of distinct episodes in data sets and recordings."""
+        uuids = {part.stored.rows[number]["episode_uuid"] for part in self.sets for number in part.numbers}
         uuids |= {recording.episode_uuid or str(recording.path) for recording in self.recordings}
         return len(uuids)
 
 
-def withdraw(consent: str, paths: Sequence[Path], really: bool = False) -> dict[str, Any]:
-    """Deletes every episode of a consent id below some paths: recordings, data sets with their raw copies.
+def withdraw(consent: str, paths: Sequence[Path], delete: bool = False) -> dict[str, Any]:
+    """Deletes all episodes of a consent id below some paths, in recordings and data sets with their raw copies.
 
-    An episode that one path names by the consent id is deleted from all of them, also where a copy does not state it
-    (a consent id that was amended in a data set is not in its recordings). A data set is replaced in one step and
-    keeps a record of when how many episodes were withdrawn, not which.
+    An episode with the consent id in one place is deleted from all places, even from copies without the id (an id
+    amended in a data set is not in its recordings). A data set is replaced atomically; it records the date and number
+    of withdrawn episodes, not which.
 
     Args:
-        consent: one id; an episode of two people may name two, and goes with either.
-        paths: folders with recordings or data sets, searched with all that is in them, or single recordings.
-        really: delete; by default only tell what would be deleted.
+        consent: one id; an episode with several ids is deleted for any of them.
+        paths: folders with recordings or data sets, searched recursively, or single recordings.
+        delete: delete the episodes; by default they are only listed.
 
     Returns:
         Summary.
 
     Raises:
-        InvalidValueError: no consent id.
+        InvalidValueError: not a single consent id.
         FileFormatError: a path does not exist, or a data set below it cannot be read; nothing was changed.
         RunError: no episode has the consent id.
     """
     consent = consent.strip()
     if not consent or "," in consent:
         raise InvalidValueError("CONSENT_ID", "one consent id", consent)
-    survey = survey_paths(consent, paths)
-    if not survey.sets and not survey.recordings:
+    scope = find_scope(consent, paths)
+    if not scope.sets and not scope.recordings:
         shown = ", ".join(map(str, paths))
-        unread = f" ({len(survey.unreadable)} recordings cannot be read)" if survey.unreadable else ""
+        unread = f" ({len(scope.unreadable)} recordings cannot be read)" if scope.unreadable else ""
         raise RunError(f"{shown}: expected an episode with consent id {consent}, found none{unread}")
     summary: dict[str, Any] = {
-        "withdrawn" if really else "would_be_withdrawn": survey.episodes,
-        "recordings": len(survey.recordings),
+        "withdrawn" if delete else "would_be_withdrawn": scope.episodes,
+        "recordings": len(scope.recordings),
         "data_sets": {},
     }
-    linked = [str(found.path) for found in survey.recordings if hard_links(found.path)]
-    # What only another copy tells of goes first: after an interruption the consent id still leads there.
-    for found in sorted(survey.sets, key=lambda found: found.root in survey.direct):
-        facts = describe(found)
-        if really:
-            facts |= without_withdrawn(found, survey.traces, len(found.numbers))
-        summary["data_sets"][str(found.root)] = facts
-    if really:
-        beside: list[Path] = []
+    linked = [str(recording.path) for recording in scope.recordings if hard_links(recording.path)]
+    # Copies without the consent id first: after an interruption those with the id still lead to the rest.
+    for data_set in sorted(scope.sets, key=lambda data_set: data_set.root in scope.direct):
+        facts = describe(data_set)
+        if delete:
+            facts |= remove_withdrawn(data_set, scope.traces, len(data_set.numbers))
+        summary["data_sets"][str(data_set.root)] = facts
+    if delete:
+        other_files: list[Path] = []
         for direct in (False, True):
-            inside = [found.path for found in survey.recordings if (found.path in survey.direct) is direct]
-            beside += delete_recordings(inside, survey.traces)
+            files = [recording.path for recording in scope.recordings if (recording.path in scope.direct) is direct]
+            other_files += delete_recordings(files, scope.traces)
         reports = {
-            "still_named_in": [str(path) for path in _still_named(paths, survey)],
-            "beside_deleted_recordings": [str(path) for path in beside if os.path.lexists(path)],
+            "still_named_in": [str(path) for path in _files_with_names(paths, scope)],
+            "beside_deleted_recordings": [str(path) for path in other_files if os.path.lexists(path)],
             "next": "copolicy-dataset release ROOT --bump major, then publish",
         }
     else:
-        files = [str(found.path) for found in survey.recordings]
+        files = [str(recording.path) for recording in scope.recordings]
         reports = {"files": files, "next": "nothing was changed; --yes deletes"}
     reports |= {
         "hard_links_elsewhere": linked,
-        "git_history": [str(found.root) for found in survey.sets if (found.root / ".git").exists()],
-        "of_other_projects": [str(path) for path in survey.foreign],
-        "unfinished": [str(path) for path in survey.unfinished if path.exists()],
-        "unreadable": [str(path) for path in survey.unreadable],
+        "git_history": [str(part.root) for part in scope.sets if (part.root / ".git").exists()],
+        "of_other_projects": [str(path) for path in scope.foreign],
+        "unfinished": [str(path) for path in scope.unfinished if path.exists()],
+        "unreadable": [str(path) for path in scope.unreadable],
         "on_the_hub": ON_THE_HUB,
-        "out_of_reach": OUT_OF_REACH,
+        "out_of_reach": COPIES_ELSEWHERE,
     }
     summary |= {name: value for name, value in reports.items() if value}
-    return summary | ({"exit_status": 1} if survey.unreadable else {})
+    return summary | ({"exit_status": 1} if scope.unreadable else {})
 
 
-def survey_paths(consent: str, paths: Sequence[Path]) -> Survey:
-    """Looks below the paths; changes nothing but what an interrupted call left undone."""
-    below = _read_below(paths)
-    sets, recordings = below.sets, below.recordings
-    direct = {path for path, found in recordings.items() if consent in (found.consents or ())}
+def find_scope(consent: str, paths: Sequence[Path]) -> WithdrawalScope:
+    """Finds the data sets and recordings with a consent id; changes nothing but completes interrupted edits."""
+    scan = _scan(paths)
+    sets, recordings = scan.sets, scan.recordings
+    direct = {path for path, recording in recordings.items() if consent in (recording.consents or ())}
     uuids = {recordings[path].episode_uuid for path in direct} - {""}
     for root, rows in sets.items():
-        named = [row["episode_uuid"] for row in rows if consent in consents_of(row)]
-        uuids |= {uuid for uuid in named if uuid}
-        direct |= {root} if named else set()
-    gone = {path: found for path, found in recordings.items() if path in direct or found.episode_uuid in uuids}
-    names, staying = {consent} | uuids, set()
-    for path, found in recordings.items():
-        (names if path in gone else staying).update(found.people)
-    concerned: list[FoundSet] = []
+        uuids_of_consent = [row["episode_uuid"] for row in rows if consent in consent_ids(row)]
+        uuids |= {uuid for uuid in uuids_of_consent if uuid}
+        direct |= {root} if uuids_of_consent else set()
+    withdrawn = {path: entry for path, entry in recordings.items() if path in direct or entry.episode_uuid in uuids}
+    removed_names, remaining_names = {consent} | uuids, set()
+    for path, recording in recordings.items():
+        (removed_names if path in withdrawn else remaining_names).update(recording.people)
+    affected: list[AffectedDataSet] = []
     for root, rows in sets.items():
         numbers = []
         for row in rows:
-            if row["episode_uuid"] in uuids or consent in consents_of(row):
+            if row["episode_uuid"] in uuids or consent in consent_ids(row):
                 numbers.append(row["episode_index"])
-                names |= people_of(row) | {row.get("source_sha256") or ""}
+                removed_names |= people_in(row) | {row.get("source_sha256") or ""}
             else:
-                staying |= people_of(row)
-        raw = tuple(name for path in gone if (name := _inside(path, root)) is not None)
+                remaining_names |= people_in(row)
+        raw = tuple(name for path in withdrawn if (name := _relative_path(path, root)) is not None)
         if numbers or raw:
-            concerned.append(FoundSet(StoredSet.read(root), tuple(numbers), raw))
-    places = [found.root.resolve() for found in concerned]
-    outside = [found for path, found in gone.items() if not any(path.resolve().is_relative_to(p) for p in places)]
-    unreadable = [path for path, found in recordings.items() if found.consents is None]
-    traces = Traces(frozenset(names - staying - {""}), frozenset(path.name for path in gone))
-    return Survey(
-        tuple(concerned), tuple(outside), tuple(unreadable), tuple(below.foreign), tuple(below.unfinished), traces,
+            affected.append(AffectedDataSet(StoredSet.read(root), tuple(numbers), raw))
+    roots = [data_set.root.resolve() for data_set in affected]
+    outside = [entry for path, entry in withdrawn.items() if not any(path.resolve().is_relative_to(r) for r in roots)]
+    unreadable = [path for path, recording in recordings.items() if recording.consents is None]
+    traces = Traces(frozenset(removed_names - remaining_names - {""}), frozenset(path.name for path in withdrawn))
+    return WithdrawalScope(
+        tuple(affected), tuple(outside), tuple(unreadable), tuple(scan.foreign), tuple(scan.unfinished), traces,
         frozenset(direct),
     )  # fmt: skip
 
 
-def _read_below(paths: Sequence[Path]) -> _Below:
-    """Reads what lies below the paths, each file and folder once."""
-    below = _Below()
-    known: set[Path] = set()
+def _scan(paths: Sequence[Path]) -> _Scan:
+    """Reads the data sets and recordings below the paths, each once."""
+    scan = _Scan()
+    visited: set[Path] = set()
     for path in paths:
         finish_interrupted(path)
         if not os.path.lexists(path):
-            raise FileFormatError(path, "a folder of recordings, a data set or a recording", "nothing there")
-        for item in _walk(path, below.unfinished):
-            if item.resolve() in known:
+            raise FileFormatError(path, "a folder of recordings, a data set or a recording", "no such file or folder")
+        for item in _walk(path, scan.unfinished):
+            if item.resolve() in visited:
                 continue
-            known.add(item.resolve())
+            visited.add(item.resolve())
             if not item.is_dir():
                 recording = read_recording(item)
                 if recording.foreign:
-                    below.foreign.append(item)
+                    scan.foreign.append(item)
                 else:
-                    below.recordings[item] = recording
+                    scan.recordings[item] = recording
             elif _is_foreign(item):
-                below.foreign.append(item)
+                scan.foreign.append(item)
             else:
-                below.sets[item] = _rows(item)
-    return below
+                scan.sets[item] = _rows(item)
+    return scan
 
 
 def _is_foreign(root: Path) -> bool:
-    """Whether a data set is another project's. One whose information cannot be read may be ours."""
+    """Whether a data set belongs to another project; False if its `meta/info.json` cannot be read."""
     try:
         info = read_json(root / INFO_FILE, dict[str, Any], "LeRobot's data set information")
     except FileFormatError:
@@ -212,41 +212,41 @@ def _is_foreign(root: Path) -> bool:
 
 
 def _rows(root: Path) -> list[dict[str, Any]]:
-    """Number, name, consent and people of each episode of a data set, their types checked.
+    """Reads number, uuid, consent and people of each episode of a data set.
 
     Raises:
-        FileFormatError: no data set of this project, or one that does not tell.
+        FileFormatError: not a data set of copolicy, or a column is missing.
     """
     folder = LeRobotFolder.open(root)
-    there = [name for name in ("source_sha256", *PEOPLE) if name in folder.episodes.column_names]
-    return folder.rows(["episode_uuid", "consent_id", *there])
+    present = [name for name in ("source_sha256", *PEOPLE_COLUMNS) if name in folder.episodes.column_names]
+    return folder.rows(["episode_uuid", "consent_id", *present])
 
 
-def _inside(path: Path, root: Path) -> str | None:
-    """The path in a data set of a file that lies, or is linked, there."""
+def _relative_path(path: Path, root: Path) -> str | None:
+    """The path of a file relative to a data set that contains it, directly or by a link, else None."""
     if path.is_relative_to(root):
         return path.relative_to(root).as_posix()
-    place = root.resolve()
-    return path.resolve().relative_to(place).as_posix() if path.resolve().is_relative_to(place) else None
+    path, root = path.resolve(), root.resolve()
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else None
 
 
 def _walk(path: Path, unfinished: list[Path]) -> Iterator[Path]:
-    """Data sets (folders) and recordings (files) at or below a path; linked folders are entered once.
+    """Yields data sets (folders) and recordings (files) at or below a path; visits linked folders once.
 
     Args:
-        unfinished: takes the folders that a running or killed command has not finished.
+        unfinished: list to which folders that a running or killed command has not finished are appended.
     """
     if path.is_file():
         yield path
         return
-    entered: set[tuple[int, int]] = set()
+    visited: set[tuple[int, int]] = set()
     finish_all_interrupted(path)
     for folder, folders, names in os.walk(path, followlinks=True):
         status = os.stat(folder)
-        if (status.st_dev, status.st_ino) in entered:
+        if (status.st_dev, status.st_ino) in visited:
             folders.clear()
             continue
-        entered.add((status.st_dev, status.st_ino))
+        visited.add((status.st_dev, status.st_ino))
         unfinished += [Path(folder, name) for name in folders if is_unfinished(name)]
         folders[:] = [name for name in folders if not is_unfinished(name)]
         if (Path(folder) / INFO_FILE).is_file():
@@ -257,11 +257,11 @@ def _walk(path: Path, unfinished: list[Path]) -> Iterator[Path]:
         yield from (Path(folder, name) for name in sorted(names) if is_recording(name))
 
 
-def _still_named(paths: Sequence[Path], survey: Survey) -> Iterator[Path]:
-    """Text files outside of data sets that name what was withdrawn; they are somebody's own and are left alone."""
-    roots = [found.root.resolve() for found in survey.sets]
+def _files_with_names(paths: Sequence[Path], scope: WithdrawalScope) -> Iterator[Path]:
+    """Yields text files outside data sets that still contain a removed name; they are not changed."""
+    roots = [data_set.root.resolve() for data_set in scope.sets]
     for path in paths:
         if path.is_dir():
-            for file in survey.traces.files_with(path):
+            for file in scope.traces.matching_files(path):
                 if not any(file.resolve().is_relative_to(root) for root in roots):
                     yield file
