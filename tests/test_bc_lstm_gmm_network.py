@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+
 from lerobot_policy_copolicy.bc_lstm_gmm.network import RecurrentMixtureNetwork
 
 REFERENCE = json.loads((Path(__file__).parent / "data/robomimic/bc_rnn_gmm.json").read_text(encoding="utf-8"))

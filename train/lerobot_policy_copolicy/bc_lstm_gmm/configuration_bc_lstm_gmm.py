@@ -31,8 +31,9 @@ class BcLstmGmmConfig(PairPolicyConfig):
         "scan": {"observation_features": "scan", "mirror": True, "permute_obstacles": True},
     }
     generic_features: ClassVar = ("absolute", "raw")
+    n_action_steps: ClassVar[int] = 1  # it acts frame by frame
     bounds: ClassVar = {
-        "horizon": Bounds(1),
+        "sequence_length": Bounds(1),
         "n_layers": Bounds(1),
         "width": Bounds(1),
         "n_modes": Bounds(1),
@@ -45,7 +46,7 @@ class BcLstmGmmConfig(PairPolicyConfig):
     }
 
     preset: str = "paper"  # "paper", "normalized" or "scan"
-    horizon: int = 10  # frames of a training window, and frames after which the LSTM's state is reset in execution
+    sequence_length: int = 10  # frames of a training window; in execution the LSTM's state is reset as often
     n_layers: int = 2  # layers of the LSTM
     width: int = 400  # hidden size of the LSTM
     n_modes: int = 5  # modes of the mixture
@@ -59,19 +60,14 @@ class BcLstmGmmConfig(PairPolicyConfig):
         pass
 
     @property
-    def n_action_steps(self) -> int:
-        """The policy acts frame by frame."""
-        return 1
-
-    @property
     def observation_delta_indices(self) -> list[int]:
         """Frames of a training window, from the current one on."""
-        return list(range(self.horizon))
+        return list(range(self.sequence_length))
 
     @property
     def action_delta_indices(self) -> list[int]:
         """The same frames."""
-        return list(range(self.horizon))
+        return list(range(self.sequence_length))
 
     def get_optimizer_preset(self) -> AdamConfig:
         """Adam with the `optimizer_*` settings."""

@@ -1,9 +1,10 @@
 """BC-LSTM-GMM: behaviour cloning of both players by an LSTM with a mixture of normal distributions."""
 
+from typing import Unpack
+
 import torch
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
-from typing import Unpack
 
 from copolicy.dataset.features import ACTION
 
@@ -17,7 +18,8 @@ class BcLstmGmmPolicy(PairPolicy):
 
     As robomimic's `BC_RNN_GMM`: the loss is the negative log-likelihood over all frames of a window that starts with
     the state zero; frames beyond the end of the episode repeat its last frame and count. In execution a mode is drawn
-    at every frame with the standard deviation `execution_deviation`, and the state is reset every `horizon` frames.
+    at every frame with the standard deviation `execution_deviation`, and the state is reset every `sequence_length` (L)
+    frames.
 
     Mandlekar et al., "What Matters in Learning from Offline Human Demonstrations" (2021, arXiv 2108.03298).
     """
@@ -47,7 +49,7 @@ class BcLstmGmmPolicy(PairPolicy):
         """The training loss: negative log-likelihood of the joint actions, in nats.
 
         Args:
-            batch: observation columns `(B, horizon, n)` and action `(B, horizon, m)` of both players.
+            batch: observation columns `(B, L, n)` and action `(B, L, m)` of both players.
             reduction: "mean", or "none" for one loss per sample.
 
         Returns:
@@ -58,9 +60,9 @@ class BcLstmGmmPolicy(PairPolicy):
             ShapeError: a column has another shape.
             RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
         """
-        sample = self._training_sample(batch, self.config.horizon, self.config.horizon)
+        sample = self._training_sample(batch, self.config.sequence_length, self.config.sequence_length)
         mixture, _ = self.network(self.features(sample))
-        loss = -mixture.distribution().log_prob(self.action_scale.scaled(sample[ACTION]))  # (B, horizon)
+        loss = -mixture.distribution().log_prob(self.action_scale.scaled(sample[ACTION]))  # (B, L)
         loss = loss.mean() if reduction == "mean" else loss.mean(dim=1)
         if self.training:
             self._loss = loss.detach()
@@ -76,7 +78,7 @@ class BcLstmGmmPolicy(PairPolicy):
         Returns:
             `(B, m)` within the bounds of the task.
         """
-        if self._frames % self.config.horizon == 0:
+        if self._frames % self.config.sequence_length == 0:
             self._state = None
         self._frames += 1
         inputs = self.features(self._observation(batch, None))[:, None]  # (B, 1, size)

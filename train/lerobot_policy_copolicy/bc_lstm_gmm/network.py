@@ -26,8 +26,8 @@ class Mixture(NamedTuple):
 class RecurrentMixtureNetwork(nn.Module):
     """robomimic 0.3's `RNNGMMActorNetwork` with its settings for BC-RNN on low-dimensional human data.
 
-    Means pass through tanh, deviations are softplus plus `min_deviation`. 1,973,245 parameters for 18 inputs, actions of
-    4 values and 5 modes (Mandlekar et al., 2021, arXiv 2108.03298).
+    Means pass through tanh, deviations are softplus plus `min_deviation`. It has 1,973,245 parameters for 18 inputs,
+    actions of 4 values and 5 modes (Mandlekar et al., 2021, arXiv 2108.03298).
 
     Args:
         input_size: values of an observation.
@@ -55,8 +55,8 @@ class RecurrentMixtureNetwork(nn.Module):
 
     def forward(self, inputs: Tensor, state: State | None = None) -> tuple[Mixture, State]:
         """Mixtures of the frames `(B, T, input_size)`, and the state after the last; a state of None is zero."""
-        hidden, state = self.lstm(inputs, state)  # (B, T, width)
+        hidden, last_state = self.lstm(inputs, state)  # (B, T, width)
         shape = (self.n_modes, self.action_size)
         means = torch.tanh(self.mean(hidden)).unflatten(-1, shape)
         deviations = nn.functional.softplus(self.deviation(hidden)).unflatten(-1, shape) + self.min_deviation
-        return Mixture(self.logits(hidden), means, deviations), state
+        return Mixture(self.logits(hidden), means, deviations), last_state

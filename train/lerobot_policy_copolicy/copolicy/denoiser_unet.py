@@ -1,5 +1,7 @@
 """A temporal convolutional U-Net that denoises an action chunk: the CNN of Diffusion Policy (Chi et al., 2023)."""
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor, nn
 
@@ -11,8 +13,8 @@ _GROUPS = 8  # of the group normalisation
 class UnetDenoiser(nn.Module):
     """Denoises an action chunk with 1-D convolutions over time, conditioned by FiLM on the step and the history.
 
-    The layers are those of `ConditionalUnet1D` of Diffusion Policy, with scale and bias in FiLM, and so is the number of
-    parameters: 65,987,588 for actions of 4 values, 3 frames of 18 values and widths of 256, 512 and 1024.
+    The layers are those of `ConditionalUnet1D` of Diffusion Policy, with scale and bias in FiLM: 65,987,588 parameters
+    for actions of 4 values, 3 frames of 18 values and widths of 256, 512 and 1024.
 
     Args:
         action_size: values of an action.
@@ -47,13 +49,11 @@ class UnetDenoiser(nn.Module):
         def block(channels_in: int, channels_out: int) -> _ResidualBlock:
             return _ResidualBlock(channels_in, channels_out, condition, kernel_size)
 
-        self.down = nn.ModuleList(
-            nn.ModuleList((block(narrow, wide), block(wide, wide))) for narrow, wide in zip(widths, widths[1:])
-        )
+        self.down = nn.ModuleList(_Pair(block(narrow, wide), block(wide, wide)) for narrow, wide in pairwise(widths))
         self.downsample = nn.ModuleList(nn.Conv1d(wide, wide, 3, stride=2, padding=1) for wide in down_widths[:-1])
-        self.middle = nn.ModuleList((block(down_widths[-1], down_widths[-1]), block(down_widths[-1], down_widths[-1])))
-        pairs = list(zip(down_widths, down_widths[1:], strict=False))[::-1]
-        self.up = nn.ModuleList(nn.ModuleList((block(2 * wide, narrow), block(narrow, narrow))) for narrow, wide in pairs)
+        self.middle = _Pair(block(down_widths[-1], down_widths[-1]), block(down_widths[-1], down_widths[-1]))
+        pairs = list(pairwise(down_widths))[::-1]
+        self.up = nn.ModuleList(_Pair(block(2 * wide, narrow), block(narrow, narrow)) for narrow, wide in pairs)
         self.upsample = nn.ModuleList(nn.ConvTranspose1d(narrow, narrow, 4, stride=2, padding=1) for narrow, _ in pairs)
         self.head = nn.Sequential(
             _convolution(down_widths[0], down_widths[0], kernel_size), nn.Conv1d(down_widths[0], action_size, 1)
@@ -72,16 +72,14 @@ class UnetDenoiser(nn.Module):
         """
         film = torch.cat((self.step_encoder(steps), condition.flatten(1)), dim=1)  # (B, step_width + To * size)
         hidden, skipped = noisy_actions.transpose(1, 2), []  # (B, channels, T)
-        for level, (first, second) in enumerate(self.down):
-            hidden = second(first(hidden, film), film)
+        for level, blocks in enumerate(self.down):
+            hidden = blocks(hidden, film)
             skipped.append(hidden)
             if level < len(self.downsample):
                 hidden = self.downsample[level](hidden)
-        for block in self.middle:
-            hidden = block(hidden, film)
-        for (first, second), upsample in zip(self.up, self.upsample, strict=True):
-            hidden = second(first(torch.cat((hidden, skipped.pop()), dim=1), film), film)
-            hidden = upsample(hidden)
+        hidden = self.middle(hidden, film)
+        for blocks, upsample in zip(self.up, self.upsample, strict=True):
+            hidden = upsample(blocks(torch.cat((hidden, skipped.pop()), dim=1), film))
         return self.head(hidden).transpose(1, 2)
 
 
@@ -107,3 +105,14 @@ class _ResidualBlock(nn.Module):
         """`(B, channels_in, T)` and `(B, condition_size)` to `(B, channels_out, T)`."""
         scale, bias = self.film(condition)[..., None].chunk(2, dim=1)  # (B, channels_out, 1) each
         return self.second(scale * self.first(hidden) + bias) + self.residual(hidden)
+
+
+class _Pair(nn.Module):
+    """Two residual blocks under the same condition."""
+
+    def __init__(self, first: _ResidualBlock, second: _ResidualBlock):
+        super().__init__()
+        self.first, self.second = first, second
+
+    def forward(self, hidden: Tensor, condition: Tensor) -> Tensor:
+        return self.second(self.first(hidden, condition), condition)

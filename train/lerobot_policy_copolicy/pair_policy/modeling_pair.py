@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import torch
 from lerobot.policies import PreTrainedPolicy
@@ -34,7 +35,9 @@ class PairPolicy(PreTrainedPolicy):
         action_scale: scales joint actions to [-1, 1] and back.
     """
 
-    config: PairPolicyConfig
+    config_class = PairPolicyConfig  # pyright: ignore[reportAssignmentType]
+    name = "pair_policy"  # pyright: ignore[reportAssignmentType]
+    config: Any  # of the subclass
     features: nn.Module
     action_scale: ActionScale
 
