@@ -12,7 +12,7 @@ from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.policy.encoders import RelativeFeatures, ScanFeatures
 from copolicy.tasks.table.policy.range_scan import RANGE, RAYS, RangeScan
 from copolicy.tasks.table.spec import SPEC
-from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures
+from lerobot_policy_copolicy.pair_policy.features import AbsoluteFeatures
 
 
 def observation(pose=(240.0, 120.0, 3.14), obstacles=((480.0, 300.0),), human=(0.5, -1.0)) -> dict[str, torch.Tensor]:

@@ -6,7 +6,7 @@ import torch
 from copolicy.tasks.table.spec import SPEC
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
-from lerobot_policy_copolicy.copolicy.features import AbsoluteFeatures
+from lerobot_policy_copolicy.pair_policy.features import AbsoluteFeatures
 
 HORIZON, FRAMES, CONDITION = 12, 3, 20
 

@@ -11,8 +11,8 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.train.cli import main as train
-from lerobot_policy_copolicy.copolicy.training_data import require_same_rate
 from lerobot_policy_copolicy.env import TableCarryingEnvConfig
+from lerobot_policy_copolicy.pair_policy.training_data import require_same_rate
 
 SIZES = "have a property that no policy observes: the size of each obstacle, where they differ (120,60 px)"
 

@@ -18,8 +18,8 @@ from copolicy.dataset.task import PairTask, get_task
 from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.cli import main
 from lerobot_policy_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.features import ActionScale
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
+from lerobot_policy_copolicy.pair_policy.features import ActionScale
 
 ROPE = """
 from dataclasses import replace

@@ -16,7 +16,7 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.train.cli import main
 from copolicy.train.episode_choice import resumed_episodes, selected_episodes
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-from lerobot_policy_copolicy.copolicy.training_data import prepare_training
+from lerobot_policy_copolicy.pair_policy.training_data import prepare_training
 
 
 def _meta(root: Path):

@@ -30,8 +30,8 @@ from copolicy.tasks.table.world import TableWorld
 from copolicy.train.cli import main as train
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
-from lerobot_policy_copolicy.copolicy.training_data import record_conditions
 from lerobot_policy_copolicy.env import TableCarryingEnvConfig
+from lerobot_policy_copolicy.pair_policy.training_data import record_conditions
 
 SLOW = Physics(angular_acceleration_limit=math.pi / 8)
 

@@ -4,8 +4,9 @@ LeRobot imports this module because the distribution has the same name; networks
 only when a policy, an environment or a teleoperator is created.
 """
 
+from .bc_lstm_gmm.configuration_bc_lstm_gmm import BcLstmGmmConfig
 from .copolicy.configuration_copolicy import CopolicyConfig
 from .env import PairTaskEnvConfig, TableCarryingEnvConfig
 from .teleoperator.config_copolicy_pair import CopolicyPairConfig
 
-__all__ = ["CopolicyConfig", "CopolicyPairConfig", "PairTaskEnvConfig", "TableCarryingEnvConfig"]
+__all__ = ["BcLstmGmmConfig", "CopolicyConfig", "CopolicyPairConfig", "PairTaskEnvConfig", "TableCarryingEnvConfig"]

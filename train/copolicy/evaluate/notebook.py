@@ -21,7 +21,7 @@ def coplan_episodes(
     policy: Policy | str = "pretrained",
     maps: str | Sequence[Any] = "holdout",
     *,
-    n_action_steps: int = 8,
+    n_action_steps: int | None = None,
     limit: int | None = None,
     seed: int = 0,
 ) -> list[Episode]:
@@ -30,7 +30,8 @@ def coplan_episodes(
     Args:
         policy: a checkpoint, a training run, `pretrained`, or a policy loaded by `load_policy`.
         maps: name of a scenario set, a scenario file, or a sequence of scenarios.
-        n_action_steps: actions of a chunk that are executed before the next chunk is predicted.
+        n_action_steps: actions of a chunk that are executed before the next chunk is predicted; 8, or all of a shorter
+            chunk, if None.
         limit: use only the first `limit` scenarios; all if None.
         seed: seed of the noise from which chunks are denoised.
 
@@ -43,6 +44,7 @@ def coplan_episodes(
         UnknownNameError: the scenario set does not exist.
     """
     loaded: Any = load_policy(policy) if isinstance(policy, str) else policy
+    n_action_steps = min(8, loaded.chunk_size) if n_action_steps is None else n_action_steps
     if not 1 <= n_action_steps <= loaded.chunk_size:
         raise InvalidValueError("n_action_steps", f"1 to {loaded.chunk_size}, the actions of a chunk", n_action_steps)
     loaded.n_action_steps = loaded.n_predicted_actions = n_action_steps

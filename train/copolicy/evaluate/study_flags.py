@@ -32,8 +32,11 @@ def add_study_flags(command: argparse.ArgumentParser, n_action_steps: int) -> No
 
 def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
     """Adds the flags of inference, of the world's settings, `--seed` and `--overwrite`."""
-    meaning = f"actions executed of each action chunk (default: {n_action_steps})"
-    add_whole_number(command, "--n-action-steps", meaning, n_action_steps)
+    shorter = ", or all of a shorter chunk" if n_action_steps > 1 else ""
+    meaning = f"actions executed of each action chunk (default: {n_action_steps}{shorter})"
+    # Without the flag, `study_policy` limits the number to the length of the policy's chunks.
+    add_whole_number(command, "--n-action-steps", meaning, None if shorter else n_action_steps)
+    command.set_defaults(default_n_action_steps=n_action_steps)
     add_whole_number(
         command, "--step-limit", "steps until a time-out (default: the task's; for the table 2000 steps of 1/30 s)"
     )
@@ -195,6 +198,8 @@ def study_policy(path: Path | str, arguments: argparse.Namespace) -> "Checkpoint
     from copolicy.train.checkpoint import Checkpoint  # torch
 
     policy = Checkpoint(path, arguments.device, policy_settings(arguments))
+    if arguments.n_action_steps is None:
+        arguments.n_action_steps = min(arguments.default_n_action_steps, policy.chunk_size)
     if arguments.n_action_steps > policy.chunk_size:
         expected = f"1 to {policy.chunk_size}, the actions of a chunk"
         raise InvalidValueError("--n-action-steps", expected, arguments.n_action_steps)

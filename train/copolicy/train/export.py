@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from lerobot.policies.factory import make_pre_post_processors
 from torch import Tensor
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
+from copolicy.dataset.command_line.commands import DISTRIBUTION
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, OutputExistsError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.files.replace_folder import replaced_folder
@@ -39,7 +39,7 @@ def export_checkpoint(
     """Writes policy, processors, `recipe.json` and, if evaluations are given, `eval.json`.
 
     Args:
-        path: a checkpoint of a co-policy.
+        path: a checkpoint of a policy of this package, such as the co-policy.
         out: the folder to write.
         evaluations: results of `copolicy-eval` on that checkpoint or on an export of it.
         commands: commands that made data and policy; written to the recipe.
@@ -49,7 +49,7 @@ def export_checkpoint(
         Path, sha256, size, and the largest difference of its actions from the checkpoint's.
 
     Raises:
-        FileFormatError: `path` is no checkpoint of a co-policy, or a file is no evaluation of it.
+        FileFormatError: `path` is no checkpoint of such a policy, or a file is no evaluation of it.
         OutputExistsError: `out` exists and may not be replaced.
         RunError: the exported policy predicts other actions than the checkpoint.
     """
@@ -59,9 +59,10 @@ def export_checkpoint(
     _check_output(out, overwrite)
     original = Checkpoint(source)
     policy = original.policy
-    if policy.config.type != "copolicy":
-        raise FileFormatError(source, "a checkpoint of a co-policy", policy.config.type)
-    recipe = training_recipe(source, original.weights_sha256, averaged=policy.ema is not None, commands=commands)
+    if not type(policy).__module__.startswith(f"{DISTRIBUTION}."):
+        raise FileFormatError(source, "a checkpoint of a policy of copolicy", policy.config.type)
+    averaged = getattr(policy, "ema", None) is not None
+    recipe = training_recipe(source, original.weights_sha256, averaged=averaged, commands=commands)
     with _staged(out, overwrite) as folder:
         _save(policy, source, folder)
         replace_json(folder / RECIPE_FILE, recipe, indent=1)
@@ -71,7 +72,7 @@ def export_checkpoint(
         results = [shortened_evaluation(file, digests) for file in evaluations]
         if results:
             replace_json(folder / EVALUATION_FILE, {"evaluations": results}, indent=1)
-        difference = _difference(policy, exported.policy)
+        difference = _difference(original, exported)
         if difference > _TOLERANCE:
             raise RunError(f"{out}: expected the actions of {source}, found one that differs by {difference:.2g}")
     size = sum(file.stat().st_size for file in out.iterdir())
@@ -87,10 +88,11 @@ def export_checkpoint(
 
 def _save(policy: Any, source: Path, folder: Path) -> None:
     config = type(policy.config).from_pretrained(source)
-    config.ema, config.device, config.pretrained_path, config.repo_id = False, "cpu", None, None
-    config.push_to_hub = False
+    config.device, config.pretrained_path, config.repo_id, config.push_to_hub = "cpu", None, None, False
     weights = {name: values.float() for name, values in policy.state_dict().items() if not name.startswith("ema.")}
-    if policy.ema is not None:
+    if hasattr(policy, "ema"):
+        config.ema = False
+    if getattr(policy, "ema", None) is not None:
         weights |= _averaged(policy.state_dict())
     exported = type(policy)(config)
     exported.load_state_dict(weights)
@@ -109,23 +111,20 @@ def _averaged(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-@torch.inference_mode()
-def _difference(original: Any, exported: Any) -> float:
-    """Largest difference of the actions of two policies from the same noise, at the starts of the task's first set."""
-    task, frames = get_task(original.config.task), original.config.n_obs_steps
+def _difference(original: Checkpoint, exported: Checkpoint) -> float:
+    """Largest difference of the actions of two policies from the same seed, at the starts of the task's first set."""
+    task, frames = get_task(original.task), original.n_obs_steps
     scenarios = next(iter(task.scenario_sets.values()))
     starts = task.states_of(np.array([task.start_of(scenario) for scenario in scenarios]))
     vectors = np.array([task.scenario_vector(scenario) for scenario in scenarios])
     human_actions = np.zeros((len(scenarios), len(task.spec.action)))
-    batch = {
-        key: torch.tensor(values, dtype=torch.float32)[:, None].repeat(1, frames, 1)
-        for key, values in ((STATE, starts), (ENVIRONMENT_STATE, vectors), (HUMAN_ACTION, human_actions))
-    }
-    shape = len(scenarios), original.config.horizon, len(task.spec.joint_action)
-    noise = torch.randn(*shape, generator=torch.Generator().manual_seed(0))
-    policies = original, exported
-    expected, actual = (policy.sample_actions(batch, torch.Generator().manual_seed(1), noise) for policy in policies)
-    return float((expected - actual).abs().max())
+    columns = (STATE, starts), (ENVIRONMENT_STATE, vectors), (HUMAN_ACTION, human_actions)
+    observations = {key: np.repeat(values[:, None], frames, axis=1) for key, values in columns}
+    actions = []
+    for policy in (original, exported):
+        policy.reset(0)
+        actions.append(policy.predict_action_chunk(observations))
+    return float(np.abs(actions[0] - actions[1]).max())
 
 
 def _check_output(out: Path, overwrite: bool) -> None:

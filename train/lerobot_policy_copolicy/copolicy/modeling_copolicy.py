@@ -3,24 +3,17 @@
 Ng, Liu and Kennedy, "Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks" (2023, arXiv 2305.12171).
 """
 
-import logging
 from collections import deque
-from functools import partial
-from pathlib import Path
 from typing import Unpack
 
 import torch
-from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
 
-from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
-from copolicy.dataset.features import ACTION, features_of
-from copolicy.dataset.lerobot_folder.info import task_of
-from copolicy.dataset.task import get_task
-from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
-from copolicy.train.finite_weights import non_finite_weight
+from copolicy.dataset.exceptions import InvalidValueError, ShapeError
+from copolicy.dataset.features import ACTION
 
+from ..pair_policy.modeling_pair import PairPolicy
 from .configuration_copolicy import CopolicyConfig
 from .denoiser_mlp import MlpDenoiser
 from .denoiser_transformer import TransformerDenoiser
@@ -28,17 +21,14 @@ from .diffusion import ActionDiffusion
 from .ema import ExponentialMovingAverage
 from .fast.backend import require_backend
 from .fast.fast_sampler import FastSampler
-from .features import AbsoluteFeatures, ActionScale
-from .training_data import prepare_training, require_same_rate
 
 _PADDING = f"{ACTION}_is_pad"
-_EPISODE = "episode_index"
 _SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
 _DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
 _NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": (MlpDenoiser, _SIZES)}
 
 
-class CopolicyPolicy(PreTrainedPolicy):
+class CopolicyPolicy(PairPolicy):
     """Predicts the next actions of both players from the last frames and the human's past actions.
 
     `select_action` explains which frames are observed and which actions are executed. In training, actions beyond
@@ -51,29 +41,10 @@ class CopolicyPolicy(PreTrainedPolicy):
 
     config_class = CopolicyConfig  # pyright: ignore[reportAssignmentType]
     name = "copolicy"  # pyright: ignore[reportAssignmentType]
+    config: CopolicyConfig
 
     def __init__(self, config: CopolicyConfig, **kwargs):
-        super().__init__(config)
-        meta = kwargs.get("dataset_meta")
-        if meta is not None:
-            config.use_task(task_of({"robot_type": getattr(meta, "robot_type", None)}))
-        config.validate_features()
-        task = get_task(config.filled.task)
-        self._sizes = {name: column["shape"][0] for name, column in features_of(task.spec).items()}
-        offered = task.features
-        self._symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
-        # Excluded episodes, to be refused in a batch if the constructor cannot find out the episodes of the training.
-        self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
-        require_same_rate(config)
-        self._loss: Tensor | None = None  # of the last step, until it is checked
-        self._updates = 0
-        unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
-        if unused:
-            logging.info("the co-policy does not read %s", ", ".join(unused))
-        self.config = config
-        encoders = {**offered.encoders, "absolute": partial(AbsoluteFeatures, task.spec)}
-        self.features = encoders[config.filled.observation_features](config.past_human_action)
-        self.action_scale = ActionScale(task.spec)
+        super().__init__(config, **kwargs)
         network, names = _NETWORKS[config.filled.network]
         self.denoiser: TransformerDenoiser | MlpDenoiser = network(
             self._sizes[ACTION], self.features.size, **{name: getattr(config, name) for name in names}
@@ -112,21 +83,7 @@ class CopolicyPolicy(PreTrainedPolicy):
         """
         if self.ema is not None:
             self.ema.update(self.denoiser)
-        self._updates += 1
-        # The trainer reads the loss next, so synchronising with the GPU here costs nothing.
-        self._require_finite_loss()
-
-    def save_pretrained(self, save_directory: str | Path, **settings) -> str | None:
-        """LeRobot's method, with a check of the weights.
-
-        Raises:
-            NonFiniteError: a weight is NaN or infinite; nothing is written.
-        """
-        state = settings.get("state_dict")
-        non_finite = non_finite_weight(self.state_dict() if state is None else state)
-        if non_finite:
-            raise NonFiniteError(f"{save_directory}: expected finite weights to save, found {non_finite}")
-        return super().save_pretrained(save_directory, **settings)
+        super().update()
 
     def reset(self) -> None:
         """Clears the history and the queued actions; call it whenever the environment is reset."""
@@ -151,13 +108,7 @@ class CopolicyPolicy(PreTrainedPolicy):
             ShapeError: a column has another shape.
             RunError: the batch has a frame of an excluded episode, or the loss of the previous step is not finite.
         """
-        if self.training:
-            self._require_finite_loss()
-            self._require_no_excluded(batch)
-        sample = self._observation(batch)
-        sample[ACTION] = self._column(batch, ACTION, self.config.horizon)
-        for augment in self._symmetries if self.training else ():
-            sample = augment(sample)
+        sample = self._training_sample(batch, self.config.n_obs_steps, self.config.horizon)
         noisy, steps, target = self.diffusion.add_noise(self.action_scale.scaled(sample[ACTION]))
         prediction = self.denoiser(noisy, steps, self.features(sample))
         error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
@@ -177,22 +128,8 @@ class CopolicyPolicy(PreTrainedPolicy):
             return (error * mask).sum(dim=1) / mask.sum(dim=1).clamp(min=1)
         return error.mean() if reduction == "mean" else error.mean(dim=1)
 
-    def _require_finite_loss(self) -> None:
-        loss, self._loss = self._loss, None
-        if loss is None or bool(torch.isfinite(loss).all()):
-            return
-        step = int(self.ema.updates) if self.ema is not None else self._updates
-        raise NonFiniteLossError(float(loss[~torch.isfinite(loss)].flatten()[0]), step)
-
-    def _require_no_excluded(self, batch: dict[str, Tensor]) -> None:
-        if not len(self._excluded) or _EPISODE not in batch:
-            return
-        used = batch[_EPISODE][torch.isin(batch[_EPISODE], self._excluded.to(batch[_EPISODE].device))]
-        if len(used):
-            raise RunError(
-                f"expected no excluded episode in a batch, found {sorted(set(used.tolist()))}; "
-                "train with copolicy-train, which leaves them out, or give --dataset.episodes without them"
-            )
+    def _finished_updates(self) -> int:
+        return int(self.ema.updates) if self.ema is not None else super()._finished_updates()
 
     @torch.no_grad()
     def sample_actions(
@@ -218,7 +155,7 @@ class CopolicyPolicy(PreTrainedPolicy):
             InvalidValueError: a column is missing, or `actions` is not from 1 to T - To + 1.
             ShapeError: a column has another shape.
         """
-        condition = self.features(self._observation(batch))
+        condition = self.features(self._observation(batch, self.config.n_obs_steps))
         shape = (len(condition), self.config.horizon, self._sizes[ACTION])
         if noise is None:
             # On the CPU, so that a seed gives the same noise on every device.
@@ -303,21 +240,3 @@ class CopolicyPolicy(PreTrainedPolicy):
         if actions is not None and not 1 <= actions <= limit:
             raise InvalidValueError("actions", f"1 to {limit}", actions)
         return self.config.n_obs_steps - 1 + (actions or limit)
-
-    def _observation(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
-        return {key: self._column(batch, key, self.config.n_obs_steps) for key in self.config.observation_keys}
-
-    def _column(self, batch: dict[str, Tensor], key: str, frames: int | None = None) -> Tensor:
-        """A column of the batch with its shape checked: `(B, frames, n)`, or `(B, n)` if `frames` is None.
-
-        LeRobot drops the last axis of columns with one value per frame; it is restored.
-        """
-        if key not in batch:
-            raise InvalidValueError("batch", f"the column {key}", sorted(batch))
-        values, size = batch[key], self._sizes[key]
-        expected = (size,) if frames is None else (frames, size)
-        if size == 1 and values.ndim == len(expected):
-            values = values[..., None]
-        if values.ndim != 1 + len(expected) or tuple(values.shape[1:]) != expected:
-            raise ShapeError(key, ("B", *expected), tuple(values.shape))
-        return values

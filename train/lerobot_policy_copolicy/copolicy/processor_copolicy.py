@@ -1,18 +1,5 @@
-"""The processors of the co-policy: they batch and move tensors between devices, and do not change values."""
+"""The processors of the co-policy; LeRobot finds them by this name."""
 
-from typing import Any
+from ..pair_policy.processor_pair import make_pair_pre_post_processors as make_copolicy_pre_post_processors
 
-import torch
-from lerobot.processor import PolicyProcessorPipeline, make_default_pre_post_processors
-
-from .configuration_copolicy import CopolicyConfig
-
-
-def make_copolicy_pre_post_processors(
-    config: CopolicyConfig, dataset_stats: dict[str, dict[str, torch.Tensor]] | None = None
-) -> tuple[PolicyProcessorPipeline[dict[str, Any], dict[str, Any]], PolicyProcessorPipeline]:
-    """LeRobot's default processors without statistics: the policy itself scales, see `CopolicyConfig`.
-
-    Inputs and outputs are in the units of the task. `dataset_stats`, which LeRobot always passes, is not used.
-    """
-    return make_default_pre_post_processors(config, None)
+__all__ = ["make_copolicy_pre_post_processors"]

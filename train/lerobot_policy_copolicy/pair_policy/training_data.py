@@ -21,13 +21,13 @@ from copolicy.train.memory_training import CheckedStream
 
 from ..env.configuration import PairTaskEnvConfig
 from .callers import data_sets_of_callers, environment_of_callers
-from .configuration_copolicy import CopolicyConfig
+from .configuration_pair import PairPolicyConfig
 
 _PHYSICS = "physics"
 _STEP_LIMIT = "step_limit"  # not compared: no property of the dynamics
 
 
-def prepare_training(config: CopolicyConfig, meta: Any) -> frozenset[int]:
+def prepare_training(config: PairPolicyConfig, meta: Any) -> frozenset[int]:
     """Checks the episodes to train on, and records their rate and world settings in the configuration.
 
     Args:
@@ -60,7 +60,7 @@ def prepare_training(config: CopolicyConfig, meta: Any) -> frozenset[int]:
     return frozenset()
 
 
-def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[int] | None) -> None:
+def record_conditions(config: PairPolicyConfig, meta: Any, episodes: Collection[int] | None) -> None:
     """Records rate, world settings, and properties that policies do not observe, of the training data in `config`.
 
     Args:
@@ -87,7 +87,7 @@ def record_conditions(config: CopolicyConfig, meta: Any, episodes: Collection[in
         )
 
 
-def require_same_rate(config: CopolicyConfig) -> None:
+def require_same_rate(config: PairPolicyConfig) -> None:
     """Refuses an environment of another task or rate than the policy's training data.
 
     Logs where its settings differ from those of the training data, and properties that policies do not observe.

@@ -30,6 +30,19 @@ class AbsoluteFeatures(nn.Module):
         return columns * self.scale + self.offset
 
 
+class RawFeatures(nn.Module):
+    """State, scenario and, if used, the human's past action in the units of the task, unscaled."""
+
+    def __init__(self, spec: TaskSpec, past_human_action: bool):
+        super().__init__()
+        self.keys = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION) if past_human_action else (STATE, ENVIRONMENT_STATE)
+        self.size = sum(bounds_of(spec)[key].shape[1] for key in self.keys)
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Joins observation columns `(..., n)` to `(..., size)`."""
+        return torch.cat([observation[key] for key in self.keys], dim=-1)
+
+
 class ActionScale(nn.Module):
     """Scales both players' actions to [-1, 1] and back; the identity if these are the task's bounds."""
 

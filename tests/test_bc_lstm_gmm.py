@@ -1,0 +1,202 @@
+"""BC-LSTM-GMM as a LeRobot policy: settings, loss, state in execution, training, studies, either seat."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from lerobot.configs import FeatureType, PolicyFeature
+
+from copolicy.cards.cli import main as cards
+from copolicy.collect.agents import PolicyAgent, load_policy
+from copolicy.collect.rollout import Rollout
+from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
+from copolicy.dataset.task import get_task
+from copolicy.evaluate.cli import main as evaluate
+from copolicy.tasks.table.features import FEATURES
+from copolicy.train.cli import main as train
+from lerobot_policy_copolicy.bc_lstm_gmm.configuration_bc_lstm_gmm import BcLstmGmmConfig
+from lerobot_policy_copolicy.bc_lstm_gmm.modeling_bc_lstm_gmm import BcLstmGmmPolicy
+
+KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_ACTION: FeatureType.STATE}
+
+
+def config(**settings) -> BcLstmGmmConfig:
+    return BcLstmGmmConfig(
+        device="cpu",
+        input_features={key: PolicyFeature(kind, FEATURES[key]["shape"]) for key, kind in KINDS.items()},
+        output_features={ACTION: PolicyFeature(FeatureType.ACTION, FEATURES[ACTION]["shape"])},
+        **{"width": 8, "n_layers": 1, **settings},
+    )
+
+
+def batch(frames: int | None, size: int = 5) -> dict[str, torch.Tensor]:
+    """Random columns of windows, or of single frames."""
+    random = torch.Generator().manual_seed(0)
+    shape = (size,) if frames is None else (size, frames)
+    keys = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION, ACTION)
+    return {key: torch.rand((*shape, *FEATURES[key]["shape"]), generator=random) for key in keys}
+
+
+def test_the_defaults_are_robomimics():
+    settings = BcLstmGmmConfig()
+    assert (settings.preset, settings.observation_features, settings.past_human_action) == ("paper", "raw", False)
+    assert (settings.sequence_length, settings.n_layers, settings.width, settings.n_modes) == (10, 2, 400, 5)
+    assert settings.min_deviation == settings.execution_deviation == settings.optimizer_lr == 1e-4
+    assert settings.action_delta_indices == settings.observation_delta_indices == list(range(10))
+    optimizer = settings.get_optimizer_preset()
+    assert (optimizer.lr, optimizer.weight_decay, optimizer.grad_clip_norm) == (1e-4, 0.0, 0.0)
+    assert settings.get_scheduler_preset() is None
+
+
+@pytest.mark.parametrize(
+    ("preset", "features", "symmetries", "size"),
+    [("paper", "raw", set(), 18), ("normalized", "absolute", set(), 18), ("scan", "scan", {"mirror"}, None)],
+)
+def test_a_preset_chooses_the_inputs(preset, features, symmetries, size):
+    policy = BcLstmGmmPolicy(config(preset=preset))
+    assert policy.config.observation_features == features
+    assert policy.config.used_symmetries >= symmetries
+    assert size is None or policy.features.size == size
+
+
+@pytest.mark.parametrize(
+    ("settings", "error", "text"),
+    [
+        ({"preset": "small"}, UnknownNameError, "preset"),
+        ({"observation_features": "pixels"}, InvalidValueError, "absolute, raw, relative, scan"),
+        ({"sequence_length": 0}, InvalidValueError, "sequence_length: expected at least 1, found 0"),
+        ({"n_modes": 0}, InvalidValueError, "n_modes: expected at least 1, found 0"),
+        ({"min_deviation": 0.0}, InvalidValueError, "min_deviation: expected a number above 0, found 0"),
+        ({"optimizer_lr": float("nan")}, InvalidValueError, "optimizer_lr"),
+        ({"mirror": True, "task": "peg"}, InvalidValueError, "mirror"),
+    ],
+)
+@pytest.mark.usefixtures("peg")
+def test_a_wrong_setting_is_one_line(settings, error, text):
+    with pytest.raises(error, match=text):
+        config(**settings)
+
+
+def test_raw_inputs_are_the_columns_themselves():
+    policy = BcLstmGmmPolicy(config())
+    columns = batch(10)
+    seen = policy.features(columns)
+    torch.testing.assert_close(seen, torch.cat((columns[STATE], columns[ENVIRONMENT_STATE]), dim=-1))
+
+
+def test_the_loss_is_the_mean_negative_log_likelihood():
+    policy = BcLstmGmmPolicy(config(sequence_length=4)).eval()
+    columns = batch(4)
+    loss, _ = policy(columns)
+    per_sample, _ = policy(columns, reduction="none")
+    mixture, _ = policy.network(policy.features(columns))
+    likelihood = torch.zeros(5, 4)
+    weights = torch.softmax(mixture.logits, dim=-1)
+    for mode in range(5):
+        z = (columns[ACTION] - mixture.means[:, :, mode]) / mixture.deviations[:, :, mode]
+        density = torch.exp(-0.5 * z.square()) / (mixture.deviations[:, :, mode] * (2 * torch.pi) ** 0.5)
+        likelihood += weights[:, :, mode] * density.prod(dim=-1)
+    torch.testing.assert_close(per_sample, -likelihood.log().mean(dim=1), rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(loss, per_sample.mean())
+
+
+def test_the_state_is_kept_and_reset_every_window():
+    policy = BcLstmGmmPolicy(config(sequence_length=3)).eval()
+    with torch.no_grad():
+        for parameter in policy.network.parameters():
+            parameter.normal_(generator=torch.Generator().manual_seed(1))
+        policy.network.logits.weight.zero_()
+        policy.network.logits.bias.copy_(torch.tensor([30.0, 0, 0, 0, 0]))  # one mode only
+    frame = batch(None)
+    acted = [policy.select_action(frame) for _ in range(7)]
+    # The same frame after a reset gives the same action up to the noise of execution, and another one in between.
+    for first, second in ((0, 3), (3, 6), (1, 4), (2, 5)):
+        torch.testing.assert_close(acted[first], acted[second], rtol=0, atol=2e-3)
+    assert (acted[0] - acted[1]).abs().max() > 0.01
+    policy.reset()
+    torch.testing.assert_close(policy.select_action(frame), acted[0], rtol=0, atol=2e-3)
+
+
+def test_a_mode_is_drawn_at_each_frame():
+    policy = BcLstmGmmPolicy(config(execution_deviation=0.0)).eval()
+    with torch.no_grad():
+        policy.network.logits.weight.zero_()
+        policy.network.logits.bias.copy_(torch.tensor([0.0, 0.0, -30, -30, -30]))
+        policy.network.mean.weight.zero_()
+        policy.network.mean.bias.copy_(torch.tensor([1.0] * 4 + [-1.0] * 4 + [0.0] * 12))
+    torch.manual_seed(0)
+    drawn = torch.stack([policy.select_action(batch(None, 1))[0] for _ in range(400)])
+    means = torch.tanh(torch.ones(4))
+    is_first = (drawn - means).abs().max(dim=1).values < 1e-5
+    assert torch.all(is_first | ((drawn + means).abs().max(dim=1).values < 1e-5))
+    assert 0.4 < is_first.float().mean() < 0.6
+    switches = (is_first[1:] != is_first[:-1]).float().mean()
+    assert 0.4 < switches < 0.6
+
+
+def test_missing_columns_and_chunks_are_one_line():
+    policy = BcLstmGmmPolicy(config())
+    with pytest.raises(InvalidValueError, match=r"the column observation\.state"):
+        policy({})
+    with pytest.raises(NotImplementedError, match="call select_action"):
+        policy.predict_action_chunk(batch(None))
+
+
+@pytest.fixture(scope="module")
+def run(sound_recordings, sound, tmp_path_factory) -> Path:
+    """A short training run on the data set of six recordings."""
+    out = tmp_path_factory.mktemp("runs") / "bc"
+    flags = ["--policy.type=bc_lstm_gmm", "--policy.device=cpu", "--policy.width=8", "--policy.n_layers=1"]
+    data = [
+        f"--dataset.root={sound_recordings.parent / 'set'}",
+        f"--output_dir={out}",
+        "--batch_size=8",
+        "--save_freq=3",
+    ]
+    assert train([*flags, *data, "--steps=3"]) == 0
+    return out
+
+
+def test_it_is_trained_resumed_and_loaded(run):
+    settings = run / "checkpoints" / "last" / "pretrained_model" / "train_config.json"
+    assert train([f"--config_path={settings}", "--resume=true", "--steps=5"]) == 0
+    policy = load_policy(run)
+    assert policy.name.startswith("policy:bc_lstm_gmm-")
+    assert (policy.n_obs_steps, policy.n_action_steps, policy.chunk_size, policy.fps) == (1, 1, 1, 10)
+
+
+@pytest.mark.parametrize("seat", [0, 1])
+def test_it_acts_frame_by_frame_at_either_seat(run, seat):
+    task, policy = get_task(), load_policy(run)
+    agent = PolicyAgent(policy, task, seed=3)
+    scenarios = task.scenario_sets["unseen"][:3]
+    players = (agent, agent.human_half()) if seat == 0 else (PolicyAgent(load_policy(run), task, seed=4), agent)
+    rollout = Rollout(task, scenarios, players, settings=task.settings_type(step_limit=30))
+    rollout.run()
+    assert agent.chunks.tolist() == [10, 10, 10]  # 30 steps of 30 Hz, 10 frames a second
+    assert np.isfinite(rollout.actions).all()
+
+
+def test_it_is_evaluated_and_described(run, tmp_path, capsys):
+    out = tmp_path / "eval.json"
+    flags = ["--maps", "unseen", "--limit", "2", "--step-limit", "60", "--out", str(out)]
+    assert evaluate(["coplan", "--policy", str(run), *flags]) == 0
+    result = json.loads(out.read_text(encoding="utf-8"))
+    assert result["policy"]["type"] == "bc_lstm_gmm"
+    assert result["settings"]["actions_per_plan"] == 1
+    again = tmp_path / "again.json"
+    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(again)]) == 0
+    assert json.loads(again.read_text(encoding="utf-8"))["episodes"] == result["episodes"]
+    capsys.readouterr()
+    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x"), "--n-action-steps", "2"]) == 2
+    assert "--n-action-steps: expected 1 to 1, the actions of a chunk, found 2" in capsys.readouterr().err
+    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x"), "--sampler", "ddim"]) == 2
+    assert "found bc_lstm_gmm without it" in capsys.readouterr().err
+    assert train(["export", str(run), "--out", str(tmp_path / "exported"), "--eval", str(out)]) == 0
+    assert cards(["model", str(tmp_path / "exported")]) == 0
+    card = (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
+    assert "bc_lstm_gmm" in card
+    assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]

@@ -1,0 +1,82 @@
+"""Settings of BC-LSTM-GMM."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lerobot.configs import PreTrainedConfig
+from lerobot.optim import AdamConfig
+
+from ..pair_policy.bounds import POSITIVE, Bounds
+from ..pair_policy.configuration_pair import PairPolicyConfig
+
+# robomimic's configuration for BC-RNN on low-dimensional human data, which the co-policy paper used: raw observations.
+_PAPER: dict[str, Any] = {"observation_features": "raw", "mirror": False, "permute_obstacles": False}
+
+
+@PreTrainedConfig.register_subclass("bc_lstm_gmm")
+@dataclass
+class BcLstmGmmConfig(PairPolicyConfig):
+    """Settings of BC-LSTM-GMM; the defaults are robomimic's for low-dimensional human data.
+
+    Presets: "paper" observes raw px, as robomimic and the co-policy paper do; "normalized" scales observations to
+    [-1, 1], as the baseline of Diffusion Policy; "scan" adds the range scan and the symmetries of the co-policy.
+    robomimic trains 200,000 steps of batch 100.
+
+    `fps`, `physics` and `unseen` are set from the training data; see `PairPolicyConfig` for the shared settings.
+    """
+
+    presets: ClassVar = {
+        "paper": _PAPER,
+        "normalized": {**_PAPER, "observation_features": "absolute"},
+        "scan": {"observation_features": "scan", "mirror": True, "permute_obstacles": True},
+    }
+    generic_features: ClassVar = ("absolute", "raw")
+    n_action_steps: ClassVar[int] = 1  # it acts frame by frame
+    bounds: ClassVar = {
+        "sequence_length": Bounds(1),
+        "n_layers": Bounds(1),
+        "width": Bounds(1),
+        "n_modes": Bounds(1),
+        "min_deviation": POSITIVE,
+        "execution_deviation": Bounds(0),
+        "optimizer_lr": Bounds(0),
+        "optimizer_weight_decay": Bounds(0),
+        "optimizer_grad_clip_norm": Bounds(0),
+        "fps": POSITIVE,
+    }
+
+    preset: str = "paper"  # "paper", "normalized" or "scan"
+    sequence_length: int = 10  # frames of a training window; in execution the LSTM's state is reset as often
+    n_layers: int = 2  # layers of the LSTM
+    width: int = 400  # hidden size of the LSTM
+    n_modes: int = 5  # modes of the mixture
+    min_deviation: float = 1e-4  # added to each standard deviation in training
+    execution_deviation: float = 1e-4  # standard deviation of every mode in execution
+    optimizer_lr: float = 1e-4  # learning rate of Adam
+    optimizer_weight_decay: float = 0.0  # weight decay of Adam
+    optimizer_grad_clip_norm: float = 0.0  # largest gradient norm; 0 does not clip
+
+    def _validate(self) -> None:
+        pass
+
+    @property
+    def observation_delta_indices(self) -> list[int]:
+        """Frames of a training window, from the current one on."""
+        return list(range(self.sequence_length))
+
+    @property
+    def action_delta_indices(self) -> list[int]:
+        """The same frames."""
+        return list(range(self.sequence_length))
+
+    def get_optimizer_preset(self) -> AdamConfig:
+        """Adam with the `optimizer_*` settings."""
+        return AdamConfig(
+            lr=self.optimizer_lr,
+            weight_decay=self.optimizer_weight_decay,
+            grad_clip_norm=self.optimizer_grad_clip_norm,
+        )
+
+    def get_scheduler_preset(self) -> None:
+        """The learning rate is constant."""
+        return None

@@ -1,0 +1,96 @@
+"""BC-LSTM-GMM: behaviour cloning of both players by an LSTM with a mixture of normal distributions."""
+
+from typing import Unpack
+
+import torch
+from lerobot.policies.pretrained import ActionSelectKwargs
+from torch import Tensor
+
+from copolicy.dataset.features import ACTION
+
+from ..pair_policy.modeling_pair import PairPolicy
+from .configuration_bc_lstm_gmm import BcLstmGmmConfig
+from .network import Mixture, RecurrentMixtureNetwork, State
+
+
+class BcLstmGmmPolicy(PairPolicy):
+    """Predicts the next joint action from the current frame and the state of an LSTM.
+
+    As robomimic's `BC_RNN_GMM`: the loss is the negative log-likelihood over all frames of a window that starts with
+    the state zero; frames beyond the end of the episode repeat its last frame and count. In execution a mode is drawn
+    at every frame with the standard deviation `execution_deviation`, and the state is reset every `sequence_length` (L)
+    frames.
+
+    Mandlekar et al., "What Matters in Learning from Offline Human Demonstrations" (2021, arXiv 2108.03298).
+    """
+
+    config_class = BcLstmGmmConfig  # pyright: ignore[reportAssignmentType]
+    name = "bc_lstm_gmm"  # pyright: ignore[reportAssignmentType]
+    config: BcLstmGmmConfig
+
+    def __init__(self, config: BcLstmGmmConfig, **kwargs):
+        super().__init__(config, **kwargs)
+        self.network = RecurrentMixtureNetwork(
+            self.features.size, self._sizes[ACTION], config.width, config.n_layers, config.n_modes, config.min_deviation
+        )
+        self.reset()
+
+    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """All weights in one group."""
+        parameters = list(self.network.parameters())
+        return [{"params": parameters, "fused": parameters[0].device.type in ("cpu", "cuda")}]
+
+    def reset(self) -> None:
+        """Resets the state of the LSTM; call it whenever the environment is reset."""
+        self._state: State | None = None
+        self._frames = 0
+
+    def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> tuple[Tensor, dict]:
+        """The training loss: negative log-likelihood of the joint actions, in nats.
+
+        Args:
+            batch: observation columns `(B, L, n)` and action `(B, L, m)` of both players.
+            reduction: "mean", or "none" for one loss per sample.
+
+        Returns:
+            The loss, and an empty dict.
+
+        Raises:
+            InvalidValueError: a column is missing.
+            ShapeError: a column has another shape.
+            RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
+        """
+        sample = self._training_sample(batch, self.config.sequence_length, self.config.sequence_length)
+        mixture, _ = self.network(self.features(sample))
+        loss = -mixture.distribution().log_prob(self.action_scale.scaled(sample[ACTION]))  # (B, L)
+        loss = loss.mean() if reduction == "mean" else loss.mean(dim=1)
+        if self.training:
+            self._loss = loss.detach()
+        return loss, {}
+
+    @torch.no_grad()
+    def select_action(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
+        """The joint action of the current frame; call it once per frame.
+
+        Args:
+            batch: observation columns `(B, n)` of single frames.
+
+        Returns:
+            `(B, m)` within the bounds of the task.
+        """
+        if self._frames % self.config.sequence_length == 0:
+            self._state = None
+        self._frames += 1
+        inputs = self.features(self._observation(batch, None))[:, None]  # (B, 1, size)
+        mixture, self._state = self.network(inputs, self._state)
+        modes = torch.full_like(mixture.deviations, self.config.execution_deviation)
+        drawn = Mixture(mixture.logits, mixture.means, modes.clamp(min=1e-12)).distribution().sample()[:, 0]
+        return self.action_scale.physical(drawn.clamp(-1.0, 1.0))
+
+    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
+        """Not offered: the policy keeps a state from frame to frame.
+
+        Raises:
+            NotImplementedError: always; call `select_action`.
+        """
+        raise NotImplementedError("bc_lstm_gmm acts frame by frame: call select_action")
