@@ -53,3 +53,17 @@ def test_help_shows_an_example(capsys):
         run(_parser(lambda arguments: {}), ["do", "--help"])
     assert stop.value.code == 0
     assert "example:\n  tool do" in capsys.readouterr().out
+
+
+def test_an_unknown_flag_is_reported_by_its_command(capsys):
+    with pytest.raises(SystemExit) as stop:
+        run(_parser(lambda arguments: {}), ["do", "--pilots", "keyboard"])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err == (
+        "usage: tool do [-h] [--json] [--debug]\ntool do: error: unrecognized arguments: --pilots keyboard\n"
+    )
+
+
+def test_nothing_is_printed_as_none(capsys):
+    assert run(_parser(lambda arguments: {"left_out": [], "physics": {}}), ["do"]) == 0
+    assert capsys.readouterr().out == "left_out  none\nphysics   none\n"

@@ -60,7 +60,7 @@ def test_recordings_become_a_data_set(recordings, tmp_path, capsys):
         "root": str(tmp_path / "set"),
         "repo_id": "me/table",
         "fps": 10,
-        "hold": "mean",
+        "downsampling": "mean",
         "episodes": 3,
         "frames": 33,
         "successes": 1,

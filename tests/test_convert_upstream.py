@@ -215,7 +215,7 @@ def test_each_format_becomes_a_data_set(examples, tmp_path, capsys, name, form, 
     summary = json.loads(captured.out)
     assert captured.err == ""
     assert (summary["format"], summary["episodes"], summary["frames"]) == (form, episodes, frames)
-    assert summary["hold"] == ("first" if form == "zarr" else "mean")
+    assert summary["downsampling"] == ("first" if form == "zarr" else "mean")
     assert summary["successes"] == episodes - 1
     assert summary["quality_flags"] == flags
     assert summary["excluded"] == (form == "zarr")

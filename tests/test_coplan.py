@@ -177,3 +177,12 @@ def test_success_rate_states_its_uncertainty():
     assert rate["standard_error"] == pytest.approx((0.75 * 0.25 / 84) ** 0.5)
     assert rate["wilson_95"] == pytest.approx([0.6479, 0.8299], abs=5e-4)
     assert success_rate([True] * 10)["wilson_95"] == pytest.approx([0.7225, 1.0], abs=5e-4)
+
+
+@pytest.mark.parametrize("name", ["eval.png", "eval"])
+def test_a_result_whose_figure_might_have_its_name_is_refused(checkpoint, tmp_path, capsys, name):
+    assert _command(checkpoint, tmp_path / name) == 2
+    assert capsys.readouterr().err == (
+        f"copolicy-eval: --out: expected a name that ends with .json, found '{tmp_path / name}'\n"
+    )
+    assert not list(tmp_path.iterdir())

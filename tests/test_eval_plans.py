@@ -220,7 +220,7 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         "angular_acceleration_limit": math.pi / 2,
         "routes": {},
         "ended_by": {"timeout": 3},
-        "picture": str(out),
+        "figure": str(out),
     }
     assert out.read_bytes().startswith(b"\x89PNG")
     assert command(checkpoint, out) == 2

@@ -125,7 +125,7 @@ def test_films_and_sheets_are_made_from_the_outline(simulated, tmp_path, capsys)
     track = read_track(simulated[0])
     assert track.seconds == track.steps / 20
     # A film of 12 pictures a second of an episode at 20 steps a second, and a second of its end.
-    assert told["gif"]["pictures"] == len(frame_positions(track, 12, 1.0)) + 12
+    assert told["gif"]["frames"] == len(frame_positions(track, 12, 1.0)) + 12
     assert told["gif"]["seconds"] == pytest.approx(track.seconds + 1, abs=0.2)
     assert all(path.stat().st_size > 1000 for path in out.values())
 

@@ -198,7 +198,7 @@ def test_auto_plans_what_torch_plans_with_the_fastest_for_the_batch(fresh_choice
     said = [record.message for record in caplog.records if record.message.startswith("sampling on the CPU")]
     assert said == [
         "sampling on the CPU with numba (batches of up to 4), onnx (larger batches): the fastest installed backends "
-        "(--policy.backend sets one)"
+        "(backend=auto)"
     ]
 
 

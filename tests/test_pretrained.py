@@ -176,7 +176,7 @@ def test_a_film_of_it(tmp_path, capsys):
     assert summary["partner"] == "simulated, human of S01"
     with Image.open(film) as image:
         assert image.size == (240, 138)
-        assert 10 < len(list(ImageSequence.Iterator(image))) <= summary["pictures"]
+        assert 10 < len(list(ImageSequence.Iterator(image))) <= summary["frames"]
     assert collect(["demo", *flags]) == 2
     assert "expected a path that does not exist yet" in capsys.readouterr().err
 

@@ -11,8 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from checked_data import make_data_set, make_recordings
 
+from copolicy.cards import DatasetFacts
 from copolicy.collect import make_agent, run_episodes
-from copolicy.dataset import load_dataset, read_episode
+from copolicy.convert import Conversion, append_recordings, convert_recordings, merge_datasets
+from copolicy.dataset import check_dataset, load_dataset, read_episode
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.listing import distinct_files
 from copolicy.evaluate import compare_episodes, coplan_episodes, success
@@ -37,6 +39,7 @@ def test_every_name_of_a_room_is_there(room):
     for name in module.__all__:
         assert getattr(module, name) is not None
     assert set(module.__all__) <= set(dir(module))
+    assert not {"TYPE_CHECKING", "lazy_names"} & set(dir(module))
     with pytest.raises(AttributeError, match=f"module '{room}' has no attribute 'nonsense'"):
         module.nonsense  # noqa: B018
 
@@ -63,7 +66,7 @@ def test_a_data_set_is_what_its_files_say(made):
     ):  # fmt: skip
         expected = np.array([rows[name][index] for index in of_first])
         np.testing.assert_array_equal(values, expected.reshape(values.shape))
-    assert repr(first).startswith(f"DatasetEpisode(0, states=({len(first)}, 7), actions=({len(first)}, 4), training-")
+    assert repr(first).startswith(f"DatasetEpisode(0, states=({len(first)}, 7), actions=({len(first)}, 4), map=train")
     assert dataset.splits == {"train": range(3)}
     assert dataset.table.column("episode_uuid").to_pylist() == [e.columns["episode_uuid"] for e in dataset.episodes]
     assert not [name for name in dataset.table.column_names if "/" in name]
@@ -182,3 +185,18 @@ def test_studies_without_sense_are_refused():
         compare_episodes([one], [other])
     with pytest.raises(InvalidValueError, match=r"n_action_steps: expected 1 to [0-9]+, the actions of a chunk"):
         coplan_episodes(n_action_steps=99, limit=1)
+
+
+def test_a_folder_may_be_a_text(made, tmp_path):
+    raw, made_set, out = str(made / "raw"), str(made / "set"), str(tmp_path / "out")
+    assert check_dataset(made_set, made_set).findings == check_dataset(made / "set", made / "set").findings
+    assert len(DatasetFacts.read(made_set).episodes) == 3
+    assert convert_recordings([raw], out, "me/out", Conversion(drift=False))["episodes"] == 3
+    assert append_recordings([raw], out, "me/out", Conversion(drift=False))["already_there"] == 3
+    with pytest.raises(InvalidValueError, match=r"folders: expected a list of folders, found '.*raw'"):
+        convert_recordings(raw, str(tmp_path / "other"), "me/out", Conversion())
+    with pytest.raises(FileFormatError):  # the two sets share their episodes
+        merge_datasets([made_set, out], str(tmp_path / "merged"), "me/out")
+    with pytest.raises(InvalidValueError, match="downsampling: expected mean or first, found 'last'"):
+        Conversion(downsampling="last")  # pyright: ignore[reportArgumentType]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -64,7 +64,7 @@ def _check(out: Path, summary: dict, maps: int) -> None:
     where = summary["where it is"]
     for name in ("data set", "card", "checkpoint"):
         assert Path(where[name]).exists(), name
-    for path in (*where["results"].split(", "), *where["pictures"].split(", ")):
+    for path in (*where["results"].split(", "), *where["figures"].split(", ")):
         assert Path(path).is_file()
     evaluation = json.loads((out / "eval" / "holdout.json").read_text(encoding="utf-8"))
     assert evaluation["summary"]["success"]["episodes"] == maps

@@ -272,7 +272,7 @@ def test_a_video_shows_every_step(track, tmp_path):
     path = tmp_path / "out" / "episode.mp4"
     result = write_video(track, path, speed=8.0, width=301)
     frames = frames_of(path)
-    assert len(frames) == result["pictures"] == math.ceil(track.steps / 8) + 1 + 30
+    assert len(frames) == result["frames"] == math.ceil(track.steps / 8) + 1 + 30
     assert frames[0].shape == (220, 300, 3)
     assert (np.abs(frames[0].astype(int) - frames[-1]).max(axis=2) > 60).sum() > 200
     drawn = pygame.Surface((300, 220), depth=32)
@@ -290,6 +290,16 @@ def test_a_gif_runs_for_ever_at_its_speed(track, tmp_path):
         assert (image.size, image.info["loop"]) == ((240, 176), 0)
         duration = sum(frame.info["duration"] for frame in ImageSequence.Iterator(image))
     assert duration / 1000 == pytest.approx(result["seconds"], rel=0.05)
+
+
+def test_each_of_several_files_is_written_or_none(recording, tmp_path, capsys):
+    flags = ["--out", str(tmp_path / "a.png"), "--out"]
+    assert main(["replay", str(recording), *flags, str(tmp_path / "b.png")]) == 2
+    assert "--out: expected one file of each kind" in capsys.readouterr().err
+    assert main(["replay", str(recording), *flags, str(tmp_path / "b.txt")]) == 2
+    assert not list(tmp_path.iterdir())
+    assert main(["replay", str(recording), *flags, str(tmp_path / "b.gif"), "--speed", "8", "--width", "300"]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.gif"]
 
 
 def test_a_sheet_has_pictures_from_start_to_end(track, tmp_path):
@@ -373,7 +383,7 @@ def test_without_pyav_the_program_ffmpeg_is_asked(recording, tmp_path):
     assert run.returncode == 0, run.stderr
     result = json.loads(run.stdout)["video"]
     size, *command = out.read_text(encoding="utf-8").split()
-    assert int(size) == result["pictures"] * 300 * 220 * 3
+    assert int(size) == result["frames"] * 300 * 220 * 3
     assert command[command.index("-s") + 1] == "300x220"
     failing = fake_ffmpeg(tmp_path / "bad", fails=True)
     run = run_without(["av"], "replay", recording, "--out", tmp_path / "b.mp4", "--speed", "8", PATH=failing)

@@ -189,6 +189,14 @@ def test_the_share_of_durations_is_that_of_their_variance():
     assert estimates["duration_between_configuration_share"].note == "one configuration, or nothing varies"
 
 
+def test_configurations_of_one_episode_each_explain_nothing():
+    trips = [(carried("L", ONE), None), (still(5), None)]
+    data = trajectories(trips, [row(ONE, duration_s=10.0), row(FREE, duration_s=12.0)])
+    estimates = eta_squared_statistics(data, _bootstrap(data), np.random.default_rng(0))
+    estimate = estimates["duration_between_configuration_share"]
+    assert (estimate.value, estimate.note) == (None, "no configuration has two episodes")
+
+
 def test_one_pair_has_nobody_to_be_compared_with():
     data = trajectories([(carried("L", ONE), None)] * 6, [row()] * 6)
     estimates = eta_squared_statistics(data, _bootstrap(data), np.random.default_rng(0))

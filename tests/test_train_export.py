@@ -66,7 +66,7 @@ def test_the_averaged_weights_take_the_place_of_the_raw_ones(checkpoint, tmp_pat
     out = tmp_path / "model"
     assert main(["export", str(checkpoint), "--out", str(out), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
-    assert summary["largest_difference_of_a_plan"] < 1e-6
+    assert summary["largest_action_difference"] < 1e-6
     before = weights_of(checkpoint / "checkpoints" / "last" / "pretrained_model")
     after = weights_of(out)
     assert {name for name in after if not name.startswith("denoiser.")} == set()

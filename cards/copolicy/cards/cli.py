@@ -35,7 +35,7 @@ def add_dataset_command(commands: Commands) -> None:
         "copolicy-cards dataset outputs/dataset --repo-id my-lab/table",
         lambda arguments: () if arguments.no_figures else FIGURES,
     )
-    dataset.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
+    dataset.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     dataset.add_argument("--repo-id", help="user/name on the Hub (default: local/FOLDER)")
     dataset.add_argument("--pretty-name", help="title of the card (default: the data set's name)")
     dataset.add_argument("--no-figures", action="store_true", help="write no figures")
@@ -57,7 +57,9 @@ def add_model_command(commands: Commands) -> None:
         "copolicy-cards model outputs/training --eval outputs/eval/holdout.json --eval outputs/eval/unseen.json",
         FIGURES,
     )
-    model.add_argument("checkpoint", type=Path, help="folder of a checkpoint or training run (last checkpoint)")
+    model.add_argument(
+        "checkpoint", type=Path, metavar="CHECKPOINT", help="folder of a checkpoint or training run (last checkpoint)"
+    )
     model.add_argument(
         "--eval",
         action="append",

@@ -26,12 +26,13 @@ class DatasetFacts:
     episodes: tuple[dict[str, Any], ...]
 
     @classmethod
-    def read(cls, root: Path) -> "DatasetFacts":
+    def read(cls, root: Path | str) -> "DatasetFacts":
         """Reads a data set folder.
 
         Raises:
             FileFormatError: no LeRobot v3 data set, one without the episode columns, or one that contradicts itself.
         """
+        root = Path(root)
         folder = LeRobotFolder.open(root)
         folder.require_task(tuple(features_of(folder.task.spec)))
         episodes = tuple(folder.rows())

@@ -23,8 +23,8 @@ _BATCH = 8  # files handed to a process at a time
 
 
 def convert_recordings(
-    folders: Sequence[Path],
-    root: Path,
+    folders: Sequence[Path | str],
+    root: Path | str,
     repo_id: str,
     conversion: Conversion,
     skip_damaged: bool = False,
@@ -45,6 +45,7 @@ def convert_recordings(
         DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is written.
         MissingExtraError: lerobot is not installed.
     """
+    root = Path(root)
     require_new(root)
     if workers < 1:
         raise InvalidValueError("workers", "at least 1", workers)
@@ -90,7 +91,7 @@ def collect_notes(episodes: Iterable[PreparedEpisode], notes: list[str]) -> Iter
         yield episode
 
 
-def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
+def find_recordings(folders: Sequence[Path | str]) -> tuple[list[Path], list[str]]:
     """Lists the recordings in `folders`, sorted by path within each, and the names of unfinished ones (`.part`).
 
     A recording that several links point to is listed once. A broken link named `*.mcap` is listed, so that reading it
@@ -102,7 +103,9 @@ def find_recordings(folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     files: list[Path] = []
     unfinished: list[str] = []
     broken: list[Path] = []
-    for folder in folders:
+    if isinstance(folders, str | Path):
+        raise InvalidValueError("folders", "a list of folders", str(folders))
+    for folder in map(Path, folders):
         if folder.is_dir():
             files += distinct_files(folder, "*.mcap")
             unfinished += [part.name for part in distinct_files(folder, "*.mcap.part")]

@@ -19,6 +19,6 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str]
         return getattr(import_module(f".{modules[name]}", package), name)
 
     def names() -> list[str]:
-        return sorted({*vars(import_module(package)), *modules})
+        return sorted({*vars(import_module(package)), *modules} - {"TYPE_CHECKING", "lazy_names"})
 
     return get, names

@@ -66,8 +66,11 @@ class DatasetEpisode:
         return len(self.states)
 
     def __repr__(self) -> str:
-        summary = ", ".join(str(self.columns[name]) for name in ("map_id", "source", "termination_reason"))
-        return f"DatasetEpisode({self.index}, states={self.states.shape}, actions={self.actions.shape}, {summary})"
+        row = self.columns
+        return (
+            f"DatasetEpisode({self.index}, states={self.states.shape}, actions={self.actions.shape}, "
+            f"map={row['map_id']}, source={row['source']}, {row['termination_reason']})"
+        )
 
     @property
     def settings(self) -> Any:

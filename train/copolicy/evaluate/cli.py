@@ -14,7 +14,16 @@ from .comparison import add_compare_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
-from .study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol, study_settings
+from .study_flags import (
+    POLICY_HELP,
+    add_study_flags,
+    checkpoint_task,
+    figure_beside,
+    study_needs,
+    study_policy,
+    study_protocol,
+    study_settings,
+)
 
 _DEFAULT_MAPS = "holdout"
 
@@ -30,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "copolicy-eval coplan --policy outputs/run/checkpoints/last/pretrained_model --maps holdout --out eval.json",
         study_needs,
     )
-    coplan.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
+    coplan.add_argument("--policy", required=True, type=Path, help=POLICY_HELP)
     add_maps_flag(coplan, _DEFAULT_MAPS, use_default=False)
     coplan.add_argument("--orientations", action="store_true", help="run each map with four start orientations")
     add_whole_number(coplan, "--repeats", "episodes per map (default: 1)", 1, 1, 10_000)
@@ -45,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure = arguments.out.with_suffix(".png")
+    figure = figure_beside(arguments.out)
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
@@ -101,6 +110,6 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
         **({} if force is None else {"interaction_force": force["mean"]}),
         "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
         "result": str(arguments.out),
-        "picture": str(figure) if task.outline is not None else task.missing("outline"),
+        "figure": str(figure) if task.outline is not None else task.missing("outline"),
         **not_measured(task, summary),
     }

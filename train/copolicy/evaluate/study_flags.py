@@ -20,7 +20,19 @@ from copolicy.dataset.task import TABLE, PairTask, get_task
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
+POLICY_HELP = "folder of a training run or a checkpoint, or pretrained (the model in the package)"
 _POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
+
+
+def figure_beside(result: Path) -> Path:
+    """Name of the figure beside a result file.
+
+    Raises:
+        InvalidValueError: the result's name does not end with .json, so that the figure might have the same name.
+    """
+    if result.suffix.lower() != ".json":
+        raise InvalidValueError("--out", "a name that ends with .json", str(result))
+    return result.with_suffix(".png")
 
 
 def add_study_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:

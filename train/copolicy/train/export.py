@@ -31,8 +31,8 @@ _TOLERANCE = 1e-6  # of a predicted action; the arithmetic of both policies is t
 
 def export_checkpoint(
     path: Path | str,
-    out: Path,
-    evaluations: Sequence[Path] = (),
+    out: Path | str,
+    evaluations: Sequence[Path | str] = (),
     commands: Sequence[str] = (),
     overwrite: bool = False,
 ) -> dict[str, Any]:
@@ -53,6 +53,7 @@ def export_checkpoint(
         OutputExistsError: `out` exists and may not be replaced.
         RunError: the exported policy predicts other actions than the checkpoint.
     """
+    out, evaluations = Path(out), [Path(file) for file in evaluations]
     source = checkpoint_folder(path)
     if out.exists() and source.resolve() == out.resolve():
         raise InvalidValueError("--out", "another folder than the checkpoint's", str(out))
@@ -81,7 +82,7 @@ def export_checkpoint(
         "weights_sha256": exported.weights_sha256,
         "parameters": sum(parameter.numel() for parameter in exported.policy.parameters()),
         "megabytes": round(size / 1e6, 3),
-        "largest_difference_of_a_plan": difference,
+        "largest_action_difference": difference,
         "evaluations": len(results),
     }
 

@@ -153,7 +153,7 @@ def _summary(arguments: argparse.Namespace, seconds: float) -> dict[str, Any]:
         "checkpoint": str(training),
         "results": f"{out / 'eval' / 'holdout.json'}, {out / 'eval' / 'unseen.json'}",
         "log": str(out / LOG_FILE),
-        "pictures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
+        "figures": f"{out / 'eval' / 'holdout.png'}, {out / 'eval' / 'unseen.png'}",
     }
     # Suggest commands in the form of the user's: through uv, or from an activated environment.
     prefix = "uv run " if "UV_RUN_RECURSION_DEPTH" in os.environ else ""

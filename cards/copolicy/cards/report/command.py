@@ -40,7 +40,7 @@ def add_report_command(commands: Commands) -> None:
         "write one HTML page about a data set: paths, heat maps, pairs, findings, and a player for every episode",
         "copolicy-cards report outputs/dataset",
     )
-    report.add_argument("root", type=Path, help="folder of a LeRobot v3 data set")
+    report.add_argument("root", type=Path, metavar="PATH", help="folder of a LeRobot v3 data set")
     report.add_argument("--out", type=Path, help=f"file of the page (default: {REPORT_NAME} in the data set's folder)")
     report.add_argument("--title", help="heading of the page (default: the folder's name)")
     report.add_argument(

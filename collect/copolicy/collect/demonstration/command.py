@@ -85,7 +85,7 @@ def _demo(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "out": str(path),
         "bytes": path.stat().st_size,
-        "pictures": count,
+        "frames": count,
         "policy": policy.name,
         "learned": policy.conditions.to_json(),
         "partner": f"simulated, human of {partner}",

@@ -76,7 +76,9 @@ def add_play_command(commands: Commands) -> None:
     )
     command.add_argument("--consent-0", default="", metavar="ID", help="id of player a's consent record (not a name)")
     command.add_argument("--consent-1", default="", metavar="ID", help="id of player b's consent record (not a name)")
-    command.add_argument("--license", default="", help="license of the recordings, by its id on the Hub (cc-by-4.0)")
+    command.add_argument(
+        "--license", default="", help="license of the recordings, by its id on the Hub, such as cc-by-4.0"
+    )
     command.add_argument(
         "--angular-limit",
         choices=ANGULAR_LIMITS,

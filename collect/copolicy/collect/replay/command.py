@@ -30,7 +30,8 @@ def add_replay_command(commands: Commands) -> None:
         "--out",
         type=Path,
         nargs="+",
-        default=(),
+        action="extend",
+        default=[],
         metavar="FILE",
         help="files to write, by suffix: .mp4 H.264 video, .gif looping GIF, .png contact sheet, .rrd Rerun file (pip "
         "install rerun-sdk); needs no display",

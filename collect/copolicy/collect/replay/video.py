@@ -125,7 +125,7 @@ def _summary(path: Path, track: Track, size: tuple[int, int], fps: int, speed: f
         "bytes": path.stat().st_size,
         "width": size[0],
         "height": size[1],
-        "pictures": count,
+        "frames": count,
         "seconds": round(count / fps, 3),
     }
 

@@ -77,8 +77,8 @@ def stored_video_size(root: Path, requested: bool, size: tuple[int, int] | None)
 
 
 def append_recordings(
-    folders: Sequence[Path],
-    root: Path,
+    folders: Sequence[Path | str],
+    root: Path | str,
     repo_id: str,
     conversion: Conversion,
     skip_damaged: bool = False,
@@ -97,6 +97,7 @@ def append_recordings(
         FileFormatError: no data set at `root`, or one with other columns.
         RunError: no new recording is usable; nothing was changed.
     """
+    root = Path(root)
     finish_interrupted(root)
     require_loadable(root)
     files, unfinished = find_recordings(folders)

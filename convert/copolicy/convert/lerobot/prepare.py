@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -31,6 +31,9 @@ class Conversion:
         keep_discarded: keep episodes that the operator discarded.
         drift: compute `replay_drift_px` by re-simulation where an episode does not state it.
         video: width and height (px) of the images drawn of each frame; None for no video.
+
+    Raises:
+        InvalidValueError: another downsampling than `mean` or `first`.
     """
 
     fps: int = 10
@@ -39,6 +42,10 @@ class Conversion:
     keep_discarded: bool = False
     drift: bool = True
     video: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        if self.downsampling not in get_args(Downsampling):
+            raise InvalidValueError("downsampling", " or ".join(get_args(Downsampling)), self.downsampling)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ class WrittenDataset:
     root: Path
     repo_id: str
     fps: int
-    hold: Downsampling  # named like its key of the summary
+    downsampling: Downsampling
     episodes: int
     frames: int
     successes: int

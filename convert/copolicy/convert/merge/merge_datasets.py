@@ -37,7 +37,11 @@ _NUMBERS = {"episode_index", "dataset_from_index", "dataset_to_index"}
 
 
 def merge_datasets(
-    roots: Sequence[Path], root: Path, repo_id: str, prefixes: Sequence[str] | None = None, same_people: bool = False
+    roots: Sequence[Path | str],
+    root: Path | str,
+    repo_id: str,
+    prefixes: Sequence[str] | None = None,
+    same_people: bool = False,
 ) -> dict[str, Any]:
     """Writes the episodes of several data sets, one after the other, as one data set at `root`.
 
@@ -56,6 +60,7 @@ def merge_datasets(
         FileFormatError: not all are data sets of this project with the same rate and features, or two share an episode.
         InvalidValueError: a name occurs in two data sets, and neither `prefixes` nor `same_people` is given.
     """
+    roots, root = [Path(path) for path in roots], Path(root)
     require_new(root)
     if prefixes is not None:
         require_prefixes(prefixes, len(roots))

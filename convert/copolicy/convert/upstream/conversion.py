@@ -79,8 +79,8 @@ def open_upstream(path: Path) -> UpstreamSource:
 
 
 def convert_upstream(
-    path: Path,
-    root: Path,
+    path: Path | str,
+    root: Path | str,
     repo_id: str,
     fps: int = 10,
     downsampling: Downsampling | None = None,
@@ -103,6 +103,7 @@ def convert_upstream(
         DamagedEpisodeError: a file is damaged and `skip_damaged` is off; nothing is written.
         MissingExtraError: lerobot or zarr is not installed.
     """
+    path, root = Path(path), Path(root)
     stride(fps, SPEC.record_hz)
     require_new(root)
     source = open_upstream(path)

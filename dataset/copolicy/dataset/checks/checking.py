@@ -70,7 +70,7 @@ def read_data(root: Path) -> EpisodeData:
     return read_recordings(root)
 
 
-def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
+def check_dataset(root: Path | str, against: Path | str | None = None) -> CheckResult:
     """Checks a LeRobot data set or a folder of recordings; changes nothing.
 
     Args:
@@ -80,8 +80,9 @@ def check_dataset(root: Path, against: Path | None = None) -> CheckResult:
     Raises:
         FileFormatError: a folder is neither a data set nor recordings, or its task is not installed.
     """
+    root = Path(root)
     result = check_data(read_data(root))
-    return result if against is None else add_leaks(result, root, against)
+    return result if against is None else add_leaks(result, root, Path(against))
 
 
 def add_leaks(result: CheckResult, root: Path, against: Path) -> CheckResult:

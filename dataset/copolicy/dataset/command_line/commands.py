@@ -58,7 +58,7 @@ def add_command(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_common_flags(parser)
-    parser.set_defaults(handler=handler, needs=needs)
+    parser.set_defaults(handler=handler, needs=needs, parser=parser)
     return parser
 
 
@@ -89,7 +89,9 @@ def run(parser: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> i
     with tolerate_closed_pipes():
         logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
         try:
-            arguments = parser.parse_args(argv)
+            arguments, unknown = parser.parse_known_args(argv)
+            if unknown:  # with the usage of the command, which parse_args does not show
+                getattr(arguments, "parser", parser).error(f"unrecognized arguments: {' '.join(unknown)}")
         except CopolicyError as error:  # raised by a flag's `type` function
             print(f"{parser.prog}: {error}", file=sys.stderr)
             return error.exit_status
@@ -160,7 +162,9 @@ def progress_bar(total: int | None, label: str) -> "tqdm[Any]":
 def _lines(summary: dict, indent: str = "") -> Iterable[str]:
     width = max((len(str(key)) for key in summary), default=0)
     for key, value in summary.items():
-        if isinstance(value, dict):
+        if isinstance(value, (dict, list, tuple)) and not value:
+            yield f"{indent}{key:<{width}}  none"
+        elif isinstance(value, dict):
             yield f"{indent}{key}"
             yield from _lines(value, indent + "  ")
         elif isinstance(value, float):

@@ -18,7 +18,7 @@ def add_select_command(commands: Commands) -> None:
         "copolicy-dataset select datasets/table --out datasets/short --pair-ids P03 P07 "
         "--where 'duration_s < 20 and source == \"human\"'",
     )  # fmt: skip
-    parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
+    parser.add_argument("root", type=Path, metavar="PATH", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="new folder; must not exist")
     _add_selection_flags(parser)
     parser.add_argument("--drop-excluded", action="store_true", help="leave out discarded and excluded episodes")
@@ -31,7 +31,7 @@ def add_split_command(commands: Commands) -> None:
         "copolicy-dataset split datasets/table --out datasets/parts --parts train=0.8 valid=0.1 test=0.1\n"
         "  copolicy-dataset split datasets/table --out datasets/parts --by pairs --parts test=P03,P07 train=rest",
     )  # fmt: skip
-    parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
+    parser.add_argument("root", type=Path, metavar="PATH", help=_ROOT)
     parser.add_argument("--out", type=Path, required=True, metavar="NEW", help="new folder of parts; must not exist")
     parser.add_argument(
         "--parts", nargs="+", required=True, metavar="NAME=VALUE",
@@ -73,7 +73,7 @@ def add_amend_command(commands: Commands) -> None:
         "  copolicy-dataset amend datasets/table --set consent_id=C-12 --episode-ids 3-5\n"
         "  copolicy-dataset amend datasets/table --restore-from recordings",
     )  # fmt: skip
-    parser.add_argument("root", type=Path, metavar="ROOT", help=_ROOT)
+    parser.add_argument("root", type=Path, metavar="PATH", help=_ROOT)
     mode = parser.add_mutually_exclusive_group(required=True)
     mode.add_argument(
         "--set", nargs="+", metavar="NAME=VALUE", dest="settings",

@@ -94,6 +94,8 @@ def _by_configuration(
     value = eta_squared(values, strata, single_stratum) if len(episodes) else float("nan")
     if len(np.unique(strata)) < 2 or not np.isfinite(value):
         return Estimate(None, "1", definition, len(episodes), note="one configuration, or nothing varies")
+    if len(np.unique(strata)) == len(strata):  # then the proportion is 1, whatever the durations are
+        return Estimate(None, "1", definition, len(episodes), note="no configuration has two episodes")
     weights = bootstrap.weights[:_PERMUTATIONS, episodes].astype(float)
     replicates = np.array([eta_squared(values, strata, single_stratum, row) for row in weights])
     draws = np.array([eta_squared(values, rng.permutation(strata), single_stratum) for _ in range(_PERMUTATIONS)])

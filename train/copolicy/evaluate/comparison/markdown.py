@@ -24,8 +24,8 @@ def markdown(comparison: Mapping[str, Any]) -> str:
     ]
     text = [
         f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes per "
-        f"run, {settings.get('actions_per_plan', '?')} actions per chunk, hold {settings.get('hold', '?')}, at most "
-        f"{settings.get('step_limit', '?')} steps ({comparison['label']}).",
+        f"run, {settings.get('actions_per_plan', '?')} actions per chunk, each held for {settings.get('hold', '?')} "
+        f"steps, at most {settings.get('step_limit', '?')} steps ({comparison['label']}).",
         _table(["method", "runs", "success, % (max)", *labels, *(f"{part}, %" for part in parts)], rows),
     ]
     if comparison["differences"]:

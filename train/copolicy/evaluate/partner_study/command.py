@@ -14,7 +14,15 @@ from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
 
-from ..study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol, study_settings
+from ..study_flags import (
+    add_study_flags,
+    checkpoint_task,
+    figure_beside,
+    study_needs,
+    study_policy,
+    study_protocol,
+    study_settings,
+)
 from ..summary import not_measured, percent
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
 
@@ -65,7 +73,7 @@ def add_partner_command(commands: Commands) -> None:
 
 
 def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure = arguments.out.with_suffix(".png")
+    figure = figure_beside(arguments.out)
     require_new(arguments.out, figure, overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
@@ -160,7 +168,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
             f"{names[0]} - {name}": _difference(by_kind["all"]["success"]) for name, by_kind in paired.items()
         },
         "result": str(arguments.out),
-        "picture": str(figure),
+        "figure": str(figure),
         **not_measured(task, summaries[0]),
     }
 

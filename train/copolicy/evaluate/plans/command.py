@@ -13,7 +13,7 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 
-from ..study_flags import add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol
+from ..study_flags import POLICY_HELP, add_study_flags, checkpoint_task, study_needs, study_policy, study_protocol
 
 if TYPE_CHECKING:
     from .sampling import BranchPoint
@@ -31,7 +31,7 @@ def add_plans_command(commands: Commands) -> None:
         "copolicy-eval plans --policy pretrained --maps unseen --map 29 --samples 64 --out plans.png",
         study_needs,
     )
-    command.add_argument("--policy", required=True, type=Path, help="checkpoint folder")
+    command.add_argument("--policy", required=True, type=Path, help=POLICY_HELP)
     add_maps_flag(command, _DEFAULT_MAPS, use_default=False)
     command.add_argument(
         "--map",
@@ -96,7 +96,7 @@ def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
         **({LIMIT_SETTING: limit} if (limit := angular_limit_of(protocol.settings)) is not None else {}),
         **({"told_otherwise": list(protocol.contradictions)} if protocol.contradictions else {}),
         **_counts(branch_point),
-        "picture": str(arguments.out),
+        "figure": str(arguments.out),
     }
 
 

@@ -53,4 +53,4 @@ def _log_choice(chosen: tuple[tuple[float, str], ...]) -> None:
     parts = [f"{name} (batches of up to {limit:g})" for name, limit in limits.items() if limit < math.inf]
     name = chosen[-1][1]
     text = ", ".join([*parts, f"{name} (larger batches)"] if parts else [name])
-    logging.info("sampling on the CPU with %s: the fastest installed backends (--policy.backend sets one)", text)
+    logging.info("sampling on the CPU with %s: the fastest installed backends (backend=auto)", text)
