@@ -237,7 +237,7 @@ def test_the_command_writes_every_robots_episodes_and_the_card_reads_them(checkp
     )
     assert cards(["model", str(copy), "--eval", str(card_input)]) == 0
     text = (copy / "README.md").read_text(encoding="utf-8")
-    assert "With simulated partners on 4 starts of the unseen maps, 1 action(s) a plan" in text
+    assert "With simulated partners on 4 starts of the unseen maps, 1 action(s) per chunk" in text
     assert "| never-yields | 0.0 ± 0.0 | 0.0 to 19.4 | 16 |" in text
 
 

@@ -118,6 +118,14 @@ def test_long_text_is_made_to_fit():
     assert draw_text(surface, "a rather long line of text " * 3, (10, 10), 30, max_width=150).width <= 150
 
 
+@pytest.mark.parametrize("width", [520, 400, 330, 300])
+def test_text_is_not_cut_that_fits_in_smaller_type(width):
+    hint = "A or Cross: keep   X or Square: redo   Y or Triangle: discard"
+    drawn = draw_text(_surface((600, 100)), hint, (10, 10), 26, max_width=width)
+    fitting = [size for size in range(13, 27) if text_size(hint, size)[0] <= width]
+    assert drawn.size == text_size(hint, max(fitting))
+
+
 @pytest.mark.parametrize("size", [(1200, 760), (400, 320), (700, 900), (2400, 1520)])
 def test_dialogues_stay_in_the_window(size):
     surface = _surface(size)

@@ -43,7 +43,11 @@ def _fitted(text: str, size: int, colour: Colour, max_width: int | None) -> pyga
     if max_width is not None:
         width = _font(size).size(text)[0]
         if width > max_width:
-            size = max(8, size // 2, int(size * max_width / width))
+            smallest, size = max(8, size // 2), int(size * max_width / width)
+            # The width of a font is not proportional to its size.
+            while size > smallest and _font(size).size(text)[0] > max_width:
+                size -= 1
+            size = max(size, smallest)
             while len(text) > 2 and _font(size).size(text)[0] > max_width:
                 text = text[:-2] + "…"
     return _font(size).render(text, True, colour)
