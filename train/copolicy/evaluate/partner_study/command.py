@@ -15,6 +15,7 @@ from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
 
 from ..study_flags import (
+    POLICY_HELP,
     add_study_flags,
     checkpoint_task,
     figure_beside,
@@ -43,7 +44,7 @@ def add_partner_command(commands: Commands) -> None:
         "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
         study_needs,
     )
-    command.add_argument("policy", metavar="[NAME=]CKPT", help="checkpoint folder, and its name in the result")
+    command.add_argument("policy", metavar="[NAME=]CKPT", help=f"{POLICY_HELP}; and its name in the result")
     command.add_argument(
         "--baseline",
         nargs="+",
