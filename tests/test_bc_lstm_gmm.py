@@ -191,9 +191,11 @@ def test_it_is_evaluated_and_described(run, tmp_path, capsys):
     assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(again)]) == 0
     assert json.loads(again.read_text(encoding="utf-8"))["episodes"] == result["episodes"]
     capsys.readouterr()
-    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x"), "--n-action-steps", "2"]) == 2
+    assert (
+        evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x.json"), "--n-action-steps", "2"]) == 2
+    )
     assert "--n-action-steps: expected 1 to 1, the actions of a chunk, found 2" in capsys.readouterr().err
-    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x"), "--sampler", "ddim"]) == 2
+    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(tmp_path / "x.json"), "--sampler", "ddim"]) == 2
     assert "found bc_lstm_gmm without it" in capsys.readouterr().err
     assert train(["export", str(run), "--out", str(tmp_path / "exported"), "--eval", str(out)]) == 0
     assert cards(["model", str(tmp_path / "exported")]) == 0

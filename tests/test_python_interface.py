@@ -14,7 +14,8 @@ from checked_data import make_data_set, make_recordings
 from copolicy.cards import DatasetFacts
 from copolicy.collect import make_agent, run_episodes
 from copolicy.convert import Conversion, append_recordings, convert_recordings, merge_datasets
-from copolicy.dataset import check_dataset, load_dataset, read_episode
+from copolicy.dataset import check_dataset, dataset_statistics, load_dataset, read_episode
+from copolicy.dataset.cli import main as dataset_command
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.listing import distinct_files
 from copolicy.evaluate import compare_episodes, coplan_episodes, success
@@ -200,3 +201,11 @@ def test_a_folder_may_be_a_text(made, tmp_path):
     with pytest.raises(InvalidValueError, match="downsampling: expected mean or first, found 'last'"):
         Conversion(downsampling="last")  # pyright: ignore[reportArgumentType]
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_statistics_are_those_of_the_command(made, tmp_path):
+    assert dataset_command(["stats", str(made / "set"), "--seed", "3", "--out", str(tmp_path / "stats.json")]) == 0
+    document = dataset_statistics(str(made / "set"), seed=3)
+    assert json.loads((tmp_path / "stats.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
+    with pytest.raises(FileFormatError, match="no-such-set"):
+        dataset_statistics(tmp_path / "no-such-set")

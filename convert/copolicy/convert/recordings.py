@@ -120,7 +120,7 @@ def find_recordings(folders: Sequence[Path | str]) -> tuple[list[Path], list[str
         logging.warning("warning: %s: a broken link; its target is skipped", link)
     files = without_duplicates(files)
     if not files:
-        kinds = " and ".join(describe_path(folder) for folder in folders)
+        kinds = " and ".join(describe_path(Path(folder)) for folder in folders)
         raise FileFormatError(", ".join(map(str, folders)), "at least one recording (*.mcap)", kinds)
     return files, unfinished
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .exceptions import CopolicyError
     from .pair_dataset import DatasetEpisode, PairDataset, load_dataset
     from .recording.reader import read_episode
-    from .statistics.compute import compute_statistics
+    from .statistics.compute import dataset_statistics
     from .task import PairTask, get_task, installed_tasks
     from .task_spec import TaskSpec, Vector
 
@@ -33,7 +33,7 @@ __all__ = [
     "TaskSpec",
     "Vector",
     "check_dataset",
-    "compute_statistics",
+    "dataset_statistics",
     "get_task",
     "installed_tasks",
     "load_dataset",
@@ -48,7 +48,7 @@ __getattr__, __dir__ = lazy_names(
         "CopolicyError": "exceptions",
         **dict.fromkeys(("DatasetEpisode", "PairDataset", "load_dataset"), "pair_dataset"),
         "read_episode": "recording.reader",
-        "compute_statistics": "statistics.compute",
+        "dataset_statistics": "statistics.compute",
         **dict.fromkeys(("PairTask", "get_task", "installed_tasks"), "task"),
         **dict.fromkeys(("TaskSpec", "Vector"), "task_spec"),
     },

@@ -1,6 +1,7 @@
 """Runs LeRobot's trainer on data sets in memory, after checking their episodes and numbers."""
 
 import logging
+import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from types import ModuleType
@@ -32,13 +33,26 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
         CopolicyError: the data set cannot be trained on, or the loss, a gradient or a weight is not finite.
     """
     guards = guarded_functions(config, {name: getattr(lerobot_train, name) for name in _GUARDED})
-    with _datasets_in_memory(), _hidden_files_ignored(), _patched(lerobot_train, guards):
+    make_guarded, groups = guards["make_policy"], list[Any]()
+
+    def make_policy(*arguments: Any, **kwargs: Any) -> Any:
+        if torch.distributed.is_available() and torch.distributed.is_initialized():
+            groups.append(torch.distributed.group.WORLD)
+        return make_guarded(*arguments, **kwargs)
+
+    patches = {**guards, "make_policy": make_policy}
+    with _datasets_in_memory(), _hidden_files_ignored(), _patched(lerobot_train, patches):
         try:
             lerobot_train.train(config)
         finally:
             # An open progress bar is drawn again when it is garbage-collected, which would be after an error's line.
             for bar in list(getattr(tqdm, "_instances", ())):
                 bar.close()
+            if groups:
+                # torch's gloo group joins its thread in its destructor with the GIL held, while that thread may need
+                # the GIL to free the tensors of the last collective: a deadlock after the last step. The reference
+                # keeps the group until the thread is idle.
+                time.sleep(0.5)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Any
 
 import torch
 from lerobot.policies import PreTrainedPolicy
-from torch import Tensor, nn
+from torch import Tensor
 
 from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
 from copolicy.dataset.features import ACTION, features_of
@@ -38,7 +38,7 @@ class PairPolicy(PreTrainedPolicy):
     config_class = PairPolicyConfig  # pyright: ignore[reportAssignmentType]
     name = "pair_policy"  # pyright: ignore[reportAssignmentType]
     config: Any  # of the subclass
-    features: nn.Module
+    features: Any
     action_scale: ActionScale
 
     def __init__(self, config: PairPolicyConfig, **kwargs):

@@ -25,8 +25,7 @@ def add_stats_command(commands: Commands) -> None:
 
 
 def _stats(arguments: argparse.Namespace) -> dict[str, Any]:
-    from .compute import compute_statistics
-    from .reading import read_trajectories
+    from .compute import dataset_statistics
 
     if arguments.seed < 0:
         raise InvalidValueError("--seed", "at least 0", arguments.seed)
@@ -35,8 +34,7 @@ def _stats(arguments: argparse.Namespace) -> dict[str, Any]:
     target = arguments.out or arguments.path / STATISTICS_FILE
     if target.is_dir():
         raise FileFormatError(target, "a file to write", "a folder")
-    data, left_out = read_trajectories(arguments.path, arguments.source)
-    document = compute_statistics(data, arguments.seed, left_out)
+    document = dataset_statistics(arguments.path, arguments.source, arguments.seed)
     replace_json(target, document, allow_nan=False)
     return {"written": str(target), **(document if arguments.json else summary(document))}
 

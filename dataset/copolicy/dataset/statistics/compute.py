@@ -2,17 +2,20 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..command_line.commands import progress
+from ..episode import Source
 from .action_variance import variance_statistics
 from .energy_distance import energy_statistics
 from .estimate import rounded
 from .forces import activity_statistics, force_statistics
 from .leadership import leadership_statistics
 from .path_modes import path_mode_statistics
+from .reading import read_trajectories
 from .resampling import MIN_CLUSTERS, Bootstrap
 from .route_entropy import route_statistics
 from .smoothness import smoothness_statistics
@@ -28,6 +31,19 @@ _SOURCE_LABELS = {
     "simulated": "scripted pairs, no person took part",
     "upstream": "files of the original program, which do not say who held the sticks",
 }
+
+
+def dataset_statistics(path: Path | str, source: Source | None = None, seed: int = 0) -> dict[str, Any]:
+    """Computes the statistics of a LeRobot v3 folder: the document that `copolicy-dataset stats` writes.
+
+    Args:
+        source: use only episodes of this source.
+
+    Raises:
+        FileFormatError: the folder does not exist, or is not a data set of an installed task.
+    """
+    data, left_out = read_trajectories(Path(path), source)
+    return compute_statistics(data, seed, left_out)
 
 
 def compute_statistics(
