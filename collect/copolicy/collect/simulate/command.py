@@ -27,7 +27,7 @@ from copolicy.dataset.worker_pool import WorkerPool
 from ..agents.simulated_players import pair_name, simulated_players
 from ..recording.episode_file import PART_SUFFIX
 from ..recording.wall_clock import WallClockAnchor
-from .episode_job import EpisodeJob, EpisodeResult
+from .episode_job import EpisodeJob, RecordedEpisode
 from .schedule import balanced_schedule
 
 
@@ -137,7 +137,7 @@ def _meta(task: PairTask, scenario: Any, pair: str, variant: str, seed: int, ind
     )
 
 
-def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[EpisodeResult]:
+def _record_all(jobs: list[EpisodeJob], workers: int) -> Iterator[RecordedEpisode]:
     groups = _groups_by_layout(jobs, workers)
     if workers == 1 or len(groups) == 1:
         for group in groups:
@@ -173,7 +173,7 @@ def _set_stop(stop: ctypes.c_bool) -> None:
     _stop = stop
 
 
-def _record_group(jobs: list[EpisodeJob]) -> list[EpisodeResult]:
+def _record_group(jobs: list[EpisodeJob]) -> list[RecordedEpisode]:
     return [job.record() for job in jobs if _stop is None or not _stop.value]
 
 
@@ -195,7 +195,7 @@ def _refuse_recordings(out: Path) -> None:
             raise OutputExistsError(path)
 
 
-def _summary(out: Path, results: list[EpisodeResult], seconds: float) -> dict[str, Any]:
+def _summary(out: Path, results: list[RecordedEpisode], seconds: float) -> dict[str, Any]:
     steps = sum(result.steps for result in results)
     size = sum(result.size for result in results)
     return {

@@ -27,7 +27,7 @@ class EpisodeJob:
     anchor: WallClockAnchor
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def record(self) -> "EpisodeResult":
+    def record(self) -> "RecordedEpisode":
         """Records the episode of the pair `meta.pair_id` with the seed `meta.seed`."""
         task = get_task(self.task)
         robot, human = (ScriptedAgent.from_pair(self.meta.pair_id, task, **self.options) for _ in range(2))
@@ -36,7 +36,7 @@ class EpisodeJob:
 
 
 @dataclass(frozen=True)
-class EpisodeResult:
+class RecordedEpisode:
     """Outcome of a recorded episode."""
 
     termination_reason: str
@@ -53,7 +53,7 @@ def record_episode(
     anchor: WallClockAnchor,
     settings: Any = None,
     task: str = TABLE,
-) -> EpisodeResult:
+) -> RecordedEpisode:
     """Runs and records an episode of two agents.
 
     Args:
@@ -71,7 +71,7 @@ def record_episode(
         rollout.run()
         (outcome,) = rollout.outcomes
         recorder.finish(outcome.success, outcome.reason)
-    return EpisodeResult(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)
+    return RecordedEpisode(outcome.reason, outcome.success, recorder.steps, path.stat().st_size)
 
 
 @dataclass
