@@ -15,9 +15,11 @@ def unknown_types(package: str) -> list[str]:
     module = import_module(package)
     values = [getattr(module, name) for name in module.__all__]
     public = {f"{package}.{name}" for name in module.__all__} | {f"{x.__module__}.{x.__qualname__}" for x in values}
-    return [
+    symbols = report["typeCompleteness"]["symbols"]
+    missing = {f"{package}.{name}" for name in module.__all__} - {symbol["name"] for symbol in symbols}
+    return [f"{name}: not among the symbols that pyright reports" for name in sorted(missing)] + [
         f"{symbol['name']}: {' '.join(problem['message'].split())}"
-        for symbol in report["typeCompleteness"]["symbols"]
+        for symbol in symbols
         if not symbol["isTypeKnown"] and any(f"{symbol['name']}.".startswith(f"{name}.") for name in public)
         for problem in symbol["diagnostics"]
     ]

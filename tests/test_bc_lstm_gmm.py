@@ -103,6 +103,19 @@ def test_the_loss_is_the_mean_negative_log_likelihood():
     torch.testing.assert_close(loss, per_sample.mean())
 
 
+def test_windows_are_augmented_in_training_alone():
+    policy = BcLstmGmmPolicy(config(preset="scan", sequence_length=4)).train()
+    columns = batch(4, 200)
+    columns[ACTION] = columns[ACTION].abs() + 0.1
+    sample = policy._training_sample(columns, 4, 4)
+    flipped = sample[ACTION][..., 1] < 0  # a window is mirrored in y as a whole, or not at all
+    assert (flipped == flipped[:, :1]).all()
+    assert 60 < int(flipped[:, 0].sum()) < 140
+    torch.testing.assert_close(sample[ACTION].abs(), columns[ACTION])
+    unchanged = policy.eval()._training_sample(columns, 4, 4)
+    torch.testing.assert_close(unchanged[ACTION], columns[ACTION], rtol=0, atol=0)
+
+
 def test_the_state_is_kept_and_reset_every_window():
     policy = BcLstmGmmPolicy(config(sequence_length=3)).eval()
     with torch.no_grad():

@@ -56,9 +56,6 @@ class BcLstmGmmConfig(PairPolicyConfig):
     optimizer_weight_decay: float = 0.0  # weight decay of Adam
     optimizer_grad_clip_norm: float = 0.0  # largest gradient norm; 0 does not clip
 
-    def _validate(self) -> None:
-        pass
-
     @property
     def observation_delta_indices(self) -> list[int]:
         """Frames of a training window, from the current one on."""

@@ -1,7 +1,6 @@
 """Settings that every policy for two players has."""
 
 import logging
-from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -126,9 +125,8 @@ class PairPolicyConfig(PreTrainedConfig):
             problems["symmetries"] = expected, self.symmetries
         return problems
 
-    @abstractmethod
     def _validate(self) -> None:
-        """Checks the rules between settings.
+        """Checks the rules between settings; a subclass that has such rules overrides it.
 
         Raises:
             InvalidValueError: a setting contradicts another.

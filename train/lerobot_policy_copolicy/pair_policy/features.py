@@ -11,25 +11,6 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.task_spec import TaskSpec
 
 
-class AbsoluteFeatures(nn.Module):
-    """The paper's input: state, scenario and, if used, the human's past action, scaled to [-1, 1]."""
-
-    scale: Tensor
-    offset: Tensor
-
-    def __init__(self, spec: TaskSpec, past_human_action: bool):
-        super().__init__()
-        self.keys = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION) if past_human_action else (STATE, ENVIRONMENT_STATE)
-        self.size = sum(bounds_of(spec)[key].shape[1] for key in self.keys)
-        for name, values in zip(("scale", "offset"), scaling_of(spec, self.keys), strict=True):
-            self.register_buffer(name, torch.from_numpy(values), persistent=False)
-
-    def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """Scales observation columns `(..., n)` in the units of the task and joins them to `(..., size)`."""
-        columns = torch.cat([observation[key] for key in self.keys], dim=-1)
-        return columns * self.scale + self.offset
-
-
 class RawFeatures(nn.Module):
     """State, scenario and, if used, the human's past action in the units of the task, unscaled."""
 
@@ -39,8 +20,24 @@ class RawFeatures(nn.Module):
         self.size = sum(bounds_of(spec)[key].shape[1] for key in self.keys)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """Joins observation columns `(..., n)` to `(..., size)`."""
+        """Joins observation columns `(..., n)` in the units of the task to `(..., size)`."""
         return torch.cat([observation[key] for key in self.keys], dim=-1)
+
+
+class AbsoluteFeatures(RawFeatures):
+    """The paper's input: the raw features scaled to [-1, 1]."""
+
+    scale: Tensor
+    offset: Tensor
+
+    def __init__(self, spec: TaskSpec, past_human_action: bool):
+        super().__init__(spec, past_human_action)
+        for name, values in zip(("scale", "offset"), scaling_of(spec, self.keys), strict=True):
+            self.register_buffer(name, torch.from_numpy(values), persistent=False)
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Joins and scales observation columns `(..., n)` in the units of the task to `(..., size)`."""
+        return super().forward(observation) * self.scale + self.offset
 
 
 class ActionScale(nn.Module):
