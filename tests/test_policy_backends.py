@@ -191,20 +191,20 @@ def test_auto_plans_what_torch_plans_with_the_fastest_for_the_batch(fresh_choice
     caplog.set_level(logging.INFO)
     plain, quick = (lively_policy(**{**NETWORKS[network], **choice}) for choice in (PLAIN, {"backend": "auto"}))
     used = []
-    for batch in (1, 5):
+    for batch in (8, 9):
         torch.testing.assert_close(plan(quick, batch), plan(plain, batch), atol=1e-4, rtol=0)
         used.append(quick.planned_with)
     assert used == [("numba",), ("numba", "onnx")]
     said = [record.message for record in caplog.records if record.message.startswith("sampling on the CPU")]
     assert said == [
-        "sampling on the CPU with numba (batches of up to 4), onnx (larger batches): the fastest installed backends "
+        "sampling on the CPU with numba (batches of up to 8), onnx (larger batches): the fastest installed backends "
         "(backend=auto)"
     ]
 
 
 def test_auto_stays_with_the_backend_of_a_study_whose_tables_end():
     planner = lively_policy(backend="auto")
-    for batch in (5, 2, 1):
+    for batch in (9, 2, 1):
         plan(planner, batch)
     assert planner.planned_with == ("onnx",)
 

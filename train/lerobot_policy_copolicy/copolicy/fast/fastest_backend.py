@@ -12,7 +12,7 @@ from .backend import BACKENDS
 
 # By largest batch size, the fastest first. The compiled kernels are optimised for the few rows of one sequence; with
 # more rows general matrix products are faster. `tests/benchmarks/planning.py --batches` measures the limits.
-_ORDER = {4: ("numba", "onnx", "torch"), 16: ("onnx", "numba", "torch"), math.inf: ("onnx", "torch")}
+_ORDER = {8: ("numba", "onnx", "torch"), 16: ("onnx", "numba", "torch"), math.inf: ("onnx", "torch")}
 
 
 def fastest_backend(condition: Tensor, batch_size: int) -> str:
