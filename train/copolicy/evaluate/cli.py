@@ -24,6 +24,7 @@ from .study_flags import (
     study_protocol,
     study_settings,
 )
+from .within_subject.command import add_power_command
 
 _DEFAULT_MAPS = "holdout"
 
@@ -50,6 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_human_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)
+    add_power_command(commands)
     return run(parser, argv)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
+from copolicy.dataset.command_line.extras import STATISTICS
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_text, require_new
 
@@ -17,7 +18,10 @@ def add_compare_command(commands: Commands) -> None:
         _compare,
         "compare results of one study, paired by start: the first method with each of the others",
         "copolicy-eval compare codp_h.json codp.json\n"
-        "  copolicy-eval compare --method CoDP-H h_seed0.json h_seed1.json --method CoDP c_seed0.json c_seed1.json",
+        "  copolicy-eval compare --method CoDP-H h_seed0.json h_seed1.json --method CoDP c_seed0.json c_seed1.json\n"
+        "  copolicy-eval compare --measurements trials.csv --unit participant --factors method configuration "
+        "--measure success",
+        lambda arguments: () if arguments.measurements is None else STATISTICS,
     )
     command.add_argument("files", nargs="*", type=Path, metavar="FILE", help="results, one method per file")
     command.add_argument(
@@ -28,11 +32,26 @@ def add_compare_command(commands: Commands) -> None:
         metavar=("NAME", "FILE"),
         help="name of a method and the results of its training runs; repeat for each method",
     )
+    command.add_argument(
+        "--measurements",
+        type=Path,
+        metavar="CSV",
+        help="analyse a table of trials instead, one row each: repeated-measures ANOVA, rank tests, contrasts",
+    )
+    command.add_argument("--unit", help="its column of the unit of analysis (default: participant)")
+    command.add_argument("--factors", nargs="+", metavar="COLUMN", help="its one or two within-unit factors")
+    command.add_argument("--measure", help="its column of values, numbers or true and false (default: success)")
     command.add_argument("--out", type=Path, help="also write the Markdown table to this file")
     command.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
 def _compare(arguments: argparse.Namespace) -> dict[str, Any]:
+    table_flags = {f"--{name}": getattr(arguments, name) for name in ("unit", "factors", "measure")}
+    if arguments.measurements is not None:
+        return _analyse(arguments)
+    for flag, value in table_flags.items():
+        if value is not None:
+            raise InvalidValueError(flag, "--measurements too", value)
     # Imported here so that `--help` does not wait for scipy.
     from .compare import compare
     from .markdown import markdown
@@ -47,6 +66,28 @@ def _compare(arguments: argparse.Namespace) -> dict[str, Any]:
         replace_text(arguments.out, text)
     if arguments.json:
         return {**comparison, "markdown": text}
+    print(text, end="")
+    return {}
+
+
+def _analyse(arguments: argparse.Namespace) -> dict[str, Any]:
+    if arguments.files or arguments.method:
+        raise InvalidValueError("--measurements", "no results beside it", [str(path) for path in arguments.files])
+    if not arguments.factors or len(arguments.factors) > 2 or len(set(arguments.factors)) < len(arguments.factors):
+        raise InvalidValueError("--factors", "one or two different columns of --measurements", arguments.factors)
+    if arguments.out:
+        require_new(arguments.out, overwrite=arguments.overwrite)
+    # Imported here so that `--help` and argument errors do not wait for scipy.
+    from ..within_subject.analysis import analyse, markdown
+    from ..within_subject.measurements import Measurements
+
+    unit, measure = arguments.unit or "participant", arguments.measure or "success"
+    analysis = analyse(Measurements.read(arguments.measurements, measure, unit, arguments.factors))
+    text = markdown(analysis)
+    if arguments.out:
+        replace_text(arguments.out, text)
+    if arguments.json:
+        return {**analysis, "markdown": text}
     print(text, end="")
     return {}
 

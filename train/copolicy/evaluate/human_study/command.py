@@ -239,11 +239,14 @@ def _report(summary: dict) -> dict[str, Any]:
             robots[name]["interaction_force"] = _value(robot["interaction_mean"], 1, 4, "")
     tests = {}
     for measure, test in summary["tests"].items():
-        f = test["anova"]
+        effects = test["anova"]
+        if not effects:
+            tests[measure] = "no test: it needs at least two people with a value for every robot, and some spread"
+            continue
+        f, n = effects[0], len(test["units"])
         tests[measure] = (
-            "no test: it needs at least two people with a value for every robot, and some spread"
-            if f is None
-            else f"F({f['df'][0]}, {f['df'][1]}) = {f['F']:.2f}, p = {f['p']:.3g}"
+            f"F({f['df'][0]}, {f['df'][1]}) = {f['F']:.2f}, p = {f['p']:.3g}, Greenhouse-Geisser "
+            f"{f['p_greenhouse_geisser']:.3g}, of {n} people; recommended: {test['recommended']}"
         )
     ratings = {
         question: {robot: _value(rating, 1, 2, "") for robot, rating in answers["robots"].items()}

@@ -11,8 +11,11 @@ from copolicy.dataset.task import TABLE, get_task
 
 from ..comparison.paired import between_runs
 from ..summary import not_measured, success_rate
+from ..within_subject.analysis import DEFINITIONS, analyse
+from ..within_subject.anova import rank_test
+from ..within_subject.measurements import Measurements
+from ..within_subject.mixed_logistic import mixed_logistic
 from .questionnaire import questions
-from .repeated_measures import anova, rank_test, tukey
 
 LABELS = {
     "human": "human-in-the-loop study: people at the human seat",
@@ -20,9 +23,9 @@ LABELS = {
 }
 _ROBOTS = "mean over participants of a participant's mean, standard error between participants; time of successes only"
 _DEFINITIONS = {
-    "anova": "one-way repeated measures over the participants who have a value with every robot; "
-    "p_greenhouse_geisser allows for unequal variances of the differences",
-    "tukey": "honestly significant differences on the error term of the ANOVA",
+    "unit_of_analysis": "the participant: mean of a participant's episodes with a robot; only participants who have a "
+    "value with every robot",
+    **DEFINITIONS,
     "ratings": "Friedman's test, with two robots Wilcoxon's signed-rank test, over participants who rated every robot",
 }
 _MEASURES = ("success", "time_s", "interaction_mean", "interaction_p95", "planning_ms")
@@ -42,10 +45,7 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     task, has_force = get_task(tasks[0]), any(row["interaction_mean"] is not None for row in rows)
     robots = list(dict.fromkeys(sorted(row["robot"] for row in rows)))
     people = list(dict.fromkeys(sorted(row["participant"] for row in rows)))
-    tests = {}
-    for measure in _TESTED[: 3 if has_force else 2]:
-        complete = _complete(people, robots, lambda p, r, measure=measure: _mean(rows, measure, p, r))
-        tests[measure] = {"anova": anova(complete), "pairs": tukey(complete, robots) if len(complete) else []}
+    tests = {measure: _tests(rows, measure) for measure in _TESTED[: 3 if has_force else 2]}
     result: dict[str, Any] = {
         "label": LABELS.get(sources[0], f"recordings of source {sources[0]}"),
         "source": sources[0],
@@ -62,6 +62,7 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
             for robot in robots
         },
         "tests": tests,
+        "mixed_logistic": mixed_logistic(rows, "robot", ("participant", "map_id")) if _has_groups(rows) else None,
     }
     if ratings:
         result["ratings"] = _ratings(ratings)
@@ -70,6 +71,24 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
         return {**result, **missing, "definitions": definitions}
     force = task.studies.definitions.get("human_interaction_force", "as the task measures it")
     return {**result, "definitions": {"robots": f"{_ROBOTS}; interaction force {force}", **_DEFINITIONS}}
+
+
+def _tests(rows: Sequence[Mapping[str, Any]], measure: str) -> dict[str, Any]:
+    """The within-subject analysis of a measure; the time of a failure is no time to completion."""
+    counted = [row for row in rows if row["success"] or measure != "time_s"]
+    robots = sorted({row["robot"] for row in rows})
+    ordered = sorted(counted, key=lambda row: robots.index(row["robot"]))
+    if {row["robot"] for row in counted} != set(robots):
+        return {"unit_of_analysis": "none: a robot has no value", "units": [], "anova": None, "contrasts": {}}
+    analysis = analyse(Measurements.of_rows(ordered, measure, "participant", ("robot",)))
+    return {name: value for name, value in analysis.items() if name not in ("definitions", "measure", "cells")}
+
+
+def _has_groups(rows: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether a mixed model has at least two robots, and several people or maps."""
+    return len({row["robot"] for row in rows}) > 1 and any(
+        len({row.get(column) for row in rows}) > 1 for column in ("participant", "map_id")
+    )
 
 
 def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
