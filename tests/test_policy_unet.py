@@ -158,6 +158,20 @@ def test_any_planner_samples_with_the_modules(backend):
     assert fast.planned_with == plain.planned_with == ("torch",)
 
 
+@pytest.mark.parametrize("settings", [{**UNET, "preset": "cnn-small"}, INPAINTING], ids=["global", "inpainting"])
+def test_mixed_precision_does_not_change_the_convolutions_of_a_cpu(settings):
+    learner = policy(**settings, mirror=False).eval()
+    losses = []
+    for enabled in (False, True):
+        torch.manual_seed(0)
+        with torch.autocast("cpu", torch.bfloat16, enabled=enabled):
+            batch = sequences()
+            if not learner.config.inpainting:
+                batch |= {key: batch[key][:, :3] for key in learner.config.observation_keys}
+            losses.append(learner(batch)[0])
+    assert torch.equal(*losses)
+
+
 def test_every_weight_of_the_network_decays_as_in_diffusion_policy():
     learner = policy(**UNET)
     (group,) = learner.get_optim_params()
