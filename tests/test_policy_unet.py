@@ -149,8 +149,8 @@ def test_a_wrong_setting_is_one_line(settings, message):
 
 @pytest.mark.parametrize("backend", ["auto", "torch"])
 def test_any_planner_samples_with_the_modules(backend):
-    settings = {**UNET, "backend": backend, "preset": "cnn", "num_inference_steps": 10}
-    fast, plain = policy(**settings).eval(), policy(**settings | {"backend": "torch"}, planner="plain").eval()
+    settings = {**UNET, "preset": "cnn", "num_inference_steps": 10}
+    fast, plain = policy(backend=backend, **settings).eval(), policy(planner="plain", **settings).eval()
     noise = torch.randn(2, 12, 4)
     chunks = [one.sample_actions(columns(2, 3), torch.Generator().manual_seed(0), noise, 8) for one in (fast, plain)]
     assert torch.equal(*chunks)
@@ -289,7 +289,7 @@ def test_it_is_trained_resumed_evaluated_and_exported(run, tmp_path):
 
 def test_it_acts_at_either_seat(run):
     task = get_task()
-    players = tuple(PolicyAgent(load_policy(run), task, seed=seed) for seed in (1, 2))
+    players = PolicyAgent(load_policy(run), task, seed=1), PolicyAgent(load_policy(run), task, seed=2)
     rollout = Rollout(task, task.scenario_sets["unseen"][:2], players, settings=task.settings_type(step_limit=30))
     rollout.run()
     assert np.isfinite(rollout.actions).all()
