@@ -74,7 +74,7 @@ class UnetDenoiser(nn.Module):
         Returns:
             The prediction, with the shape of `noisy`.
         """
-        # On a CPU without automatic mixed precision: a backward pass of convolutions in bf16 took 40 times as long.
+        # On a CPU without automatic mixed precision: the backward pass of convolutions in bf16 is far slower there.
         with torch.autocast("cpu", enabled=False) if noisy.device.type == "cpu" else nullcontext():
             if self.inpainting:
                 return self.unet(self.with_observed(noisy, condition), steps)
