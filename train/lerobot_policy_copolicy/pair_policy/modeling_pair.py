@@ -61,7 +61,7 @@ class PairPolicy(PreTrainedPolicy):
             logging.info("%s does not read %s", config.type, ", ".join(unused))
         generic: dict[str, Callable] = {"absolute": AbsoluteFeatures, "raw": RawFeatures}
         encoders = {**offered.encoders, **{name: partial(encoder, task.spec) for name, encoder in generic.items()}}
-        self.features = encoders[config.filled.observation_features](config.past_human_action)
+        self.features = encoders[config.filled.observation_features](config.filled.past_human_action)
         self.action_scale = ActionScale(task.spec)
 
     def update(self) -> None:
