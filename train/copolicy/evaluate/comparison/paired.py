@@ -1,6 +1,7 @@
 """Statistics of paired comparisons: differences of two methods on the same starts, intervals and tests."""
 
 import math
+import warnings
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -117,7 +118,11 @@ def welch(first: Sequence[float], second: Sequence[float]) -> dict[str, Any] | N
         return None
     if np.ptp(first) == np.ptp(second) == 0:
         return None
-    result = stats.ttest_ind(first, second, equal_var=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", RuntimeWarning
+        )  # scipy warns if one set has no spread, which Welch's test allows
+        result = stats.ttest_ind(first, second, equal_var=False)
     low, high = result.confidence_interval(0.95)  # pyright: ignore[reportAttributeAccessIssue]
     return {"interval_95": [float(low), float(high)], "p": float(result.pvalue)}  # pyright: ignore
 
