@@ -160,6 +160,10 @@ class PublishedMethod:
     mean: Mapping[str, tuple[int, int]]
     planning_ms: float | None = None
 
+    def is_of(self, config: Mapping[str, Any]) -> bool:
+        """Whether a policy with these settings is an implementation of the method."""
+        return all(config.get(setting) in values for setting, values in self.policies.items())
+
 
 class Studies:
     """The part `studies` of a task: its additions to study results.

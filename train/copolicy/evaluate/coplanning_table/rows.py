@@ -20,8 +20,8 @@ DEFINITIONS = {
     "episodes, sqrt(p (1 - p) / episodes), which does not cover the choice of the training seed",
     "time_s": "simulated time of successful episodes: mean over seeds of a seed's mean, ± standard error over seeds",
     "interaction": "mean over seeds of the mean over episodes, ± standard error over seeds",
-    "planning_ms": "wall time of one call of the policy, after the first, for all running episodes of the study at once; "
-    "tests/benchmarks/planning_methods.py measures one decision at a time",
+    "planning_ms": "wall time of one call of the policy, after the first, for all running episodes of the study at "
+    "once; tests/benchmarks/planning_methods.py measures one decision at a time",
     "parameters": "trained parameters of the policy",
     "samples": "training samples drawn: steps x batch size x processes",
     "difference": "the reference (first method) minus this method on the same maps, each map the mean over a method's "

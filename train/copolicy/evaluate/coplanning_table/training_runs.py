@@ -107,11 +107,7 @@ class TrainedMethod:
 
     def published(self, studies: Studies) -> PublishedMethod | None:
         """The published method that this one implements."""
-        config = self.runs[0].config
-        for method in studies.published:
-            if all(config.get(setting) in values for setting, values in method.policies.items()):
-                return method
-        return None
+        return next((method for method in studies.published if method.is_of(self.runs[0].config)), None)
 
 
 def read_trained_methods(texts: Sequence[str]) -> list[TrainedMethod]:
