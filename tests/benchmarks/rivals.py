@@ -84,11 +84,11 @@ ROWS: Mapping[str, Row] = {
     "cogail-scan": Row(
         preset="scan", policy="cogail", command="cogail", fps=_RIVALS_HZ, steps=6_000_000, batch=1, bf16=False
     ),
-    "diffusion": Row(_DIFFUSION, preset="", policy="diffusion", steps=6_000, batch=64, bf16=False),
-    "diffusion-scaled": Row((*_DIFFUSION, _SCALED), preset="", policy="diffusion", steps=6_000, batch=64, bf16=False),
-    "act": Row(_ACT, preset="", policy="act", steps=6_000, batch=64, bf16=False),
+    "diffusion": Row(_DIFFUSION, preset="", policy="diffusion", steps=3_600, batch=64, bf16=False),
+    "diffusion-scaled": Row((*_DIFFUSION, _SCALED), preset="", policy="diffusion", steps=3_600, batch=64, bf16=False),
+    "act": Row(_ACT, preset="", policy="act", steps=3_600, batch=64, bf16=False),
     "act-scaled": Row(
-        (*_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")), "", "pairs-sim-376", 6_000, 64, (), "act", bf16=False
+        (*_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")), "", "pairs-sim-376", 3_600, 64, (), "act", bf16=False
     ),
 }
 """The methods, each with its budget on a CPU."""
