@@ -10,8 +10,8 @@ from policy_runs import save_run
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 
-import rivals  # noqa: E402  # pyright: ignore[reportMissingImports]
-import training_study  # noqa: E402  # pyright: ignore[reportMissingImports]
+import rivals  # pyright: ignore[reportMissingImports]
+import training_study  # pyright: ignore[reportMissingImports]
 
 ROW = training_study.Row(policy="bc_lstm_gmm", preset="paper", steps=100, batch=8, bf16=False)
 

@@ -129,8 +129,9 @@ def made_policy(made: Made, folder: Path) -> Checkpoint:
     return Checkpoint(folder)
 
 
-def _statistics(low: np.ndarray, high: np.ndarray) -> dict[str, np.ndarray]:
-    return {"min": low, "max": high, "mean": (low + high) / 2, "std": high - low}
+def _statistics(low: np.ndarray, high: np.ndarray) -> dict[str, torch.Tensor]:
+    values = {"min": low, "max": high, "mean": (low + high) / 2, "std": high - low}
+    return {name: torch.from_numpy(value).float() for name, value in values.items()}
 
 
 def _observations(frames: int) -> dict[str, np.ndarray]:

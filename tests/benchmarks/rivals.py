@@ -57,6 +57,11 @@ def _vrnn(preset: str) -> Row:
     return Row(preset=preset, policy="vrnn", fps=_RIVALS_HZ, steps=10_000, batch=64, bf16=False)
 
 
+def _cogail(preset: str) -> Row:
+    """Its own command: a step is a frame in the world."""
+    return Row(preset=preset, policy="cogail", command="cogail", fps=_RIVALS_HZ, steps=6_000_000, batch=1, bf16=False)
+
+
 def _cnn(preset: str, steps: int = 5_000) -> Row:
     return Row(preset=preset, steps=steps, batch=256, bf16=False)
 
@@ -78,12 +83,9 @@ ROWS: Mapping[str, Row] = {
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
     "vrnn-scan": _vrnn("scan"),
-    "cogail": Row(
-        preset="paper", policy="cogail", command="cogail", fps=_RIVALS_HZ, steps=6_000_000, batch=1, bf16=False
-    ),
-    "cogail-scan": Row(
-        preset="scan", policy="cogail", command="cogail", fps=_RIVALS_HZ, steps=6_000_000, batch=1, bf16=False
-    ),
+    "cogail": _cogail("paper"),
+    "cogail-corrected": _cogail("corrected"),
+    "cogail-scan": _cogail("scan"),
     "diffusion": Row(_DIFFUSION, preset="", policy="diffusion", steps=3_600, batch=64, bf16=False),
     "diffusion-scaled": Row((*_DIFFUSION, _SCALED), preset="", policy="diffusion", steps=3_600, batch=64, bf16=False),
     "act": Row(_ACT, preset="", policy="act", steps=3_600, batch=64, bf16=False),

@@ -125,7 +125,7 @@ def _table(methods: "list[TrainedMethod]", results: list, task: PairTask, left_o
     counts = {name: results[0][0][name].result["settings"]["map_count"] for name in maps}
     map_sets = {name: results[0][0][name].result["settings"]["map_set"] for name in maps}
     settings |= {"map_sets": map_sets, "map_counts": counts}
-    settings["map_count_text"] = ", ".join(f"{count} maps of {name}" for name, count in counts.items())
+    settings["map_count_text"] = ", ".join(f"{name}: {count} maps" for name, count in counts.items())
     measured = all(run.measures_interaction for run in read[0][maps[0]])
     not_measured = {} if measured else {"interaction": task.missing("interaction measure")}
     force = task.studies.definitions.get("interaction_force")

@@ -53,7 +53,7 @@ def save_table_figure(table: Mapping[str, Any], path: Path) -> None:
     if published:
         mark = {"marker": "D", "linestyle": "", "markeredgecolor": VERMILION, "markersize": 5}
         handles += [
-            Line2D([], [], markerfacecolor=VERMILION, label="published mean (people's data)", **mark),
+            Line2D([], [], markerfacecolor=VERMILION, label="published mean", **mark),
             Line2D([], [], markerfacecolor="none", label="published best", **mark),
         ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)

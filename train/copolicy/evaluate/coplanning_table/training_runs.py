@@ -69,13 +69,16 @@ class TrainingRun:
         return cls(
             folder,
             checkpoint,
-            hashlib.sha256((checkpoint / "model.safetensors").read_bytes()).hexdigest(),
-            read_json(checkpoint / "config.json", dict[str, Any], "the configuration of a policy"),
-            training_conditions(checkpoint),
-            *(reached.get(name) for name in ("seed", "steps", "samples", "batch_size")),
-            (training or {}).get("steps"),
-            str(data.get("repo_id") or ""),
-            _seconds(folder),
+            weights=hashlib.sha256((checkpoint / "model.safetensors").read_bytes()).hexdigest(),
+            config=read_json(checkpoint / "config.json", dict[str, Any], "the configuration of a policy"),
+            conditions=training_conditions(checkpoint),
+            seed=reached.get("seed"),
+            steps=reached.get("steps"),
+            samples=reached.get("samples"),
+            batch_size=reached.get("batch_size"),
+            planned_steps=(training or {}).get("steps"),
+            data=str(data.get("repo_id") or ""),
+            seconds=_seconds(folder),
         )
 
     @property
