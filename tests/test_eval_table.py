@@ -270,9 +270,10 @@ def test_runs_of_one_method_differ_in_their_seed_alone(methods, tmp_path, capsys
     same = refused(weights=0)
     assert same.startswith(f"expected another training than {first}, found the same weights ")
     assert refused(reached=50) == f"expected steps 100, as {first}: {alone}, found 50"
-    assert refused(fps=30.0).startswith("expected f")
-    assert refused(preset="scan").endswith(alone + ", found scan") or "scan" in refused(preset="scan")
-    assert alone in refused(policy="copolicy")
+    assert refused(fps=30.0) == f"expected frames a second 10, as {first}: {alone}, found 30"
+    assert refused(preset="scan") == f"expected preset paper, as {first}: {alone}, found scan"
+    assert refused(policy="copolicy") == f"expected type bc_lstm_gmm, as {first}: {alone}, found copolicy"
+    assert refused(min_deviation=0.1) == f"expected min_deviation 0.0001, as {first}: {alone}, found 0.1"
 
 
 def test_names_outputs_and_rates(methods, tmp_path, capsys):

@@ -91,9 +91,10 @@ class TrainingRun:
     @property
     def method(self) -> dict[str, Any]:
         """What runs of one method have in common: everything but the seed."""
-        policy = {name: value for name, value in self.config.items() if name not in _PLACES}
+        first = {name: self.config.get(name) for name in ("type", "preset")}  # the first difference is reported
         shared = {"data set": self.data, "frames a second": self.conditions.fps, "batch_size": self.batch_size}
-        return {**policy, **shared, "steps": self.steps}
+        policy = {name: value for name, value in self.config.items() if name not in _PLACES}
+        return {**first, **shared, "steps": self.steps, **policy}
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def _default_name(run: TrainingRun) -> str:
 def _require_one_method(runs: Sequence[TrainingRun]) -> None:
     first = runs[0]
     for position, run in enumerate(runs[1:], 1):
-        for name in first.method.keys() | run.method.keys():
+        for name in {**first.method, **run.method}:
             expected, actual = first.method.get(name), run.method.get(name)
             if expected != actual:
                 raise FileFormatError(
