@@ -141,16 +141,44 @@ class SceneView(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class PublishedMethod:
+    """Published results of a method in the co-planning study of a task.
+
+    Attributes:
+        name: name in the publication.
+        policies: values by which the configuration of a policy is recognised as this method: any of the values, for
+            each setting.
+        best: successes and episodes of the best training seed, by scenario set.
+        mean: successes and episodes of all training seeds, by scenario set.
+        planning_ms: mean time of one decision, ms; None if it was not published.
+    """
+
+    name: str
+    policies: Mapping[str, tuple[Any, ...]]
+    best: Mapping[str, tuple[int, int]]
+    mean: Mapping[str, tuple[int, int]]
+    planning_ms: float | None = None
+
+    def is_of(self, config: Mapping[str, Any]) -> bool:
+        """Whether a policy with these settings is an implementation of the method."""
+        return all(config.get(setting) in values for setting, values in self.policies.items())
+
+
 class Studies:
     """The part `studies` of a task: its additions to study results.
 
     Attributes:
         step_limit: steps after which an episode of a study ends; None for the limit in the settings.
         definitions: definitions of measures for this task, by their names in results.
+        published: published results of the co-planning study, for comparison, in the order of the publication.
+        published_source: source of `published` and how it was measured.
     """
 
     step_limit: int | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
+    published: tuple[PublishedMethod, ...] = ()
+    published_source: str = ""
 
     def factors(self, scenario: Any) -> dict[str, Any]:
         """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""

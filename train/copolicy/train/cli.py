@@ -15,7 +15,7 @@ from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
 from copolicy.dataset.files.local_path import require_repo_id, similar_path
-from copolicy.dataset.files.staging import disk_error_number, named_errors
+from copolicy.dataset.files.staging import disk_error_number, error_chain, named_errors
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
@@ -25,6 +25,8 @@ from .settings_check import require_usable_numbers
 _PROG = "copolicy-train"
 # draccus puts this before the reason if a section of the configuration is optional.
 _UNDECODED = "Could not decode the value into any of the given types:"
+# draccus says this without the reason if the settings of a policy contradict each other.
+_NOT_MADE = "Couldn't instantiate class"
 _SETTINGS = "train_config.json"
 _HELP = """\
 usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
@@ -208,8 +210,10 @@ def _parse():
     try:
         with contextlib.redirect_stderr(printed):
             return parsed()
-    except SystemExit:
+    except SystemExit as exit:
         problem = " ".join(printed.getvalue().rpartition("error: ")[2].split())
+        if _NOT_MADE in problem:
+            problem += f" {_one_line(list(error_chain(exit))[-1])}"
         raise CopolicyError(problem.replace(f"{_UNDECODED} ", "") or "unreadable flags (see --help)") from None
     except CopolicyError:
         raise
