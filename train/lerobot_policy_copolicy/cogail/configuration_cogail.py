@@ -23,7 +23,6 @@ _PAPER: dict[str, Any] = {
     "bounded_actions": False,
     "start_frames": "first",
     "initial_deviation": 1.0,
-    "n_updates_discriminator_only": 0,
 }
 _CORRECTED: dict[str, Any] = {
     **_PAPER,
@@ -68,7 +67,7 @@ class CoGailConfig(PairPolicyConfig):
     bounds: ClassVar = {
         **dict.fromkeys(("history", "width", "n_worlds", "frames_per_update", "n_epochs", "n_minibatches"), Bounds(1)),
         **dict.fromkeys(("expert_batch_size", "discriminator_passes", "first_discriminator_passes"), Bounds(1)),
-        **dict.fromkeys(("pretrain_epochs", "n_first_updates", "n_updates_discriminator_only"), Bounds(0)),
+        **dict.fromkeys(("pretrain_epochs", "n_first_updates"), Bounds(0)),
         **dict.fromkeys(("value_weight", "entropy_weight", "code_weight", "inverse_weight"), Bounds(0)),
         **dict.fromkeys(("gradient_penalty", "optimizer_grad_clip_norm"), Bounds(0)),
         **dict.fromkeys(("optimizer_lr", "optimizer_eps", "discriminator_lr", "clip", "initial_deviation"), POSITIVE),
@@ -107,7 +106,6 @@ class CoGailConfig(PairPolicyConfig):
     discriminator_passes: int = 5  # passes of the discriminator over the frames of an update
     first_discriminator_passes: int = 50  # the same in the first `n_first_updates` updates
     n_first_updates: int = 10  # updates with `first_discriminator_passes`
-    n_updates_discriminator_only: int | None = None  # first updates that train only discriminator and value
     gradient_penalty: float = 10.0  # weight of the discriminator's gradient penalty
     bounded_actions: bool | None = None  # the discriminator sees actions clipped to their bounds, as the world does
 

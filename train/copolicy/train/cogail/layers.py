@@ -74,7 +74,7 @@ class Dense:
             values = activations[-1] @ weight.T
             values += bias
             if kind is nn.Tanh:
-                np.tanh(values, out=values)
+                _tanh(values)
             elif kind is nn.ReLU:
                 np.maximum(values, 0, out=values)
             activations.append(values)
@@ -141,6 +141,16 @@ class Adam:
         for moment, values in zip(self._moments, state["moments"], strict=True):
             moment[:] = values.numpy()
         self._steps = int(state["steps"])
+
+
+def _tanh(values: Array) -> None:
+    """Hyperbolic tangent in place, to 2e-7: numpy's own takes twice as long where it has no vector instructions."""
+    np.clip(values, -10, 10, out=values)
+    values *= 2
+    np.exp(values, out=values)
+    values += 1
+    np.divide(-2, values, out=values)
+    values += 1
 
 
 def joined(*parts: Array) -> Array:

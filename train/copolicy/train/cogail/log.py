@@ -77,7 +77,8 @@ def _draw_ends(axes: Any, rows: Sequence[Mapping[str, Any]], steps: Sequence[flo
         ]
         axes.plot(steps, _averaged(counts), label=reason.replace("_", " "))
     axes.set_title("ends of training episodes, %", fontsize=10)
-    axes.legend(fontsize=8, frameon=False)
+    if reasons:
+        axes.legend(fontsize=8, frameon=False)
 
 
 def _averaged(values: Sequence[float]) -> list[float]:
