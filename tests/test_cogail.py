@@ -52,6 +52,7 @@ def test_the_defaults_are_the_published_ones():
     settings = config()
     assert (settings.preset, settings.history, settings.width, settings.code) == ("paper", 15, 64, "drawn")
     assert (settings.input_range, settings.history_start, settings.bounded_actions) == ("unit", "zeros", False)
+    assert (settings.reward, settings.after_success, settings.start_frames) == ("logit", "zero", "first")
     assert (settings.gamma, settings.gae_lambda, settings.clip) == (0.99, 0.95, 0.2)
     assert (settings.n_epochs, settings.n_minibatches, settings.frames_per_update) == (10, 32, 6000)
     assert (settings.optimizer_lr, settings.optimizer_grad_clip_norm, settings.discriminator_lr) == (3e-4, 0.5, 1e-3)

@@ -82,6 +82,8 @@ def test_the_discriminator_learns_to_tell_frames_apart():
     assert after["expert_accuracy"] > 0.98
     assert after["policy_accuracy"] > 0.98
     assert adversary.reward(frames(50, 1.0)).min() > 0 > adversary.reward(policy).max()
+    positive = Adversary(adversary.discriminator, 1e-3, 10.0, 64, reward="positive")
+    np.testing.assert_allclose(positive.reward(policy), np.log1p(np.exp(adversary.reward(policy))), rtol=1e-4)
 
 
 def minibatch(reference: CoGailNetwork, settings: CoGailConfig, size: int = 40) -> tuple[Minibatch, torch.Tensor]:

@@ -23,6 +23,8 @@ _PAPER: dict[str, Any] = {
     "bounded_actions": False,
     "start_frames": "first",
     "initial_deviation": 1.0,
+    "reward": "logit",
+    "after_success": "zero",
 }
 _CORRECTED: dict[str, Any] = {
     **_PAPER,
@@ -32,6 +34,8 @@ _CORRECTED: dict[str, Any] = {
     "bounded_actions": True,
     "start_frames": "any",
     "initial_deviation": 0.3,
+    "reward": "positive",
+    "after_success": "demonstrated",
 }
 
 
@@ -42,8 +46,13 @@ class CoGailConfig(PairPolicyConfig):
 
     Presets: "paper" is Co-GAIL as the co-policy paper evaluated it; "corrected" scales to [-1, 1], starts the history
     with the first frame, keeps one code an episode, shows the discriminator the actions that the world executes,
-    starts training episodes at any frame of the demonstrations, and explores less; "scan" is "corrected" with the range
-    scan and the symmetries of the co-policy.
+    starts training episodes at any frame of the demonstrations, explores less, and changes the reward; "scan" is
+    "corrected" with the range scan and the symmetries of the co-policy.
+
+    The published reward, the logit, is negative for most of the policy's frames, since the discriminator recognises
+    them; then every end is a gain, also a collision (Kostrikov et al., ICLR 2019, on this bias). "corrected" rewards
+    every frame with a positive number and values a success as if demonstrated frames followed forever, so that only
+    other ends are a loss.
 
     The code in execution (`code`): "drawn" at every frame around one point of the grid of training codes, as the
     co-policy paper evaluated; "inferred" from the partner's last action by the inverse model, as the original Co-GAIL
@@ -62,6 +71,8 @@ class CoGailConfig(PairPolicyConfig):
         "history_start": ("zeros", "first"),
         "code": ("drawn", "inferred", "episode"),
         "start_frames": ("first", "any"),
+        "reward": ("logit", "positive"),
+        "after_success": ("zero", "demonstrated"),
     }
     n_action_steps: ClassVar[int] = 1  # it acts frame by frame
     bounds: ClassVar = {
@@ -107,6 +118,8 @@ class CoGailConfig(PairPolicyConfig):
     first_discriminator_passes: int = 50  # the same in the first `n_first_updates` updates
     n_first_updates: int = 10  # updates with `first_discriminator_passes`
     gradient_penalty: float = 10.0  # weight of the discriminator's gradient penalty
+    reward: str | None = None  # "logit": log D - log(1 - D); "positive": -log(1 - D), so that ending early is no gain
+    after_success: str | None = None  # value after a success: "zero", or the mean reward that is "demonstrated" forever
     bounded_actions: bool | None = None  # the discriminator sees actions clipped to their bounds, as the world does
 
     @property

@@ -19,17 +19,18 @@ class Adversary:
     """A discriminator with its optimizer.
 
     The loss is binary cross-entropy with demonstrated frames as ones, and a gradient penalty at random points between
-    demonstrated and policy frames (Gulrajani et al., 2017). The reward is log D - log(1 - D), the logit.
+    demonstrated and policy frames (Gulrajani et al., 2017). The reward is log D - log(1 - D), the logit, or
+    -log(1 - D), which is positive.
 
     Attributes:
         discriminator: the network, whose weights training changes in place.
     """
 
-    def __init__(self, discriminator: Discriminator, lr: float, penalty: float, batch_size: int):
+    def __init__(self, discriminator: Discriminator, lr: float, penalty: float, batch_size: int, reward: str = "logit"):
         self.discriminator = discriminator
         self._flat = Flat(discriminator)
         self._network, self._optimizer = Dense(discriminator.network, self._flat), Adam(self._flat, lr)
-        self._penalty, self._batch_size = penalty, batch_size
+        self._penalty, self._batch_size, self._positive = penalty, batch_size, reward == "positive"
 
     def train(self, frames: Array, sample: Sample, passes: int) -> dict[str, float]:
         """Trains for a number of passes over the policy's frames.
@@ -106,7 +107,8 @@ class Adversary:
 
     def reward(self, frames: Array) -> Array:
         """Rewards `(N,)` of frames `(N, size + 2 m)`."""
-        return self._network.forward(frames).output[:, 0]
+        logits = self._network.forward(frames).output[:, 0]
+        return np.logaddexp(0, logits) if self._positive else logits
 
     def state(self) -> dict[str, Any]:
         """Everything that a resumed training needs."""

@@ -26,7 +26,7 @@ class PolicyFrames:
         values: `(T, W)` of the frames.
         next_values: `(T, W)` of the frames that follow in the episode: at a truncation that of the last state, at any
             other end zero.
-        ended: `(T, W)` whether the episode ended in the frame.
+        ended, succeeded: `(T, W)` whether the episode ended in the frame, and in success.
     """
 
     inputs: Array
@@ -36,6 +36,7 @@ class PolicyFrames:
     values: Array
     next_values: Array
     ended: Array
+    succeeded: Array
 
 
 def collect(
@@ -63,7 +64,8 @@ def collect(
         if step.truncated.any():
             final = encode(step.final_histories, step.final_scenarios).numpy()
             next_values[step.truncated] = learner.means_and_values(final, step.final_codes.numpy())[1]
-        row = inputs, codes, actions, learner.log_probabilities(actions, means), values, next_values, step.ended
+        acted = inputs, codes, actions, learner.log_probabilities(actions, means)
+        row = *acted, values, next_values, step.ended, step.succeeded
         for name, of_frame in zip(rows, row, strict=True):
             rows[name].append(of_frame)
         inputs, codes = encode(worlds.histories, worlds.scenarios).numpy(), worlds.codes.numpy().copy()

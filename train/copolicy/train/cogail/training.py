@@ -31,6 +31,8 @@ from .rollout import PolicyFrames, RewardScale, advantages, collect
 from .training_state import read_checkpoint, write_checkpoint
 from .worlds import RestartingWorlds
 
+_REWARD_SAMPLE = 2048  # demonstrated frames whose rewards are averaged
+
 
 def train_cogail(config: TrainPipelineConfig) -> None:
     """Trains Co-GAIL in the world of the task, or continues a run from its newest checkpoint.
@@ -91,7 +93,11 @@ class CoGailTraining:
         self._learner = Learner(policy.network, settings)
         discriminator = Discriminator(policy.inputs.size, len(policy.network.log_deviation), settings.width)
         self._adversary = Adversary(
-            discriminator, settings.discriminator_lr, settings.gradient_penalty, settings.expert_batch_size
+            discriminator,
+            settings.discriminator_lr,
+            settings.gradient_penalty,
+            settings.expert_batch_size,
+            policy.config.filled.reward,
         )
         self._scale = RewardScale(settings.n_worlds, settings.gamma)
 
@@ -159,9 +165,12 @@ class CoGailTraining:
     def _with_advantages(self, frames: PolicyFrames, rewards: Array) -> Minibatch:
         settings = self.settings
         scaled = self._scale.scaled(rewards, frames.ended)
-        estimates = advantages(
-            scaled, frames.values, frames.next_values, frames.ended, settings.gamma, settings.gae_lambda
-        )
+        next_values = frames.next_values
+        if settings.after_success == "demonstrated":
+            demonstrated = self._adversary.reward(joined(*self._expert.sample(_REWARD_SAMPLE))).mean()
+            following = demonstrated / self._scale.deviation / (1 - settings.gamma)
+            next_values = np.where(frames.succeeded, following, next_values).astype(np.float32)
+        estimates = advantages(scaled, frames.values, next_values, frames.ended, settings.gamma, settings.gae_lambda)
         normal = (estimates - estimates.mean()) / (estimates.std() + 1e-5)
         parts = frames.inputs, frames.codes, frames.actions
         numbers = frames.log_probabilities, frames.values, estimates + frames.values, normal

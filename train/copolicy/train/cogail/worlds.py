@@ -23,11 +23,13 @@ class Step(NamedTuple):
     Attributes:
         ended: `(W,)` the episode ended in this frame, and the world was restarted.
         truncated: `(W,)` it ended at the step limit.
+        succeeded: `(W,)` it ended in success.
         final_histories, final_scenarios, final_codes: of the truncated worlds, at their end.
     """
 
     ended: Array
     truncated: Array
+    succeeded: Array
     final_histories: Tensor
     final_scenarios: Tensor
     final_codes: Tensor
@@ -71,20 +73,21 @@ class RestartingWorlds:
 
     def step(self, actions: Array) -> Step:
         """Executes joint actions `(W, 2 m)` in the task's units, within their bounds, for one frame."""
-        ended, truncated = np.zeros(len(actions), bool), np.zeros(len(actions), bool)
+        ended, truncated, succeeded = np.zeros((3, len(actions)), bool)
         states = np.empty((len(actions), self.histories.shape[2]), np.float32)
         for index, (world, action) in enumerate(zip(self._worlds, actions, strict=True)):
             for _ in range(self._stride):
                 outcome = world.step(action)
                 if outcome.done:
-                    ended[index], truncated[index] = True, outcome.reason == TIMEOUT
+                    ended[index], succeeded[index] = True, outcome.success
+                    truncated[index] = outcome.reason == TIMEOUT
                     self.reasons[outcome.reason] += 1
                     break
             states[index] = world.observation
         self._frames += 1
         self.histories = next_history(self.histories, torch.from_numpy(states))
         final = torch.from_numpy(truncated)
-        step = Step(ended, truncated, self.histories[final], self.scenarios[final], self.codes[final])
+        step = Step(ended, truncated, succeeded, self.histories[final], self.scenarios[final], self.codes[final])
         for index in np.flatnonzero(ended).tolist():
             self._lengths.append(int(self._frames[index]))
             self._worlds[index] = self._restarted(index)
