@@ -239,20 +239,15 @@ def test_it_acts_frame_by_frame_at_either_seat(run, seat):
     assert np.isfinite(rollout.actions).all()
 
 
-def test_the_code_can_be_inferred_by_a_trained_policy(run):
-    task, inferring = get_task(), load_policy(run, settings={"code": "inferred"})
-    agents = PolicyAgent(inferring, task, seed=3), PolicyAgent(load_policy(run), task, seed=4)
-    rollout = Rollout(task, task.scenario_sets["unseen"][:2], agents, settings=task.settings_type(step_limit=12))
-    rollout.run()
-    assert agents[0].chunks.tolist() == [4, 4]
-
-
 def test_it_is_evaluated_and_described(run, tmp_path):
     out = tmp_path / "eval.json"
     flags = ["--maps", "training", "--limit", "1", "--step-limit", "60", "--out", str(out)]
     assert evaluate(["coplan", "--policy", str(run), *flags]) == 0
     result = json.loads(out.read_text(encoding="utf-8"))
-    assert result["policy"]["type"] == "cogail"
+    assert (result["policy"]["type"], result["policy"]["code"]) == ("cogail", "drawn")
+    inferred = tmp_path / "inferred.json"
+    assert evaluate(["coplan", "--policy", str(run), *flags[:-1], str(inferred), "--code", "inferred"]) == 0
+    assert json.loads(inferred.read_text(encoding="utf-8"))["policy"]["code"] == "inferred"
     assert result["settings"]["actions_per_plan"] == 1
     assert train(["export", str(run), "--out", str(tmp_path / "exported"), "--eval", str(out)]) == 0
     recipe = json.loads((tmp_path / "exported" / "recipe.json").read_text(encoding="utf-8"))

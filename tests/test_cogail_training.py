@@ -24,11 +24,12 @@ from lerobot_policy_copolicy.cogail.configuration_cogail import CoGailConfig
 from lerobot_policy_copolicy.cogail.inputs import HistoryInputs
 from lerobot_policy_copolicy.cogail.network import CoGailNetwork, Discriminator
 
-FLOAT32 = {"rtol": 2e-4, "atol": 2e-5}
 
-
-def gradient(module: torch.nn.Module) -> np.ndarray:
-    return np.concatenate([parameter.grad.flatten().numpy() for parameter in module.parameters()])
+def assert_gradient(ours: np.ndarray, module: torch.nn.Module) -> None:
+    """That of autograd, up to rounding of float32."""
+    gradients = [parameter.grad for parameter in module.parameters()]
+    expected = np.concatenate([gradient.flatten().numpy() for gradient in gradients if gradient is not None])
+    np.testing.assert_allclose(ours, expected, rtol=2e-4, atol=2e-5)
 
 
 def test_the_gradient_of_the_discriminator_is_that_of_autograd():
@@ -44,18 +45,17 @@ def test_the_gradient_of_the_discriminator_is_that_of_autograd():
     (expected + 10 * expected_penalty).backward()
     assert cross_entropy == pytest.approx(expected.item(), rel=1e-5)
     assert penalty == pytest.approx(expected_penalty.item(), rel=1e-5)
-    np.testing.assert_allclose(adversary._flat.gradient, gradient(reference), **FLOAT32)
+    assert_gradient(adversary._flat.gradient, reference)
 
 
 def test_a_discriminator_of_unit_slope_has_no_penalty():
     network = Discriminator(1, 1, width=2)
+    weights = [torch.zeros(parameter.shape) for parameter in network.parameters()]
+    # Near zero tanh is the identity: the logit is 0.6 x + 0.8 y.
+    weights[0][0], weights[2][0, 0], weights[4][0, 0] = 1e-3 * torch.tensor([0.6, 0.8]), 1.0, 1e3
     with torch.no_grad():
-        for parameter in network.parameters():
-            parameter.zero_()
-        # Near zero tanh is the identity: the logit is 0.6 x + 0.8 y.
-        network.network[0].weight.copy_(1e-3 * torch.tensor([[0.6, 0.8], [0.0, 0.0]]))
-        network.network[2].weight[0, 0] = 1.0
-        network.network[4].weight[0, 0] = 1e3
+        for parameter, values in zip(network.parameters(), weights, strict=True):
+            parameter.copy_(values)
     adversary = Adversary(network, 1e-3, penalty=10.0, batch_size=4)
     frames = np.random.default_rng(0).uniform(-1, 1, (4, 2)).astype(np.float32)
     assert adversary.add_gradient(frames, frames, frames)[1] < 1e-9
@@ -123,7 +123,7 @@ def test_the_gradient_of_the_policy_is_that_of_autograd():
     (loss + settings.inverse_weight * inverse).backward()
     terms = learner.add_gradient(own, inputs.numpy(), actions.numpy())
     assert terms[-1] == pytest.approx(inverse.item(), rel=1e-5)
-    np.testing.assert_allclose(learner.flat.gradient, gradient(reference), **FLOAT32)
+    assert_gradient(learner.flat.gradient, reference)
 
 
 def test_the_losses_of_the_code_ignore_the_robots_half():
@@ -234,6 +234,20 @@ def test_worlds_restart_with_the_codes_of_the_grid_in_turn(start_frames):
     assert (dict(reasons), length) == ({"timeout": 30}, 3.0)
     moved = worlds.histories[:, -1, 0] != task.scenario_sets["training"][0].start[0]
     assert bool(moved.any()) == (start_frames == "any")
+
+
+def test_a_success_is_told_from_other_ends():
+    torch.manual_seed(0)
+    task = get_task()
+    worlds = RestartingWorlds(demonstrations(task), 2, task.settings_type(), 10, "first")
+    goal, centre = worlds.scenarios[0, 3:5].tolist(), worlds.scenarios[1, 5:7].tolist()
+    worlds._worlds[0].restore((*goal, 0.0, 0.0, 0.0, 0.0))
+    worlds._worlds[1].restore((*centre, 0.0, 0.0, 0.0, 0.0))  # on its obstacle
+    step = worlds.step(np.zeros((2, 4)))
+    assert step.ended.tolist() == [True, True]
+    assert step.succeeded.tolist() == [True, False]
+    assert not step.truncated.any()
+    assert worlds.take_episodes()[0] == {"goal": 1, "collision_obstacle": 1}
 
 
 def test_worlds_continue_from_their_state():

@@ -9,11 +9,11 @@ CODE_SIZE = 2
 """Values of a code."""
 
 
-def tanh_network(input_size: int, width: int, output_size: int) -> nn.Sequential:
-    """Two hidden layers with tanh; weights are orthogonal with gain sqrt(2), those of the output with gain 1."""
+def tanh_network(input_size: int, width: int, output_size: int, gain: float) -> nn.Sequential:
+    """Two hidden layers with tanh; weights are orthogonal with gain sqrt(2), those of the output with `gain`."""
     layers = (nn.Linear(input_size, width), nn.Linear(width, width), nn.Linear(width, output_size))
-    for layer, gain in zip(layers, (math.sqrt(2), math.sqrt(2), 1.0), strict=True):
-        nn.init.orthogonal_(layer.weight, gain)
+    for layer, layer_gain in zip(layers, (math.sqrt(2), math.sqrt(2), gain), strict=True):
+        nn.init.orthogonal_(layer.weight, layer_gain)
         nn.init.zeros_(layer.bias)
     return nn.Sequential(layers[0], nn.Tanh(), layers[1], nn.Tanh(), layers[2])
 
@@ -33,9 +33,9 @@ class CoGailNetwork(nn.Module):
     def __init__(self, input_size: int, action_size: int, width: int = 64, deviation: float = 1.0):
         super().__init__()
         self.partner = slice(action_size // 2, action_size)
-        self.actor = tanh_network(input_size + CODE_SIZE, width, action_size)
+        self.actor = tanh_network(input_size + CODE_SIZE, width, action_size, gain=1.0)
         self.log_deviation = nn.Parameter(torch.full((action_size,), math.log(deviation)))
-        self.critic = tanh_network(input_size + CODE_SIZE, width, 1)
+        self.critic = tanh_network(input_size + CODE_SIZE, width, 1, gain=math.sqrt(2))
         self.inverse = nn.Sequential(
             nn.Linear(input_size + action_size // 2, width), nn.ReLU(), nn.Linear(width, CODE_SIZE), nn.Tanh()
         )
@@ -72,15 +72,3 @@ class Discriminator(nn.Module):
     def forward(self, frames: Tensor) -> Tensor:
         """Logits `(B,)` of frames `(B, size + 2 m)`: an encoded observation and a joint action."""
         return self.network(frames)[:, 0]
-
-    def logits_and_slopes(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits `(B,)` and the norms `(B,)` of their gradients with respect to the frames.
-
-        The gradient is computed by the chain rule, so that one pass of autograd differentiates it.
-        """
-        first, _, second, _, last = self.network
-        hidden = torch.tanh(first(frames))
-        deeper = torch.tanh(second(hidden))
-        slopes = ((1 - deeper * deeper) * last.weight[0]) @ second.weight
-        slopes = ((1 - hidden * hidden) * slopes) @ first.weight
-        return last(deeper)[:, 0], torch.linalg.vector_norm(slopes, dim=1)

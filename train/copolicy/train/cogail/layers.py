@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from copolicy.dataset.arrays import Array
 
@@ -38,7 +38,7 @@ class Flat:
             self._views[id(parameter)] = value, gradient
             start = part.stop
 
-    def of(self, parameter: nn.Parameter) -> tuple[Array, Array]:
+    def of(self, parameter: Tensor) -> tuple[Array, Array]:
         """A parameter's values and gradient, as views."""
         return self._views[id(parameter)]
 
