@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
 POLICY_HELP = "folder of a training run or a checkpoint, or pretrained (the model in the package)"
-_POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
+_POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend", "code")
 
 
 def figure_beside(result: Path) -> Path:
@@ -51,6 +51,8 @@ def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) ->
     add_whole_number(command, "--num-inference-steps", steps, None, 1, 1000)
     scale, noise = number("--initial-noise-scale", 0, 10), "scale of the initial noise (default: the checkpoint's)"
     command.add_argument("--initial-noise-scale", type=scale, help=noise)
+    codes = ("drawn", "inferred", "episode")
+    command.add_argument("--code", choices=codes, help="how cogail gets its code (default: the checkpoint's)")
     add_world_flags(command, n_action_steps)
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 

@@ -30,6 +30,7 @@ _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
     "preset", "past_human_action", "network", "inpainting", "prediction_type", "observation_features", "sampler",
     "num_inference_steps", "timestep_spacing", "planner", "backend", "initial_noise_scale", "horizon", "n_obs_steps",
+    "code",
 )  # fmt: skip
 _LOCK = threading.Lock()  # policies draw from torch's global generator, whose state each call sets
 

@@ -33,6 +33,7 @@ class PairPolicy(PreTrainedPolicy):
     Attributes:
         features: encodes observation columns `(..., n)` into network inputs `(..., features.size)`.
         action_scale: scales joint actions to [-1, 1] and back.
+        symmetries: functions that augment training samples, see `PolicyFeatures`.
     """
 
     config_class = PairPolicyConfig  # pyright: ignore[reportAssignmentType]
@@ -50,7 +51,7 @@ class PairPolicy(PreTrainedPolicy):
         task = get_task(config.filled.task)
         self._sizes = {name: column["shape"][0] for name, column in features_of(task.spec).items()}
         offered = task.features
-        self._symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
+        self.symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
         # Excluded episodes, to be refused in a batch if the constructor cannot find out the episodes of the training.
         self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
         require_same_rate(config)
@@ -103,7 +104,7 @@ class PairPolicy(PreTrainedPolicy):
             self._require_no_excluded(batch)
         sample = self._observation(batch, frames)
         sample[ACTION] = self._column(batch, ACTION, actions)
-        for augment in self._symmetries if self.training else ():
+        for augment in self.symmetries if self.training else ():
             sample = augment(sample)
         return sample
 

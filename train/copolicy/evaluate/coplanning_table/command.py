@@ -67,7 +67,7 @@ def add_table_command(commands: Commands) -> None:
     command.add_argument("--device", default="cpu", help="default: cpu")
     add_world_flags(command, n_action_steps=8)
     # Each method is evaluated with the inference settings of its checkpoints.
-    command.set_defaults(sampler=None, backend=None, num_inference_steps=None, initial_noise_scale=None)
+    command.set_defaults(sampler=None, backend=None, num_inference_steps=None, initial_noise_scale=None, code=None)
 
 
 def _coplanning(arguments: argparse.Namespace) -> dict[str, Any]:
