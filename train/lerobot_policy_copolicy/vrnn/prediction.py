@@ -1,0 +1,75 @@
+"""Runs the network over rows of motion: on observed rows with the encoder, and beyond them with the prior."""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from .motion_rows import MOTION, MotionRows
+from .network import MotionNetwork, Normals
+
+
+class Encoded(NamedTuple):
+    """Results on T observed rows: predictions `(B, T, p)`, distributions, and the recurrent state after them."""
+
+    predicted: Tensor
+    posterior: Normals
+    prior: Normals
+    state: list[Tensor]
+
+
+def encode(network: MotionNetwork, rows: Tensor) -> Encoded:
+    """Runs over observed rows `(B, T, n)`, T >= 1; latent variables are drawn from the encoder."""
+    embedded = network.embed_row(rows).unbind(1)
+    noise = torch.randn(len(embedded), len(rows), network.latent, dtype=rows.dtype, device=rows.device)
+    state = network.initial_state(len(rows), rows)
+    posteriors, latents, tops = [], [], []
+    for row, row_noise in zip(embedded, noise, strict=True):
+        tops.append(state[-1])
+        posterior = network.posterior(row, state[-1])
+        posteriors.append(posterior)
+        latents.append(network.embed_latent(posterior.sample(row_noise)))
+        state = network.advance(row, latents[-1], state)
+    # What the recurrence does not need is computed at once.
+    top = torch.stack(tops, dim=1)  # (B, T, width)
+    means, log_variances = (torch.stack(values, dim=1) for values in zip(*posteriors, strict=True))
+    predicted = network.decode(torch.stack(latents, dim=1), top)
+    return Encoded(predicted, Normals(means, log_variances), network.prior(top), state)
+
+
+class FreeRun(NamedTuple):
+    """Results of T predicted rows: predictions `(B, T, p)`, and the poses that they integrate to, `(B, T, 4)`."""
+
+    predicted: Tensor
+    poses: Tensor
+
+
+def free_run(
+    network: MotionNetwork, motion_rows: MotionRows, state: list[Tensor], pose: Tensor, scenarios: Tensor, steps: int
+) -> FreeRun:
+    """Predicts rows beyond the observed ones; latent variables are drawn from the prior.
+
+    If the network predicts the displacement alone, the surroundings are those of the integrated pose, else the
+    predicted row is the next input as it is.
+
+    Args:
+        state: recurrent state after the last observed row.
+        pose: `(B, 4)` last observed pose.
+        scenarios: `(B, k)` scenario vectors.
+        steps: rows to predict, T >= 1.
+    """
+    noise = torch.randn(steps, len(pose), network.latent, dtype=pose.dtype, device=pose.device)
+    predictions, poses = [], []
+    for row_noise in noise:
+        latent = network.embed_latent(network.prior(state[-1]).sample(row_noise))
+        predicted = network.decode(latent, state[-1])
+        before, pose = pose, motion_rows.moved(pose, predicted[:, :MOTION])
+        predictions.append(predicted)
+        poses.append(pose)
+        if len(poses) == steps:
+            break
+        row = predicted
+        if predicted.shape[1] == MOTION:
+            row = torch.cat((predicted, motion_rows.surroundings(before, pose, scenarios)), dim=-1)
+        state = network.advance(network.embed_row(row), latent, state)
+    return FreeRun(torch.stack(predictions, dim=1), torch.stack(poses, dim=1))

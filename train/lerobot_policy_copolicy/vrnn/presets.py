@@ -1,0 +1,55 @@
+"""Named sets of settings of the VRNN planner."""
+
+from typing import Any
+
+_DEFAULT: dict[str, Any] = {
+    "observation_features": "points",
+    "mirror": False,
+    "permute_obstacles": False,
+    "stride": 5,
+    "encoded_frames": 30,
+    "plan_frames": 90,
+    "lookahead_frames": 30,
+    "motion_axes": "body",
+    "scaled_rows": True,
+    "heading_on_circle": True,
+    "predicted": "motion",
+    "loss_balance": "frame",
+    "zero_history": False,
+    "repeat_last_obstacle": False,
+    "controller": "velocity",
+    "unit_force": False,
+    "wrapped_angle": True,
+    "optimizer_weight_decay": 1e-6,
+    "optimizer_grad_clip_norm": 1.0,
+}
+
+_SCAN: dict[str, Any] = {
+    **_DEFAULT,
+    "observation_features": "scan",
+    "mirror": True,
+    "permute_obstacles": True,
+    "motion_axes": "scene",  # those of the scan
+}
+
+# The planner of the co-policy paper (2023): published settings, and the defects that shaped its behaviour.
+_PAPER: dict[str, Any] = {
+    **_DEFAULT,
+    "stride": 1,
+    "plan_frames": 130,
+    "lookahead_frames": 120,
+    "motion_axes": "scene",
+    "scaled_rows": False,
+    "heading_on_circle": False,
+    "predicted": "row",
+    "loss_balance": "published",
+    "zero_history": True,
+    "repeat_last_obstacle": True,
+    "controller": "proportional",
+    "unit_force": True,
+    "wrapped_angle": False,
+    "optimizer_weight_decay": 0.2,
+    "optimizer_grad_clip_norm": 0.0,
+}
+
+PRESETS: dict[str, dict[str, Any]] = {"default": _DEFAULT, "scan": _SCAN, "paper": _PAPER}
