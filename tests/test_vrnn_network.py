@@ -231,3 +231,31 @@ def test_the_features_in_execution_have_the_published_defects():
     expected = torch.tensor([(5 - 100) / 8, (7 - 200) / 8, 1.0, 0, 1.0, 0, 1.0, 0])
     torch.testing.assert_close(features(observation)[0], expected)
     torch.testing.assert_close(features.train()(observation), correct)  # not in training
+
+
+@pytest.mark.parametrize("n_layers", [1, 2, 3])
+def test_the_recurrence_and_its_gradients_are_those_of_the_layers(n_layers):
+    torch.manual_seed(0)
+    network = MotionNetwork(12, 4, latent=3, width=8, n_layers=n_layers).double()
+    rows = torch.randn(5, 7, 12, dtype=torch.float64)
+    torch.manual_seed(1)
+    encoded = encode(network, rows)
+    torch.manual_seed(1)
+    noise = torch.randn(7, 5, 3, dtype=torch.float64)
+    state = network.initial_state(5, rows)
+    predicted, divergence = [], torch.zeros((), dtype=torch.float64)
+    for row, row_noise in zip(network.embed_row(rows).unbind(1), noise, strict=True):
+        posterior, prior = network.posterior(row, state[-1]), network.prior(state[-1])
+        latent = network.embed_latent(posterior.sample(row_noise))
+        predicted.append(network.decode(latent, state[-1]))
+        divergence = divergence + posterior.divergence(prior).sum()
+        state = network.advance(row, latent, state)
+    expected = torch.stack(predicted, dim=1)
+    torch.testing.assert_close(encoded.predicted, expected)
+    torch.testing.assert_close(torch.stack(encoded.state), torch.stack(state))
+    parameters = list(network.parameters())
+    reference = torch.autograd.grad(expected.square().sum() + divergence + state[0].sin().sum(), parameters)
+    total = encoded.predicted.square().sum() + encoded.posterior.divergence(encoded.prior).sum()
+    gradients = torch.autograd.grad(total + encoded.state[0].sin().sum(), parameters)
+    for gradient, wanted in zip(gradients, reference, strict=True):
+        torch.testing.assert_close(gradient, wanted)

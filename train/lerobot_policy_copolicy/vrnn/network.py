@@ -6,7 +6,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-_LOG_VARIANCE = 10.0  # bound of the logarithm of a variance, so that its exponential is finite
+LOG_VARIANCE = 10.0
+"""Bound of the logarithm of a variance, so that its exponential is finite."""
 
 
 class Normals(NamedTuple):
@@ -57,6 +58,14 @@ class MotionNetwork(nn.Module):
         """The recurrent state at the start: zeros `(batch, width)`, one of each cell."""
         return [like.new_zeros(batch, self.width) for _ in range(self.n_layers)]
 
+    @property
+    def recurrent_weights(self) -> list[Tensor]:
+        """Weights of encoder, embedding of the latent variable, and cells, in the order of `ObservedRecurrence`."""
+        cells = [
+            getattr(cell, name) for cell in self.cells for name in ("weight_ih", "bias_ih", "weight_hh", "bias_hh")
+        ]
+        return [*self.encoder.parameters(), *self.embed_latent.parameters(), *cells]
+
     def posterior(self, embedded: Tensor, top: Tensor) -> Normals:
         """Distribution of the latent variable given its row, embedded `(..., width)`, and the top state before it."""
         return _normals(self.encoder(torch.cat((embedded, top), dim=-1)))
@@ -87,4 +96,4 @@ def _layers(*sizes: int) -> nn.Sequential:
 
 def _normals(values: Tensor) -> Normals:
     mean, log_variance = values.chunk(2, dim=-1)
-    return Normals(mean, log_variance.clamp(-_LOG_VARIANCE, _LOG_VARIANCE))
+    return Normals(mean, log_variance.clamp(-LOG_VARIANCE, LOG_VARIANCE))

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from .motion_rows import MOTION, MotionRows
 from .network import MotionNetwork, Normals
+from .recurrence import ObservedRecurrence
 
 
 class Encoded(NamedTuple):
@@ -20,21 +21,14 @@ class Encoded(NamedTuple):
 
 def encode(network: MotionNetwork, rows: Tensor) -> Encoded:
     """Runs over observed rows `(B, T, n)`, T >= 1; latent variables are drawn from the encoder."""
-    embedded = network.embed_row(rows).unbind(1)
-    noise = torch.randn(len(embedded), len(rows), network.latent, dtype=rows.dtype, device=rows.device)
-    state = network.initial_state(len(rows), rows)
-    posteriors, latents, tops = [], [], []
-    for row, row_noise in zip(embedded, noise, strict=True):
-        tops.append(state[-1])
-        posterior = network.posterior(row, state[-1])
-        posteriors.append(posterior)
-        latents.append(network.embed_latent(posterior.sample(row_noise)))
-        state = network.advance(row, latents[-1], state)
-    # What the recurrence does not need is computed at once.
-    top = torch.stack(tops, dim=1)  # (B, T, width)
-    means, log_variances = (torch.stack(values, dim=1) for values in zip(*posteriors, strict=True))
-    predicted = network.decode(torch.stack(latents, dim=1), top)
-    return Encoded(predicted, Normals(means, log_variances), network.prior(top), state)
+    embedded = network.embed_row(rows).transpose(0, 1).to(rows.dtype)  # (T, B, width)
+    noise = torch.randn(*embedded.shape[:2], network.latent, dtype=embedded.dtype, device=rows.device)
+    with torch.autocast(rows.device.type, enabled=False):
+        results = ObservedRecurrence.apply(embedded, noise, *network.recurrent_weights)
+    tops, means, log_variances, latents, state = results  # pyright: ignore[reportGeneralTypeIssues]
+    top = tops.transpose(0, 1)  # (B, T, width)
+    posterior = Normals(means.transpose(0, 1), log_variances.transpose(0, 1))
+    return Encoded(network.decode(latents.transpose(0, 1), top), posterior, network.prior(top), list(state.unbind(0)))
 
 
 class FreeRun(NamedTuple):
