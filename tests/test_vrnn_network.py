@@ -116,6 +116,17 @@ def test_displacements_are_undone(in_body_axes, scaled):
         torch.testing.assert_close(moved[0], expected, rtol=0, atol=1e-3)
 
 
+def test_the_pose_is_added_within_the_bounds_of_the_state():
+    bounds = torch.tensor(get_task().spec.state.bounds, dtype=torch.float32)
+    with_pose, without = PointFeatures(MOVED, True, bounds), PointFeatures(MOVED, True)
+    state = MOVED.states(poses((900, 150, math.pi / 2)), torch.zeros(1, 3))
+    observation = {STATE: state, ENVIRONMENT_STATE: scenario()[None]}
+    encoded = with_pose(observation)
+    assert encoded.shape[1] == with_pose.size == without.size + 4
+    torch.testing.assert_close(encoded[0, -4:], torch.tensor([0.5, -0.5, 0, 1]), rtol=0, atol=1e-5)
+    torch.testing.assert_close(encoded[:, :-4], without(observation))
+
+
 def test_headings_stay_on_the_circle_or_drift():
     path = torch.tensor([[600.0, 300.0, 1.0, 0.0]])
     drifted, kept = path, path

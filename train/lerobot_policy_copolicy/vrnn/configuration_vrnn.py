@@ -71,7 +71,7 @@ class VrnnConfig(PairPolicyConfig):
     }
 
     history_frames: int = 30  # frames before the current one that a plan is made from
-    window_frames: int = 120  # frames of a training window: the history, and the motion after it
+    window_frames: int | None = None  # frames of a training window: the history, and the motion after it
     stride: int | None = None  # frames between two rows of motion
     encoded_frames: int | None = None  # frames of a window whose latent variables are the encoder's; then the prior's
     plan_frames: int | None = None  # frames that a plan predicts
@@ -83,6 +83,7 @@ class VrnnConfig(PairPolicyConfig):
     width: int = 64  # hidden size of all layers
     n_layers: int = 2  # layers of the GRU
 
+    observe_pose: bool | None = None  # for the features "points": the body's own pose too, which tells of walls
     motion_axes: str | None = None  # axes of displacements: "body", or "scene" as published
     scaled_rows: bool | None = None  # scale displacements and surroundings; else px, rad and units of 8 px
     heading_on_circle: bool | None = None  # scale predicted orientations to a cosine and a sine
@@ -118,10 +119,10 @@ class VrnnConfig(PairPolicyConfig):
         for name in ("history_frames", "window_frames", "encoded_frames", "plan_frames"):
             if getattr(self, name) % filled.stride:
                 raise InvalidValueError(name, f"a multiple of stride = {self.stride}", getattr(self, name))
-        if self.window_frames <= self.history_frames:
+        if filled.window_frames <= self.history_frames:
             expected = f"more than history_frames = {self.history_frames}"
             raise InvalidValueError("window_frames", expected, self.window_frames)
-        if filled.encoded_frames > self.window_frames:
+        if filled.encoded_frames > filled.window_frames:
             raise InvalidValueError(
                 "encoded_frames", f"at most window_frames = {self.window_frames}", self.encoded_frames
             )
@@ -132,7 +133,7 @@ class VrnnConfig(PairPolicyConfig):
     @property
     def observation_delta_indices(self) -> list[int]:
         """Frames of a training window: the history, the current frame and those after it, one a stride."""
-        after = self.window_frames - self.history_frames
+        after = self.filled.window_frames - self.history_frames
         return list(range(-self.history_frames, after + 1, self.filled.stride))
 
     @property

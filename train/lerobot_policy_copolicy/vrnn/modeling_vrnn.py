@@ -66,7 +66,8 @@ class VrnnPolicy(PairPolicy):
         if self.config.observation_features != "points":
             return super()._make_features(task)
         settings: Any = self.config.filled
-        features = PointFeatures(_motion_of(task), settings.scaled_rows)
+        bounds = torch.tensor(task.spec.state.bounds, dtype=torch.float32) if settings.observe_pose else None
+        features = PointFeatures(_motion_of(task), settings.scaled_rows, bounds)
         features.repeat_last, features.velocity_as_goal = settings.repeat_last_obstacle, settings.velocity_as_goal
         return features
 
@@ -110,7 +111,7 @@ class VrnnPolicy(PairPolicy):
             RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
         """
         settings: Any = self.config.filled
-        steps = self.config.window_frames // settings.stride
+        steps = settings.window_frames // settings.stride
         encoded = settings.encoded_frames // settings.stride
         sample = self._training_sample(batch, steps + 1, 1)
         poses, scenarios = self._rows.motion.poses(sample[STATE]), sample[ENVIRONMENT_STATE][:, 0]

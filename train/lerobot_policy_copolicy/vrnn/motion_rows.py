@@ -17,25 +17,42 @@ class PointFeatures(nn.Module):
     """Goal and obstacles in the axes of the body, the published surroundings.
 
     Unscaled: x, y of each point in units of 8 px, and zeros for an absent point. Scaled: each at two scales, over the
-    scene and around the body, and for each obstacle whether it exists.
+    scene and around the body, and for each obstacle whether it exists. The pose is added where bounds are given.
+
+    Args:
+        motion: of the task.
+        scaled: scale the places.
+        bounds: `(2, n)` lowest and highest states, by which the body's own pose is scaled to [-1, 1].
 
     Attributes:
         repeat_last, velocity_as_goal: the surroundings as the published planner computed them in execution, see
             `VrnnConfig`; for an eval mode alone.
     """
 
-    def __init__(self, motion: BodyMotion, scaled: bool):
+    pose_bounds: Tensor
+
+    def __init__(self, motion: BodyMotion, scaled: bool, bounds: Tensor | None = None):
         super().__init__()
         self.motion, self.scaled = motion, scaled
         self.repeat_last = self.velocity_as_goal = False
         points = len(motion.points)
         self.size = 5 * points - 1 if scaled else 2 * points
+        self.with_pose = bounds is not None
+        if bounds is not None:
+            self.register_buffer("pose_bounds", motion.poses(bounds), persistent=False)
+            self.size += self.pose_bounds.shape[1]
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         """Columns `(..., n)` in the units of the task to `(..., size)`."""
         states = observation[STATE]
         points = self._points(states, self.motion.scenario_points(observation[ENVIRONMENT_STATE]))  # (..., P, 2)
-        poses = self.motion.poses(states)[..., None, :]
+        encoded = self._encoded(points, self.motion.poses(states)[..., None, :])
+        if not self.with_pose:
+            return encoded
+        low, high = self.pose_bounds
+        return torch.cat((encoded, (2 * self.motion.poses(states) - low - high) / (high - low)), dim=-1)
+
+    def _encoded(self, points: Tensor, poses: Tensor) -> Tensor:
         present = (points != 0).any(dim=-1, keepdim=True).to(points.dtype)
         places = self.motion.to_body(points - poses[..., :2], poses) * present
         if not self.scaled:

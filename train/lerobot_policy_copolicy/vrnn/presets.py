@@ -6,10 +6,12 @@ _DEFAULT: dict[str, Any] = {
     "observation_features": "points",
     "mirror": False,
     "permute_obstacles": False,
+    "window_frames": 60,
     "stride": 5,
-    "encoded_frames": 30,
+    "encoded_frames": 60,
     "plan_frames": 90,
     "lookahead_frames": 30,
+    "observe_pose": True,
     "motion_axes": "body",
     "scaled_rows": True,
     "heading_on_circle": True,
@@ -29,15 +31,19 @@ _SCAN: dict[str, Any] = {
     "observation_features": "scan",
     "mirror": True,
     "permute_obstacles": True,
+    "observe_pose": False,  # the scan has it
     "motion_axes": "scene",  # those of the scan
 }
 
 # The planner of the co-policy paper (2023): published settings, and the defects that shaped its behaviour.
 _PAPER: dict[str, Any] = {
     **_DEFAULT,
+    "window_frames": 120,
     "stride": 1,
+    "encoded_frames": 30,
     "plan_frames": 130,
     "lookahead_frames": 120,
+    "observe_pose": False,
     "motion_axes": "scene",
     "scaled_rows": False,
     "heading_on_circle": False,
