@@ -54,21 +54,24 @@ class MotionNetwork(nn.Module):
         self.prior_layers = nn.Sequential(_layers(width, width, width), nn.Linear(width, 2 * latent))
         self.cells = nn.ModuleList(nn.GRUCell(width if layer else 2 * width, width) for layer in range(n_layers))
 
-    def initial_state(self, batch: int, like: Tensor) -> list[Tensor]:
-        """The recurrent state at the start: zeros `(batch, width)`, one of each cell."""
-        return [like.new_zeros(batch, self.width) for _ in range(self.n_layers)]
+    @property
+    def observed_weights(self) -> list[Tensor]:
+        """Weights of encoder, embedding of the latent variable, and cells, for `ObservedRecurrence`."""
+        return [*self.encoder.parameters(), *self.embed_latent.parameters(), *self._cell_weights]
 
     @property
-    def recurrent_weights(self) -> list[Tensor]:
-        """Weights of encoder, embedding of the latent variable, and cells, in the order of `ObservedRecurrence`."""
-        cells = [
-            getattr(cell, name) for cell in self.cells for name in ("weight_ih", "bias_ih", "weight_hh", "bias_hh")
-        ]
-        return [*self.encoder.parameters(), *self.embed_latent.parameters(), *cells]
+    def predicted_weights(self) -> list[Tensor]:
+        """Weights of prior, embedding of the latent variable, decoder, embedding of a row, and cells.
 
-    def posterior(self, embedded: Tensor, top: Tensor) -> Normals:
-        """Distribution of the latent variable given its row, embedded `(..., width)`, and the top state before it."""
-        return _normals(self.encoder(torch.cat((embedded, top), dim=-1)))
+        For `PredictedRecurrence`.
+        """
+        layers = (self.prior_layers, self.embed_latent, self.decoder, self.embed_row)
+        return [*(weight for layer in layers for weight in layer.parameters()), *self._cell_weights]
+
+    @property
+    def _cell_weights(self) -> list[Tensor]:
+        names = ("weight_ih", "bias_ih", "weight_hh", "bias_hh")
+        return [getattr(cell, name) for cell in self.cells for name in names]
 
     def prior(self, top: Tensor) -> Normals:
         """Distribution of the latent variable given the top state `(..., width)` before its row."""
@@ -77,14 +80,6 @@ class MotionNetwork(nn.Module):
     def decode(self, latent: Tensor, top: Tensor) -> Tensor:
         """The predicted values `(..., p)` of a row from its embedded latent variable and the top state before it."""
         return self.decoder(torch.cat((latent, top), dim=-1))
-
-    def advance(self, embedded: Tensor, latent: Tensor, state: list[Tensor]) -> list[Tensor]:
-        """The recurrent state after a row, from the row and its latent variable, both embedded `(B, width)`."""
-        values, states = torch.cat((embedded, latent), dim=-1), []
-        for cell, before in zip(self.cells, state, strict=True):
-            values = cell(values, before)
-            states.append(values)
-        return states
 
 
 def _layers(*sizes: int) -> nn.Sequential:

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from .motion_rows import MOTION, MotionRows
 from .network import MotionNetwork, Normals
-from .recurrence import ObservedRecurrence
+from .recurrence import ObservedRecurrence, PredictedRecurrence
 
 
 class Encoded(NamedTuple):
@@ -16,7 +16,7 @@ class Encoded(NamedTuple):
     predicted: Tensor
     posterior: Normals
     prior: Normals
-    state: list[Tensor]
+    state: Tensor
 
 
 def encode(network: MotionNetwork, rows: Tensor) -> Encoded:
@@ -24,22 +24,25 @@ def encode(network: MotionNetwork, rows: Tensor) -> Encoded:
     embedded = network.embed_row(rows).transpose(0, 1).to(rows.dtype)  # (T, B, width)
     noise = torch.randn(*embedded.shape[:2], network.latent, dtype=embedded.dtype, device=rows.device)
     with torch.autocast(rows.device.type, enabled=False):
-        results = ObservedRecurrence.apply(embedded, noise, *network.recurrent_weights)
+        results = ObservedRecurrence.apply(embedded, noise, *network.observed_weights)
     tops, means, log_variances, latents, state = results  # pyright: ignore[reportGeneralTypeIssues]
     top = tops.transpose(0, 1)  # (B, T, width)
     posterior = Normals(means.transpose(0, 1), log_variances.transpose(0, 1))
-    return Encoded(network.decode(latents.transpose(0, 1), top), posterior, network.prior(top), list(state.unbind(0)))
+    return Encoded(network.decode(latents.transpose(0, 1), top), posterior, network.prior(top), state)
 
 
 class FreeRun(NamedTuple):
-    """Results of T predicted rows: predictions `(B, T, p)`, and the poses that they integrate to, `(B, T, 4)`."""
+    """Results of T predicted rows: predictions `(B, T, p)`, and the poses that they integrate to, `(B, T, 4)`.
+
+    The poses have no gradient.
+    """
 
     predicted: Tensor
     poses: Tensor
 
 
 def free_run(
-    network: MotionNetwork, motion_rows: MotionRows, state: list[Tensor], pose: Tensor, scenarios: Tensor, steps: int
+    network: MotionNetwork, motion_rows: MotionRows, state: Tensor, pose: Tensor, scenarios: Tensor, steps: int
 ) -> FreeRun:
     """Predicts rows beyond the observed ones; latent variables are drawn from the prior.
 
@@ -47,23 +50,21 @@ def free_run(
     predicted row is the next input as it is.
 
     Args:
-        state: recurrent state after the last observed row.
+        state: `(layers, B, width)` recurrent state after the last observed row.
         pose: `(B, 4)` last observed pose.
         scenarios: `(B, k)` scenario vectors.
         steps: rows to predict, T >= 1.
     """
+    poses = [pose]
+
+    def next_row(predicted: Tensor) -> Tensor:
+        poses.append(motion_rows.moved(poses[-1], predicted[:, :MOTION]))
+        if predicted.shape[1] > MOTION or len(poses) > steps:
+            return predicted
+        return torch.cat((predicted, motion_rows.surroundings(poses[-2], poses[-1], scenarios)), dim=-1)
+
     noise = torch.randn(steps, len(pose), network.latent, dtype=pose.dtype, device=pose.device)
-    predictions, poses = [], []
-    for row_noise in noise:
-        latent = network.embed_latent(network.prior(state[-1]).sample(row_noise))
-        predicted = network.decode(latent, state[-1])
-        before, pose = pose, motion_rows.moved(pose, predicted[:, :MOTION])
-        predictions.append(predicted)
-        poses.append(pose)
-        if len(poses) == steps:
-            break
-        row = predicted
-        if predicted.shape[1] == MOTION:
-            row = torch.cat((predicted, motion_rows.surroundings(before, pose, scenarios)), dim=-1)
-        state = network.advance(network.embed_row(row), latent, state)
-    return FreeRun(torch.stack(predictions, dim=1), torch.stack(poses, dim=1))
+    with torch.autocast(pose.device.type, enabled=False):
+        predicted = PredictedRecurrence.apply(next_row, state.to(pose.dtype), noise, *network.predicted_weights)
+    assert isinstance(predicted, Tensor)
+    return FreeRun(predicted.transpose(0, 1), torch.stack(poses[1:], dim=1))

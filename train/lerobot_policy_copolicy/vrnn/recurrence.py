@@ -1,61 +1,49 @@
-"""The recurrence of the network over observed rows, with its own backward pass, which is several times as fast.
+"""The recurrences of the network, with their own backward pass, which is several times as fast.
 
 Autograd computes the gradients of all weights at every row. Here the rows are passed once forward and once backward
 with the products that the recurrence needs, and the gradient of each weight is one product over all rows.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
+from .cells import cells_backward, cells_forward, gate_slopes, products
 from .network import LOG_VARIANCE
+
+_OF_CELL = 6  # tensors that `cells_forward` keeps of each cell
 
 
 class ObservedRecurrence(torch.autograd.Function):
-    """Encoder, latent variables and recurrent cells over T rows, from the state zero.
+    """Encoder, latent variables and recurrent cells over T observed rows, from the state zero.
 
-    The computation is that of `MotionNetwork.posterior`, `embed_latent` and `advance`. Inputs are the embedded rows
-    `(T, B, width)`, noise `(T, B, latent)` and the weights (`MotionNetwork.recurrent_weights`); outputs are the top
-    states before each row `(T, B, width)`, means and logarithms of the variances `(T, B, latent)`, embedded latent
-    variables `(T, B, width)`, and the state after the last row `(layers, B, width)`.
+    Inputs are the embedded rows `(T, B, width)`, noise `(T, B, latent)` and the weights
+    (`MotionNetwork.observed_weights`); outputs are the top states before each row `(T, B, width)`, means and logarithms
+    of the variances `(T, B, latent)`, embedded latent variables `(T, B, width)`, and the state after the last row
+    `(layers, B, width)`.
     """
 
     @staticmethod
     def forward(ctx: Any, embedded: Tensor, noise: Tensor, *weights: Tensor) -> tuple[Tensor, ...]:  # pyright: ignore
         """See the class."""
-        encoder, cells, width = weights[:8], _by_layer(weights[8:]), embedded.shape[2]
-        first, first_bias, second, second_bias, head, head_bias, latent_weight, latent_bias = encoder
-        from_rows = torch.addmm(first_bias, embedded.flatten(0, 1), first[:, :width].t()).view_as(embedded)
-        first_top = first[:, width:].t()
-        cell_rows = embedded.flatten(0, 1) @ cells[0][0][:, :width].t() + cells[0][1]
-        cell_rows = cell_rows.view(*embedded.shape[:2], -1)
-        states = [embedded.new_zeros(embedded.shape[1:]) for _ in cells]
+        first, first_bias, second, second_bias, head, head_bias, latent_weight, latent_bias, *cells = weights
+        width, flat = embedded.shape[2], embedded.flatten(0, 1)
+        # What comes from the rows themselves, for all rows at once.
+        from_rows = torch.addmm(first_bias, flat, first[:, :width].t()).view_as(embedded)
+        gate_rows = torch.addmm(cells[1], flat, cells[0][:, :width].t()).unflatten(0, embedded.shape[:2])
+        states = [embedded.new_zeros(embedded.shape[1:]) for _ in cells[::4]]
         stored: list[list[Tensor]] = []
         for row in range(len(embedded)):
             top = states[-1]
-            hidden = torch.addmm(from_rows[row], top, first_top).relu_()
+            hidden = torch.addmm(from_rows[row], top, first[:, width:].t()).relu_()
             above = torch.addmm(second_bias, hidden, second.t()).relu_()
-            mean, raw = torch.addmm(head_bias, above, head.t()).chunk(2, dim=1)
-            log_variance = raw.clamp(-LOG_VARIANCE, LOG_VARIANCE)
-            spread = noise[row] * torch.exp(0.5 * log_variance)
-            sample = mean + spread
-            latent = torch.addmm(latent_bias, sample, latent_weight.t()).relu_()
-            kept = [top, hidden, above, mean, raw, spread, sample, latent]
-            for layer, (to_gates, bias, recurrent, recurrent_bias) in enumerate(cells):
-                if layer:
-                    gates = torch.addmm(bias, states[layer - 1], to_gates.t())
-                else:
-                    gates = torch.addmm(cell_rows[row], latent, to_gates[:, width:].t())
-                before = states[layer]
-                own = torch.addmm(recurrent_bias, before, recurrent.t())
-                reset, update = (gates[:, : 2 * width] + own[:, : 2 * width]).sigmoid_().chunk(2, dim=1)
-                own_new = own[:, 2 * width :]
-                new = torch.addcmul(gates[:, 2 * width :], reset, own_new).tanh_()
-                states[layer] = torch.lerp(new, before, update)
-                kept += [before, reset, update, new, own_new, states[layer]]
-            stored.append(kept)
+            kept = [top, hidden, above, *_latent(above, head, head_bias, noise[row], latent_weight, latent_bias)]
+            gates = torch.addmm(gate_rows[row], kept[-1], cells[0][:, width:].t())
+            states, of_cells = cells_forward(cells, gates, states)
+            stored.append(kept + of_cells)
         columns = [torch.stack(values) for values in zip(*stored, strict=True)]
         ctx.save_for_backward(embedded, *weights, *columns)
         ctx.n_weights = len(weights)
@@ -68,65 +56,142 @@ class ObservedRecurrence(torch.autograd.Function):
         """Gradients of the embedded rows and the weights."""
         embedded, *saved = ctx.saved_tensors
         weights, columns = saved[: ctx.n_weights], saved[ctx.n_weights :]
-        encoder, cells, width = weights[:8], _by_layer(weights[8:]), embedded.shape[2]
-        first, _, second, _, head, _, latent_weight, _ = encoder
-        tops, hidden, above, _, raw, spread, samples, latents = columns[:8]
-        layers = [columns[8 + 6 * layer : 14 + 6 * layer] for layer in range(len(cells))]
+        first, _, second, _, head, _, latent_weight, _, *cells = weights
+        tops, hidden, above, _, raw, spread, samples, latents, *of_cells = columns
         d_tops, d_means, d_log_variances, d_latents, d_last = gradients
-        inside = (raw > -LOG_VARIANCE) & (raw < LOG_VARIANCE)
-        half_spread = 0.5 * spread
-        # Derivatives of the gates by their inputs, for all rows at once.
-        slopes = [
-            (own * reset * (1 - reset), (before - new) * update * (1 - update), (1 - update) * (1 - new * new))
-            for before, reset, update, new, own, _ in layers
-        ]
+        width, flat, slopes = embedded.shape[2], embedded.flatten(0, 1), gate_slopes(of_cells)
+        inside, half_spread = raw.abs() < LOG_VARIANCE, 0.5 * spread
         d_state = list(d_last.unbind(0))
         found: list[list[Tensor]] = []
         for row in reversed(range(len(embedded))):
-            of_gates: list[list[Tensor]] = []
-            d_input = torch.zeros_like(d_state[0])
-            for layer in reversed(range(len(cells))):
-                to_gates, _, recurrent, _ = cells[layer]
-                _, resets, updates, *_ = layers[layer]
-                by_reset, by_update, by_new = slopes[layer]
-                d_after = d_state[layer] if layer == len(cells) - 1 else d_state[layer] + d_input
-                d_new = d_after * by_new[row]
-                d_both = torch.cat((d_new * by_reset[row], d_after * by_update[row]), dim=1)
-                d_gates = torch.cat((d_both, d_new), dim=1)
-                d_own = torch.cat((d_both, d_new * resets[row]), dim=1)
-                d_state[layer] = torch.addmm(d_after * updates[row], d_own, recurrent)
-                d_input = d_gates @ (to_gates if layer else to_gates[:, width:])
-                of_gates.append([d_gates, d_own])
-            d_latent = (d_input + d_latents[row]) * (latents[row] > 0)
+            of_gates = cells_backward(cells, of_cells, slopes, row, d_state)
+            d_latent = (of_gates[0] @ cells[0][:, width:] + d_latents[row]) * (latents[row] > 0)
             d_sample = d_latent @ latent_weight
             d_raw = (d_sample * half_spread[row] + d_log_variances[row]) * inside[row]
             d_head = torch.cat((d_sample + d_means[row], d_raw), dim=1)
             d_above = (d_head @ head) * (above[row] > 0)
             d_hidden = (d_above @ second) * (hidden[row] > 0)
             d_state[-1] = torch.addmm(d_state[-1] + d_tops[row], d_hidden, first[:, width:])
-            found.append([d_hidden, d_above, d_head, d_latent, *(value for pair in of_gates for value in pair)])
-        found.reverse()
-        by_row = [torch.stack(values).flatten(0, 1) for values in zip(*found, strict=True)]
-        d_hidden, d_above, d_head, d_latent, *of_cells = by_row
-        flat = embedded.flatten(0, 1)
-        inputs = [torch.cat((flat, latents.flatten(0, 1)), dim=1), *(layer[5].flatten(0, 1) for layer in layers[:-1])]
+            found.append([d_hidden, d_above, d_head, d_latent, *of_gates])
+        d_hidden, d_above, d_head, d_latent, *of_gates = _joined(found)
+        flat_latents = latents.flatten(0, 1)
+        inputs = torch.cat((flat, flat_latents), dim=1)
         d_weights = [
-            *_products(d_hidden, torch.cat((flat, tops.flatten(0, 1)), dim=1)),
-            *_products(d_above, hidden.flatten(0, 1)),
-            *_products(d_head, above.flatten(0, 1)),
-            *_products(d_latent, samples.flatten(0, 1)),
+            *products(d_hidden, torch.cat((flat, tops.flatten(0, 1)), dim=1)),
+            *products(d_above, hidden.flatten(0, 1)),
+            *products(d_head, above.flatten(0, 1)),
+            *products(d_latent, samples.flatten(0, 1)),
+            *_of_cells(of_gates, of_cells, inputs),
         ]
-        of_layer = list(zip(of_cells[::2], of_cells[1::2], strict=True))[::-1]
-        for layer, (d_gates, d_own) in enumerate(of_layer):
-            d_weights += [*_products(d_gates, inputs[layer]), *_products(d_own, layers[layer][0].flatten(0, 1))]
-        d_embedded = d_hidden @ first[:, :width] + of_layer[0][0] @ cells[0][0][:, :width]
+        d_embedded = d_hidden @ first[:, :width] + of_gates[0] @ cells[0][:, :width]
         return d_embedded.view_as(embedded), None, *d_weights
 
 
-def _by_layer(weights: Any) -> list[Any]:
-    return [weights[index : index + 4] for index in range(0, len(weights), 4)]
+class PredictedRecurrence(torch.autograd.Function):
+    """Prior, latent variables, decoder and recurrent cells over T rows that the network predicts itself.
+
+    Inputs are a function from the prediction `(B, p)` of a row to the next input `(B, n)`, whose first p values are
+    the prediction and whose others are constants, the state `(layers, B, width)`, noise `(T, B, latent)` and the
+    weights (`MotionNetwork.predicted_weights`); the output is the predictions `(T, B, p)`.
+    """
+
+    @staticmethod
+    def forward(  # pyright: ignore
+        ctx: Any, next_row: Callable[[Tensor], Tensor], state: Tensor, noise: Tensor, *weights: Tensor
+    ) -> Tensor:
+        """See the class."""
+        (first, first_bias, second, second_bias, head, head_bias, latent_weight, latent_bias) = weights[:8]
+        (decoder, decoder_bias, out, out_bias, row_weight, row_bias, embed, embed_bias, *cells) = weights[8:]
+        states, stored = list(state.unbind(0)), list[list[Tensor]]()
+        predictions, of_rows = list[Tensor](), list[list[Tensor]]()
+        for row_noise in noise:
+            top = states[-1]
+            hidden = torch.addmm(first_bias, top, first.t()).relu_()
+            above = torch.addmm(second_bias, hidden, second.t()).relu_()
+            kept = [top, hidden, above, *_latent(above, head, head_bias, row_noise, latent_weight, latent_bias)]
+            both = torch.cat((kept[-1], top), dim=1)
+            decoded = torch.addmm(decoder_bias, both, decoder.t()).relu_()
+            predictions.append(torch.addmm(out_bias, decoded, out.t()))
+            stored.append([*kept, both, decoded])
+            row = next_row(predictions[-1])
+            if len(stored) == len(noise):
+                break
+            embedding = torch.addmm(row_bias, row, row_weight.t()).relu_()
+            inputs = torch.cat((torch.addmm(embed_bias, embedding, embed.t()).relu_(), kept[-1]), dim=1)
+            states, of_cells = cells_forward(cells, torch.addmm(cells[1], inputs, cells[0].t()), states)
+            of_rows.append([row, embedding, inputs, *of_cells])
+        columns = [torch.stack(values) for values in zip(*stored, strict=True)]
+        inputs_of = [torch.stack(values) for values in zip(*of_rows, strict=True)]
+        ctx.save_for_backward(*weights, *columns, *inputs_of)
+        ctx.n_weights, ctx.n_columns, ctx.n_layers = len(weights), len(columns), len(state)
+        return torch.stack(predictions)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore
+        """Gradients of the state and the weights."""
+        weights, saved = ctx.saved_tensors[: ctx.n_weights], ctx.saved_tensors[ctx.n_weights :]
+        columns, inputs_of = saved[: ctx.n_columns], saved[ctx.n_columns :]
+        (first, _, second, _, head, _, latent_weight, _) = weights[:8]
+        (decoder, _, out, _, row_weight, _, embed, _, *cells) = weights[8:]
+        tops, hidden, above, _, raw, spread, samples, latents, both, decoded = columns
+        rows, embeddings, inputs, *of_cells = inputs_of or [tops[:0]] * 3
+        (d_predicted,) = gradients
+        width, size, slopes = tops.shape[2], d_predicted.shape[2], gate_slopes(of_cells)
+        inside, half_spread = raw.abs() < LOG_VARIANCE, 0.5 * spread
+        d_state = [torch.zeros_like(tops[0]) for _ in range(ctx.n_layers)]
+        found, found_inputs = list[list[Tensor]](), list[list[Tensor]]()
+        for row in reversed(range(len(tops))):
+            d_out, d_latent = d_predicted[row], torch.zeros_like(tops[0])
+            if row < len(rows):
+                of_gates = cells_backward(cells, of_cells, slopes, row, d_state)
+                d_both = of_gates[0] @ cells[0]
+                d_embed = d_both[:, :width] * (inputs[row, :, :width] > 0)
+                d_latent = d_both[:, width:]
+                d_embedding = (d_embed @ embed) * (embeddings[row] > 0)
+                d_out = d_out + d_embedding @ row_weight[:, :size]
+                found_inputs.append([d_embedding, d_embed, *of_gates])
+            d_decoded = (d_out @ out) * (decoded[row] > 0)
+            d_pair = d_decoded @ decoder
+            d_latent = (d_latent + d_pair[:, :width]) * (latents[row] > 0)
+            d_sample = d_latent @ latent_weight
+            d_head = torch.cat((d_sample, d_sample * half_spread[row] * inside[row]), dim=1)
+            d_above = (d_head @ head) * (above[row] > 0)
+            d_hidden = (d_above @ second) * (hidden[row] > 0)
+            d_state[-1] = torch.addmm(d_state[-1] + d_pair[:, width:], d_hidden, first)
+            found.append([d_hidden, d_above, d_head, d_latent, d_decoded, d_out])
+        of_columns = zip(_joined(found), (tops, hidden, above, samples, both, decoded), strict=True)
+        d_weights = [value for pair in of_columns for value in products(pair[0], pair[1].flatten(0, 1))]
+        if found_inputs:
+            d_embedding, d_embed, *of_gates = _joined(found_inputs)
+            d_weights += products(d_embedding, rows.flatten(0, 1)) + products(d_embed, embeddings.flatten(0, 1))
+            d_weights += _of_cells(of_gates, of_cells, inputs.flatten(0, 1))
+        else:
+            d_weights += [torch.zeros_like(weight) for weight in weights[len(d_weights) :]]
+        return None, torch.stack(d_state), None, *d_weights
 
 
-def _products(gradient: Tensor, inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """Gradients of a weight and its bias from those of the results `(N, m)` and the inputs `(N, n)`."""
-    return gradient.t() @ inputs, gradient.sum(dim=0)
+def _latent(
+    above: Tensor, head: Tensor, head_bias: Tensor, noise: Tensor, weight: Tensor, bias: Tensor
+) -> list[Tensor]:
+    """Mean, unbounded logarithm of the variance, noise in its units, sample, and embedded latent variable."""
+    mean, raw = torch.addmm(head_bias, above, head.t()).chunk(2, dim=1)
+    spread = noise * torch.exp(0.5 * raw.clamp(-LOG_VARIANCE, LOG_VARIANCE))
+    sample = mean + spread
+    return [mean, raw, spread, sample, torch.addmm(bias, sample, weight.t()).relu_()]
+
+
+def _joined(found: list[list[Tensor]]) -> list[Tensor]:
+    """Columns `(T B, m)` of values that were found from the last row to the first."""
+    return [torch.stack(values).flatten(0, 1) for values in zip(*reversed(found), strict=True)]
+
+
+def _of_cells(of_gates: list[Tensor], of_cells: list[Tensor], inputs: Tensor) -> list[Tensor]:
+    """Gradients of the cells' weights, from those of their gates `(T B, 3 width)` and the input of the first cell."""
+    gradients: list[Tensor] = []
+    for layer in range(len(of_gates) // 2):
+        before, *_, after = of_cells[_OF_CELL * layer : _OF_CELL * (layer + 1)]
+        gradients += products(of_gates[2 * layer], inputs)
+        gradients += products(of_gates[2 * layer + 1], before.flatten(0, 1))
+        inputs = after.flatten(0, 1)
+    return gradients
