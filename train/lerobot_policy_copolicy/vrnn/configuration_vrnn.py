@@ -90,8 +90,8 @@ class VrnnConfig(PairPolicyConfig):
     predicted: str | None = None  # "motion": recompute surroundings from the pose; "row": predict and feed back all
     loss_balance: str | None = None  # "frame": error and divergence per frame; "published": mean error, sum of the KL
     motion_deviation: float = 0.03  # standard deviation of predicted displacements, scaled; for "frame"
-    kl_cycles: int = 4  # cycles of the weight of the divergence in a training
-    kl_ramp: float = 0.5  # fraction of a cycle in which this weight rises from 0 to 1
+    kl_cycles: int | None = None  # cycles of the weight of the divergence in a training
+    kl_ramp: float | None = None  # fraction of a cycle in which this weight rises from 0 to 1
     kl_steps: int | None = None  # training steps of all cycles; set from the training
 
     zero_history: bool | None = None  # the history before an episode is zeros; else the table at rest

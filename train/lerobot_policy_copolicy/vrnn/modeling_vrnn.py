@@ -125,7 +125,7 @@ class VrnnPolicy(PairPolicy):
             history = self.config.history_frames // settings.stride
             counts[:, history:] = ~batch[_PADDING][:, history + 1 :]
         error = torch.where(counts[..., None], predicted - rows[..., : predicted.shape[-1]], 0)
-        weight = kl_weight(int(self.updates), self.config.kl_steps, self.config.kl_cycles, self.config.kl_ramp)
+        weight = kl_weight(int(self.updates), self.config.kl_steps, settings.kl_cycles, settings.kl_ramp)
         if settings.loss_balance == "published":
             loss = published_loss(error, posterior, prior, weight)
         else:

@@ -17,6 +17,9 @@ _DEFAULT: dict[str, Any] = {
     "heading_on_circle": True,
     "predicted": "motion",
     "loss_balance": "frame",
+    # One rise: after the last of several, a decaying learning rate is too small for the prior to follow the encoder.
+    "kl_cycles": 1,
+    "kl_ramp": 0.25,
     "zero_history": False,
     "repeat_last_obstacle": False,
     "controller": "velocity",
@@ -49,6 +52,8 @@ _PAPER: dict[str, Any] = {
     "heading_on_circle": False,
     "predicted": "row",
     "loss_balance": "published",
+    "kl_cycles": 4,
+    "kl_ramp": 0.5,
     "zero_history": True,
     "repeat_last_obstacle": True,
     "controller": "proportional",
