@@ -48,7 +48,7 @@ def frame(columns: dict[str, torch.Tensor], index: int = 0) -> dict[str, torch.T
 
 
 def test_the_paper_preset_has_the_published_settings():
-    settings = config(preset="paper", width=64)
+    settings = config(preset="paper", width=64).filled
     assert (settings.history_frames, settings.window_frames, settings.encoded_frames) == (30, 120, 30)
     assert (settings.stride, settings.plan_frames + settings.history_frames, settings.lookahead_frames) == (1, 160, 120)
     assert (settings.latent, settings.n_layers, settings.replan_frames, VrnnConfig().n_samples) == (6, 2, 2, 16)
