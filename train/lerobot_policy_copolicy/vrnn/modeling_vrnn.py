@@ -116,7 +116,8 @@ class VrnnPolicy(PairPolicy):
         sample = self._training_sample(batch, steps + 1, 1)
         poses, scenarios = self._rows.motion.poses(sample[STATE]), sample[ENVIRONMENT_STATE][:, 0]
         rows = self._rows.rows(poses, scenarios)  # (B, T, n)
-        predicted, posterior, prior, state = encode(self.network, rows[:, :encoded])
+        latents, tops, posterior, state = encode(self.network, rows[:, :encoded])
+        predicted, prior = self.network.decode(latents, tops), self.network.prior(tops)
         if encoded < steps:
             continued = free_run(self.network, self._rows, state, poses[:, encoded], scenarios, steps - encoded)
             predicted = torch.cat((predicted, continued.predicted), dim=1)

@@ -11,11 +11,18 @@ from .recurrence import ObservedRecurrence, PredictedRecurrence
 
 
 class Encoded(NamedTuple):
-    """Results on T observed rows: predictions `(B, T, p)`, distributions, and the recurrent state after them."""
+    """Results on T observed rows.
 
-    predicted: Tensor
+    Attributes:
+        latents: `(B, T, width)` embedded latent variables; with the top states they give the predictions of the rows.
+        tops: `(B, T, width)` top state before each row, which gives the prior.
+        posterior: distributions of the latent variables.
+        state: `(layers, B, width)` recurrent state after the last row.
+    """
+
+    latents: Tensor
+    tops: Tensor
     posterior: Normals
-    prior: Normals
     state: Tensor
 
 
@@ -26,9 +33,8 @@ def encode(network: MotionNetwork, rows: Tensor) -> Encoded:
     with torch.autocast(rows.device.type, enabled=False):
         results = ObservedRecurrence.apply(embedded, noise, *network.observed_weights)
     tops, means, log_variances, latents, state = results  # pyright: ignore[reportGeneralTypeIssues]
-    top = tops.transpose(0, 1)  # (B, T, width)
     posterior = Normals(means.transpose(0, 1), log_variances.transpose(0, 1))
-    return Encoded(network.decode(latents.transpose(0, 1), top), posterior, network.prior(top), state)
+    return Encoded(latents.transpose(0, 1), tops.transpose(0, 1), posterior, state)
 
 
 class FreeRun(NamedTuple):
@@ -64,7 +70,10 @@ def free_run(
         return torch.cat((predicted, motion_rows.surroundings(poses[-2], poses[-1], scenarios)), dim=-1)
 
     noise = torch.randn(steps, len(pose), network.latent, dtype=pose.dtype, device=pose.device)
+    weights = network.predicted_weights
+    if not torch.is_grad_enabled():  # so that a plan keeps nothing for a backward pass
+        weights = [weight.detach() for weight in weights]
     with torch.autocast(pose.device.type, enabled=False):
-        predicted = PredictedRecurrence.apply(next_row, state.to(pose.dtype), noise, *network.predicted_weights)
+        predicted = PredictedRecurrence.apply(next_row, state.to(pose.dtype), noise, *weights)
     assert isinstance(predicted, Tensor)
     return FreeRun(predicted.transpose(0, 1), torch.stack(poses[1:], dim=1))

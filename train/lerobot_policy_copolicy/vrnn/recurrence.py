@@ -104,6 +104,7 @@ class PredictedRecurrence(torch.autograd.Function):
         (decoder, decoder_bias, out, out_bias, row_weight, row_bias, embed, embed_bias, *cells) = weights[8:]
         states, stored = list(state.unbind(0)), list[list[Tensor]]()
         predictions, of_rows = list[Tensor](), list[list[Tensor]]()
+        differentiable = any(ctx.needs_input_grad)  # not in a plan
         for row_noise in noise:
             top = states[-1]
             hidden = torch.addmm(first_bias, top, first.t()).relu_()
@@ -112,14 +113,18 @@ class PredictedRecurrence(torch.autograd.Function):
             both = torch.cat((kept[-1], top), dim=1)
             decoded = torch.addmm(decoder_bias, both, decoder.t()).relu_()
             predictions.append(torch.addmm(out_bias, decoded, out.t()))
-            stored.append([*kept, both, decoded])
             row = next_row(predictions[-1])
-            if len(stored) == len(noise):
+            if differentiable:
+                stored.append([*kept, both, decoded])
+            if len(predictions) == len(noise):
                 break
             embedding = torch.addmm(row_bias, row, row_weight.t()).relu_()
             inputs = torch.cat((torch.addmm(embed_bias, embedding, embed.t()).relu_(), kept[-1]), dim=1)
             states, of_cells = cells_forward(cells, torch.addmm(cells[1], inputs, cells[0].t()), states)
-            of_rows.append([row, embedding, inputs, *of_cells])
+            if differentiable:
+                of_rows.append([row, embedding, inputs, *of_cells])
+        if not differentiable:
+            return torch.stack(predictions)
         columns = [torch.stack(values) for values in zip(*stored, strict=True)]
         inputs_of = [torch.stack(values) for values in zip(*of_rows, strict=True)]
         ctx.save_for_backward(*weights, *columns, *inputs_of)
