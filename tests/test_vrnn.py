@@ -134,13 +134,13 @@ def test_it_learns_to_move_on():
     policy = VrnnPolicy(config(width=16, latent=2, history_frames=20, window_frames=40, encoded_frames=40)).train()
     columns = batch(policy)
     optimizer = torch.optim.Adam(policy.parameters(), 5e-3)
-    for _ in range(80):
+    for _ in range(200):
         loss, _ = policy(columns)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
         policy.update()
-    assert int(policy.updates) == 80
+    assert int(policy.updates) == 200
     policy.eval()
     states = columns[STATE][:, : policy.config.history_frames // 5 + 1]
     path = policy._planner.plan(states, columns[ENVIRONMENT_STATE][:, 0])
