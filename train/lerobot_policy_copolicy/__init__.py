@@ -9,6 +9,7 @@ from .cogail.configuration_cogail import CoGailConfig
 from .copolicy.configuration_copolicy import CopolicyConfig
 from .env import PairTaskEnvConfig, TableCarryingEnvConfig
 from .teleoperator.config_copolicy_pair import CopolicyPairConfig
+from .vrnn.configuration_vrnn import VrnnConfig
 
 __all__ = [
     "BcLstmGmmConfig",
@@ -17,4 +18,5 @@ __all__ = [
     "CopolicyPairConfig",
     "PairTaskEnvConfig",
     "TableCarryingEnvConfig",
+    "VrnnConfig",
 ]

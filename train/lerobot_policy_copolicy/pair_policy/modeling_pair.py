@@ -13,7 +13,7 @@ from torch import Tensor
 from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
 from copolicy.dataset.features import ACTION, features_of
 from copolicy.dataset.lerobot_folder.info import task_of
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
 from copolicy.train.finite_weights import non_finite_weight
 
@@ -60,10 +60,14 @@ class PairPolicy(PreTrainedPolicy):
         unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
         if unused:
             logging.info("%s does not read %s", config.type, ", ".join(unused))
-        generic: dict[str, Callable] = {"absolute": AbsoluteFeatures, "raw": RawFeatures}
-        encoders = {**offered.encoders, **{name: partial(encoder, task.spec) for name, encoder in generic.items()}}
-        self.features = encoders[config.filled.observation_features](config.filled.past_human_action)
+        self.features = self._make_features(task)
         self.action_scale = ActionScale(task.spec)
+
+    def _make_features(self, task: PairTask) -> Any:
+        """The encoder with the name `observation_features`; a subclass with encoders of its own overrides it."""
+        generic: dict[str, Callable] = {"absolute": AbsoluteFeatures, "raw": RawFeatures}
+        encoders = {**task.features.encoders, **{name: partial(make, task.spec) for name, make in generic.items()}}
+        return encoders[self.config.filled.observation_features](self.config.filled.past_human_action)
 
     def update(self) -> None:
         """LeRobot's trainer calls this after each optimizer step.
