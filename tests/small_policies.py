@@ -13,6 +13,7 @@ from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 TRANSFORMER = {"network": "transformer", "n_layers": 1, "width": 16, "n_heads": 2, "feedforward_width": 32}
 MLP = {"network": "mlp", "n_layers": 2, "width": 32}
+UNET = {"network": "unet", "down_widths": (8, 16, 16), "step_width": 8}
 
 
 def policy(seed: int = 0, task: str = "table", **settings) -> Any:

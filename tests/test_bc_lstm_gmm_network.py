@@ -68,3 +68,20 @@ def test_frame_by_frame_it_says_the_same(network, windows):
         mixture, state = network(frame[:, None], state)
         means.append(mixture.means)
     torch.testing.assert_close(torch.cat(means, dim=1), whole.means)
+
+
+def test_frame_by_frame_gives_the_mixtures_of_a_window():
+    network = RecurrentMixtureNetwork(18, 4, width=8)
+    inputs = torch.rand(3, 6, 18, generator=torch.Generator().manual_seed(0))
+    whole, last = network(inputs)
+    state, frames = None, []
+    with torch.no_grad():
+        for frame in range(6):
+            mixture, state = network(inputs[:, frame : frame + 1], state)
+            frames.append(mixture)
+    for name in ("logits", "means", "deviations"):
+        values = torch.cat([getattr(mixture, name) for mixture in frames], dim=1)
+        torch.testing.assert_close(values, getattr(whole, name).detach(), rtol=1e-5, atol=1e-6)
+    assert state is not None
+    for one, other in zip(state, last, strict=True):
+        torch.testing.assert_close(one, other.detach(), rtol=1e-5, atol=1e-6)

@@ -52,10 +52,15 @@ def test_two_results_are_compared_pair_by_pair(tmp_path, capsys):
     assert (difference["first"], difference["second"]) == ("a", "b")
     assert difference["success"]["mean"] == pytest.approx(5 / 12)
     assert difference["mcnemar"] == {"only_first": 6, "only_second": 1, "p": pytest.approx(0.125)}
-    assert difference["time_s"] == {"mean": -2.0, "bootstrap_95": [-2.0, -2.0], "pairs": 5, "maps": 5}
+    assert difference["time_s"] == {
+        "mean": -2.0, "standard_error": 0.0, "bootstrap_95": [-2.0, -2.0], "pairs": 5, "maps": 5
+    }  # fmt: skip
     assert difference["interaction_mean"]["mean"] == pytest.approx(-0.2)
     low, high = difference["success"]["bootstrap_95"]
     # Twelve differences of +1 (6), 0 (5), -1 (1): standard error 0.18, and a resample moves in twelfths.
+    assert difference["success"]["standard_error"] == pytest.approx(
+        np.std([1] * 6 + [0] * 5 + [-1]) / 12**0.5, rel=0.03
+    )
     assert low == pytest.approx(5 / 12 - 1.96 * 0.18, abs=0.09)
     assert high == pytest.approx(5 / 12 + 1.96 * 0.18, abs=0.09)
     assert difference["between_runs"] is None
@@ -186,7 +191,7 @@ def test_orientations_of_a_map_are_drawn_together():
     wide = clustered_mean(effect, np.repeat(np.arange(20), 8).tolist())["bootstrap_95"]
     assert (wide[1] - wide[0]) / (narrow[1] - narrow[0]) == pytest.approx(math.sqrt(8), rel=0.15)
     half = clustered_mean(np.array([1.0, math.nan]), ["a", "b"])
-    assert half == {"mean": 1.0, "bootstrap_95": None, "pairs": 1, "maps": 1}
+    assert half == {"mean": 1.0, "standard_error": None, "bootstrap_95": None, "pairs": 1, "maps": 1}
 
 
 def test_mcnemar_is_the_binomial_test_of_the_discordant_pairs():

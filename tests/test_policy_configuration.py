@@ -99,8 +99,17 @@ def test_loaded_configuration_takes_overrides(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "error", "message"),
     [
-        ({"preset": "big"}, UnknownNameError, "unknown preset 'big'; available: default, paper, small"),
-        ({"network": "unet"}, UnknownNameError, "unknown network 'unet'; available: mlp, transformer"),
+        (
+            {"preset": "big"},
+            UnknownNameError,
+            "unknown preset 'big'; available: cnn, cnn-inpainting, cnn-small, default, paper, small",
+        ),
+        ({"network": "rnn"}, UnknownNameError, "unknown network 'rnn'; available: mlp, transformer, unet"),
+        (
+            {"timestep_spacing": "linspace"},
+            UnknownNameError,
+            "unknown timestep_spacing 'linspace'; available: leading, trailing",
+        ),
         ({"sampler": "euler"}, UnknownNameError, "unknown sampler 'euler'; available: ddim, ddpm, dpmsolver++"),
         (
             {"n_action_steps": 11},

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import torch
 from lerobot.policies import get_policy_class
-from small_policies import MLP, OBSERVATIONS, TRANSFORMER, columns, policy
+from small_policies import MLP, OBSERVATIONS, TRANSFORMER, UNET, columns, policy
 from torch._dynamo.utils import counters
 
 from copolicy.dataset.exceptions import InvalidValueError, ShapeError
@@ -138,7 +138,7 @@ def test_weight_decay_spares_biases_norms_and_positions():
 
 
 @pytest.mark.filterwarnings("ignore:The .grad attribute of a Tensor that is not a leaf")  # torch's own, while tracing
-@pytest.mark.parametrize("network", [TRANSFORMER, MLP])
+@pytest.mark.parametrize("network", [TRANSFORMER, MLP, UNET])
 def test_one_compiled_layer_serves_all_and_learns_the_same(monkeypatch, network):
     # The "eager" backend traces and guards as the usual one does, and needs no compiler.
     monkeypatch.setattr(torch, "compile", partial(torch.compile, backend="eager"))

@@ -6,6 +6,7 @@ import torch
 from copolicy.tasks.table.spec import SPEC
 from lerobot_policy_copolicy.copolicy.denoiser_mlp import MlpDenoiser
 from lerobot_policy_copolicy.copolicy.denoiser_transformer import TransformerDenoiser
+from lerobot_policy_copolicy.copolicy.denoiser_unet import UnetDenoiser
 from lerobot_policy_copolicy.pair_policy.features import AbsoluteFeatures
 
 HORIZON, FRAMES, CONDITION = 12, 3, 20
@@ -56,7 +57,14 @@ def test_an_action_does_not_see_later_frames(frame):
     assert (after[:, frame:] - before[:, frame:]).abs().amax(dim=(0, 2)).min() > 0
 
 
-@pytest.mark.parametrize("make", [transformer, lambda: MlpDenoiser(4, CONDITION, HORIZON, FRAMES, 2, 64)])
+@pytest.mark.parametrize(
+    "make",
+    [
+        transformer,
+        lambda: MlpDenoiser(4, CONDITION, HORIZON, FRAMES, 2, 64),
+        lambda: UnetDenoiser(4, CONDITION, FRAMES, (16, 32, 32), step_width=16),
+    ],
+)
 def test_every_input_reaches_the_prediction(make):
     torch.manual_seed(0)
     network = make()

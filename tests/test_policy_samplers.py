@@ -8,7 +8,11 @@ from diffusers.schedulers.scheduling_dpmsolver_multistep import DPMSolverMultist
 from copolicy.dataset.exceptions import UnknownNameError
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.diffusion import ActionDiffusion
-from lerobot_policy_copolicy.copolicy.fast.sampler_coefficients import SamplerCoefficients, trailing_timesteps
+from lerobot_policy_copolicy.copolicy.fast.sampler_coefficients import (
+    SamplerCoefficients,
+    leading_timesteps,
+    trailing_timesteps,
+)
 
 PREDICTIONS = ("epsilon", "sample", "v_prediction")
 
@@ -44,6 +48,14 @@ def test_table_is_the_scheduler(sampler, prediction_type, num_inference_steps):
     plain, table = both(process, noise)
     assert len(process.coefficients.steps) == num_inference_steps
     assert plain.abs().max() > 0.3
+    torch.testing.assert_close(table, plain, atol=2e-5, rtol=0)
+
+
+@pytest.mark.parametrize("sampler", ["ddpm", "ddim", "dpmsolver++"])
+def test_table_with_leading_steps_is_the_scheduler(sampler):
+    process = diffusion(sampler=sampler, num_inference_steps=8, timestep_spacing="leading")
+    plain, table = both(process, torch.randn(5, 12, 4, generator=torch.Generator().manual_seed(1)))
+    assert [step.timestep for step in process.coefficients.steps] == list(range(84, -1, -12))
     torch.testing.assert_close(table, plain, atol=2e-5, rtol=0)
 
 
@@ -125,6 +137,13 @@ def test_trailing_steps_are_those_of_diffusers_where_its_range_has_the_right_len
         scheduler.set_timesteps(steps)
         if steps not in (29, 31, 58, 62, 97):  # where diffusers ends with the step -1
             assert scheduler.timesteps.tolist() == timesteps
+
+
+def test_leading_steps_are_those_of_diffusers():
+    scheduler = DDPMScheduler(100)
+    for steps in range(1, 101):
+        scheduler.set_timesteps(steps)
+        assert scheduler.timesteps.tolist() == leading_timesteps(100, steps)
 
 
 def test_the_scheduler_of_one_plan_forgets_the_one_before():

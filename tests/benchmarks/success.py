@@ -12,35 +12,12 @@ The rows of the paper's size are for a GPU:
 
 import argparse
 import json
-import os
-import subprocess
-import sys
-import sysconfig
-from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
+from training_study import Row, data_set, evaluate, policy_flags, train
 
 MAPS = ("holdout", "unseen")
-BATCH = 512
-
-
-@dataclass(frozen=True)
-class Row:
-    """One setting of the study."""
-
-    flags: tuple[str, ...] = ()
-    preset: str = "small"
-    recipe: str = "pairs-sim-376"
-    steps: int = 6000
-    batch: int = BATCH
-    evaluation: tuple[str, ...] = ()
-
-
-def _policy(**settings: object) -> tuple[str, ...]:
-    return tuple(f"--policy.{name}={str(value).lower()}" for name, value in settings.items())
-
 
 _PAPER = {
     "observation_features": "absolute", "prediction_type": "epsilon", "mirror": False, "permute_obstacles": False,
@@ -50,36 +27,36 @@ _TRANSFORMER = {
     "network": "transformer", "n_layers": 2, "width": 64, "n_heads": 4, "feedforward_width": 256,
 }  # fmt: skip
 # Learning rate for batches four times the paper's.
-_PAPER_SIZE = _policy(
+_PAPER_SIZE = policy_flags(
     optimizer_lr=4e-4, scheduler_warmup_steps=500, scheduler_final_lr_fraction=0.01, compile_model=True
 )
 ROWS = {
     "codp-h": Row(),
-    "codp": Row(_policy(past_human_action=False)),
-    "no-symmetry": Row(_policy(mirror=False, permute_obstacles=False)),
-    "mirror-only": Row(_policy(permute_obstacles=False)),
-    "permutation-only": Row(_policy(mirror=False)),
-    "relative": Row(_policy(observation_features="relative")),
-    "absolute": Row(_policy(observation_features="absolute")),
-    "epsilon": Row(_policy(prediction_type="epsilon")),
-    "cold-noise": Row(_policy(initial_noise_scale=0.7)),
-    "paper-settings": Row(_policy(**_PAPER)),
-    "paper-settings-long": Row(_policy(**_PAPER), steps=60000),
-    "absolute-sample-long": Row(_policy(**{**_PAPER, "prediction_type": "sample"}), steps=20000),
-    "epsilon-long": Row(_policy(prediction_type="epsilon"), steps=20000),
+    "codp": Row(policy_flags(past_human_action=False)),
+    "no-symmetry": Row(policy_flags(mirror=False, permute_obstacles=False)),
+    "mirror-only": Row(policy_flags(permute_obstacles=False)),
+    "permutation-only": Row(policy_flags(mirror=False)),
+    "relative": Row(policy_flags(observation_features="relative")),
+    "absolute": Row(policy_flags(observation_features="absolute")),
+    "epsilon": Row(policy_flags(prediction_type="epsilon")),
+    "cold-noise": Row(policy_flags(initial_noise_scale=0.7)),
+    "paper-settings": Row(policy_flags(**_PAPER)),
+    "paper-settings-long": Row(policy_flags(**_PAPER), steps=60000),
+    "absolute-sample-long": Row(policy_flags(**{**_PAPER, "prediction_type": "sample"}), steps=20000),
+    "epsilon-long": Row(policy_flags(prediction_type="epsilon"), steps=20000),
     "larger": Row(recipe="pairs-sim-3000", steps=12000),
     "wide-pairs": Row(recipe="pairs-sim-376-wide"),
     "orientations": Row(recipe="pairs-sim-376-orientations", evaluation=("--orientations",)),
     "turned": Row(evaluation=("--orientations",)),
-    "transformer": Row(_policy(**_TRANSFORMER), steps=12000, batch=256),
-    "transformer-codp": Row(_policy(**_TRANSFORMER, past_human_action=False), steps=12000, batch=256),
-    "transformer-dropout": Row(_policy(**_TRANSFORMER, attention_dropout=0.3), steps=12000, batch=256),
-    "transformer-long": Row(_policy(**_TRANSFORMER), steps=24000, batch=256),
+    "transformer": Row(policy_flags(**_TRANSFORMER), steps=12000, batch=256),
+    "transformer-codp": Row(policy_flags(**_TRANSFORMER, past_human_action=False), steps=12000, batch=256),
+    "transformer-dropout": Row(policy_flags(**_TRANSFORMER, attention_dropout=0.3), steps=12000, batch=256),
+    "transformer-long": Row(policy_flags(**_TRANSFORMER), steps=24000, batch=256),
     "long": Row(steps=20000),
     # 1057 divides the frames of the data set, so that no batch is smaller and compiled anew.
     "paper-size": Row(_PAPER_SIZE, preset="default", steps=3527, batch=1057),
-    "paper-size-codp": Row((*_PAPER_SIZE, *_policy(past_human_action=False)), "default", steps=3527, batch=1057),
-    "paper": Row(_policy(optimizer_lr=4e-4, compile_model=True), preset="paper", steps=4854, batch=2048),
+    "paper-size-codp": Row((*_PAPER_SIZE, *policy_flags(past_human_action=False)), "default", steps=3527, batch=1057),
+    "paper": Row(policy_flags(optimizer_lr=4e-4, compile_model=True), preset="paper", steps=4854, batch=2048),
 }
 
 
@@ -101,26 +78,10 @@ def main() -> None:
 
 def run(out: Path, name: str, seed: int, device: str) -> None:
     """Trains and evaluates one row with one seed, as far as it is not done."""
-    row = ROWS[name]
-    folder = out / name / f"seed_{seed}"
-    dataset = _data_set(out, row.recipe)
-    training = folder / "training"
-    if not (training / "checkpoints" / "last").exists():
-        started = perf_counter()
-        _command(
-            "copolicy-train", "--policy.type=copolicy", f"--policy.preset={row.preset}", f"--policy.device={device}",
-            f"--dataset.repo_id=local/{row.recipe}", f"--dataset.root={dataset}", f"--output_dir={training}",
-            f"--steps={row.steps}", f"--batch_size={row.batch}", f"--seed={seed}", f"--save_freq={row.steps}",
-            f"--log_freq={row.steps}", "--env_eval_freq=0", *row.flags, log=folder / "training.log",
-        )  # fmt: skip
-        (folder / "seconds.json").write_text(json.dumps(perf_counter() - started), encoding="utf-8")
+    row, folder = ROWS[name], out / name / f"seed_{seed}"
+    training = train(row, data_set(out, row.recipe, row.fps), folder, seed, device)
     for maps in MAPS:
-        result = folder / f"{maps}.json"
-        if not result.exists():
-            _command(
-                "copolicy-eval", "coplan", "--policy", str(training), "--maps", maps, "--out", str(result),
-                "--device", device, *row.evaluation, log=folder / f"{maps}.log",
-            )  # fmt: skip
+        evaluate(training, maps, folder / f"{maps}.json", row.evaluation, device)
     print(name, seed, *(f"{maps} {_successes(folder / f'{maps}.json').mean():.3f}" for maps in MAPS), flush=True)
 
 
@@ -146,28 +107,6 @@ def _mean(rates: list[float]) -> str:
 
 def _successes(result: Path) -> np.ndarray:
     return np.array([episode["success"] for episode in json.loads(result.read_text(encoding="utf-8"))["episodes"]])
-
-
-def _data_set(out: Path, recipe: str) -> Path:
-    dataset, recordings = out / "data" / recipe, out / "data" / f"{recipe}-recordings"
-    if not dataset.exists():
-        log = out / "data" / f"{recipe}.log"
-        _command("copolicy-collect", "simulate", "--recipe", recipe, "--out", str(recordings), log=log)
-        _command(
-            "copolicy-convert", "mcap", str(recordings), "--out", str(dataset), "--repo-id", f"local/{recipe}",
-            "--license", "cc0-1.0", log=log,
-        )  # fmt: skip
-    return dataset
-
-
-def _command(name: str, *flags: str, log: Path) -> None:
-    log.parent.mkdir(parents=True, exist_ok=True)
-    program = str(Path(sysconfig.get_path("scripts")) / name)
-    environment = {"ACCELERATE_MIXED_PRECISION": "bf16", "OMP_NUM_THREADS": "1", **os.environ, "HF_HUB_OFFLINE": "1"}
-    with log.open("a", encoding="utf-8") as file:
-        status = subprocess.run([program, *flags], env=environment, stdout=file, stderr=file).returncode
-    if status:
-        sys.exit(f"{name} ended with status {status}; see {log}")
 
 
 if __name__ == "__main__":

@@ -5,8 +5,18 @@ only when a policy, an environment or a teleoperator is created.
 """
 
 from .bc_lstm_gmm.configuration_bc_lstm_gmm import BcLstmGmmConfig
+from .cogail.configuration_cogail import CoGailConfig
 from .copolicy.configuration_copolicy import CopolicyConfig
 from .env import PairTaskEnvConfig, TableCarryingEnvConfig
 from .teleoperator.config_copolicy_pair import CopolicyPairConfig
+from .vrnn.configuration_vrnn import VrnnConfig
 
-__all__ = ["BcLstmGmmConfig", "CopolicyConfig", "CopolicyPairConfig", "PairTaskEnvConfig", "TableCarryingEnvConfig"]
+__all__ = [
+    "BcLstmGmmConfig",
+    "CoGailConfig",
+    "CopolicyConfig",
+    "CopolicyPairConfig",
+    "PairTaskEnvConfig",
+    "TableCarryingEnvConfig",
+    "VrnnConfig",
+]

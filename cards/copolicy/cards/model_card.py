@@ -14,9 +14,16 @@ from .model_results import results
 # Settings that distinguish policies, in the order of the card; a policy has only some of them.
 _SETTINGS = (
     "type", "preset", "past_human_action", "network", "observation_features", "n_obs_steps", "horizon",
-    "n_action_steps", "n_layers", "width", "n_heads", "num_train_timesteps", "prediction_type", "sampler",
-    "num_inference_steps", "initial_noise_scale", "mirror", "permute_obstacles", "ema", "fps",
+    "n_action_steps", "n_layers", "width", "n_heads", "down_widths", "inpainting", "num_train_timesteps",
+    "prediction_type", "sampler", "num_inference_steps", "timestep_spacing", "initial_noise_scale", "mirror",
+    "permute_obstacles", "ema", "fps",
 )  # fmt: skip
+_UNET_SETTINGS = {"down_widths", "inpainting"}
+_WITHOUT_EFFECT = {  # by network
+    "transformer": _UNET_SETTINGS,
+    "mlp": _UNET_SETTINGS | {"n_heads"},
+    "unet": {"n_layers", "width", "n_heads"},
+}
 _PACKAGED = "pretrained"  # folder name of the model in the package
 _TRAINING = ("steps", "batch_size", "samples", "seed")
 
@@ -121,7 +128,7 @@ def _data(checkpoint: CheckpointFacts) -> str:
 def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, Any]]) -> str:
     averaged = (checkpoint.recipe.get("weights") or {}).get("averaged")
     # Stated in another row, or without effect.
-    skipped = ({"ema"} if averaged else set()) | ({"n_heads"} if checkpoint.config.get("network") == "mlp" else set())
+    skipped = ({"ema"} if averaged else set()) | _WITHOUT_EFFECT.get(checkpoint.config.get("network") or "", set())
     rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config.keys() - skipped]
     training = [
         (f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if checkpoint.training.get(key) is not None

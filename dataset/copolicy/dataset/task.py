@@ -27,10 +27,12 @@ from .outline import Outline
 from .scenarios import ScenarioFiles, ScenarioName, ScenarioSet, file_and_split, is_file_name
 from .task_parts import (
     RUNNING,
+    BodyMotion,
     Limit,
     Outcome,
     Player,
     PolicyFeatures,
+    PublishedMethod,
     Rule,
     Scenario,
     SceneView,
@@ -55,11 +57,13 @@ __all__ = [
     "RECORD_HZ",
     "RUNNING",
     "TABLE",
+    "BodyMotion",
     "Limit",
     "Outcome",
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "PublishedMethod",
     "Rule",
     "Scenario",
     "SceneView",
@@ -293,6 +297,11 @@ class PairTask(ABC):
     def features(self) -> PolicyFeatures:
         """Observation encoders and symmetries for policies. Import torch here, not at the top of a task's module."""
         return PolicyFeatures()
+
+    @property
+    def motion(self) -> BodyMotion | None:
+        """Planar motion of the body, for policies that plan it. Import torch here, not at the top of the module."""
+        return None
 
     def settings_summary(self, settings: Any) -> str:
         """Readable text of the settings that differ from the defaults; `default` if none does."""

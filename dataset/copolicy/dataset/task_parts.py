@@ -141,16 +141,44 @@ class SceneView(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class PublishedMethod:
+    """Published results of a method in the co-planning study of a task.
+
+    Attributes:
+        name: name in the publication.
+        policies: values by which the configuration of a policy is recognised as this method: any of the values, for
+            each setting.
+        best: successes and episodes of the best training seed, by scenario set.
+        mean: successes and episodes of all training seeds, by scenario set.
+        planning_ms: mean time of one decision, ms; None if it was not published.
+    """
+
+    name: str
+    policies: Mapping[str, tuple[Any, ...]]
+    best: Mapping[str, tuple[int, int]]
+    mean: Mapping[str, tuple[int, int]]
+    planning_ms: float | None = None
+
+    def is_of(self, config: Mapping[str, Any]) -> bool:
+        """Whether a policy with these settings is an implementation of the method."""
+        return all(config.get(setting) in values for setting, values in self.policies.items())
+
+
 class Studies:
     """The part `studies` of a task: its additions to study results.
 
     Attributes:
         step_limit: steps after which an episode of a study ends; None for the limit in the settings.
         definitions: definitions of measures for this task, by their names in results.
+        published: published results of the co-planning study, for comparison, in the order of the publication.
+        published_source: source of `published` and how it was measured.
     """
 
     step_limit: int | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
+    published: tuple[PublishedMethod, ...] = ()
+    published_source: str = ""
 
     def factors(self, scenario: Any) -> dict[str, Any]:
         """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""
@@ -194,6 +222,61 @@ class PolicyFeatures:
 
     encoders: Mapping[str, Callable[[bool], Any]] = field(default_factory=dict)
     symmetries: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = field(default_factory=dict)
+
+
+class BodyMotion(Protocol):
+    """The part `motion` of a task: the motion of the carried body in a plane, for policies that plan it (in torch).
+
+    A pose `(..., 4)` is the position x, y and the cosine and sine of the orientation. A velocity or a wrench `(..., 3)`
+    is along x, along y, and about the body's centre, in the axes of the scene. A point that is zero is absent.
+
+    Attributes:
+        speed: greatest speed of the centre along an axis that both players sustain, units of position per s.
+        reach: distance of the players from the centre, at which rotations compare with displacements.
+        full_force: force of a player's action of 1.
+        inertia: mass along x, along y, and moment of inertia; a wrench divided by it is an acceleration.
+        damping: wrench per velocity that friction takes, along x, along y, and about the centre.
+        points: names of the points of a scenario, the goal first, then obstacles.
+    """
+
+    speed: float
+    reach: float
+    full_force: float
+    inertia: tuple[float, float, float]
+    damping: tuple[float, float, float]
+    points: tuple[str, ...]
+
+    def poses(self, states: Any) -> Any:
+        """Poses `(..., 4)` in states `(..., n)`."""
+        ...
+
+    def velocities(self, states: Any) -> Any:
+        """Velocities `(..., 3)` in states `(..., n)`."""
+        ...
+
+    def states(self, poses: Any, velocities: Any) -> Any:
+        """States `(..., n)` of poses `(..., 4)` and velocities `(..., 3)`."""
+        ...
+
+    def scenario_points(self, scenarios: Any) -> Any:
+        """The points `(..., len(points), 2)` of scenario vectors `(..., k)`, in the axes of the scene."""
+        ...
+
+    def to_body(self, vectors: Any, poses: Any) -> Any:
+        """Vectors `(..., 2)` of the scene in the axes of the body at poses `(..., 4)`."""
+        ...
+
+    def to_scene(self, vectors: Any, poses: Any) -> Any:
+        """The inverse of `to_body`."""
+        ...
+
+    def rewards(self, poses: Any, scenarios: Any) -> Any:
+        """`(...)` rewards of poses `(..., 4)` in scenarios `(..., k)`; see `World.reward`."""
+        ...
+
+    def joint_actions(self, wrenches: Any, poses: Any) -> Any:
+        """The smallest joint actions `(..., 2 m)` that exert wrenches `(..., 3)` at poses `(..., 4)`, not clipped."""
+        ...
 
 
 @dataclass(frozen=True)

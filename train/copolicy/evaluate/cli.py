@@ -8,9 +8,10 @@ from typing import Any
 from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
-from copolicy.dataset.files.staging import replace_json, require_new
+from copolicy.dataset.files.staging import require_new
 
 from .comparison import add_compare_command
+from .coplanning_table import add_table_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
@@ -22,7 +23,6 @@ from .study_flags import (
     study_needs,
     study_policy,
     study_protocol,
-    study_settings,
 )
 from .within_subject.command import add_power_command
 
@@ -52,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_compare_command(commands)
     add_plans_command(commands)
     add_power_command(commands)
+    add_table_command(commands)
     return run(parser, argv)
 
 
@@ -62,48 +63,18 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
     chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     if arguments.orientations:
         chosen = task.turned(chosen)
-    scenarios = chosen.scenarios[: arguments.limit]
     # Imported here so that `--help` and argument errors do not wait for torch.
-    from .coplan.figure import save_path_figure
-    from .coplan.rollouts import coplan
-    from .summary import not_measured, percent, summarise
+    from .coplan.study import coplan_settings, write_coplan_result
+    from .summary import percent
 
     policy = study_policy(arguments.policy, arguments)
     protocol = study_protocol(arguments, [(str(arguments.policy), policy.conditions)])
+    scenarios = chosen.scenarios[: arguments.limit]
     with progress_bar(len(scenarios) * arguments.repeats, "episodes") as bar:
-        episodes = coplan(
-            policy,
-            scenarios,
-            protocol.settings,
-            repeats=arguments.repeats,
-            fps=protocol.fps,
-            seed=arguments.seed,
-            on_step=lambda finished: bar.update(finished - bar.n),
-        )
-    summary = summarise(episodes, policy)
-    result = {
-        "study": "coplan",
-        "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
-        "policy": policy.describe(),
-        "settings": {
-            "maps": chosen.label,
-            "map_set": chosen.describe(),
-            "orientations": arguments.orientations,
-            "map_count": len(scenarios),
-            "complete_set": arguments.limit is None,
-            "repeats": arguments.repeats,
-            **study_settings(arguments, protocol, scenarios),
-        },
-        "summary": summary,
-        **not_measured(task, summary),
-        "episodes": [episode.to_json() for episode in episodes],
-    }
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+        settings = coplan_settings(arguments, protocol, chosen)
+        result = write_coplan_result(policy, protocol, scenarios, settings, arguments.out, bar)
+    summary, task = result["summary"], protocol.task
     success, force = summary["success"], summary["interaction_force"]
-    title = f"co-planning on {chosen.label}: {percent(success)} of {success['episodes']} episodes"
-    if task.outline is not None:
-        save_path_figure(episodes, figure, title)
-    replace_json(arguments.out, result, indent=1)  # last, so that an existing result is always complete
     return {
         "success": percent(success),
         "episodes": success["episodes"],
@@ -113,5 +84,5 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
         "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
         "result": str(arguments.out),
         "figure": str(figure) if task.outline is not None else task.missing("outline"),
-        **not_measured(task, summary),
+        **{name: result[name] for name in ("not_measured",) if name in result},
     }

@@ -73,8 +73,8 @@ def compare_episodes(first: Sequence[Episode], second: Sequence[Episode]) -> dic
     """Mean difference `first - second` on the same starts with a 95 % interval, bootstrapped over maps.
 
     Returns:
-        `mean`, `bootstrap_95`, `pairs` and `maps` for `success`, for `time_s` (episodes in which both succeeded) and,
-        if the task measures interaction, for `interaction_mean` and `interaction_p95`.
+        `mean`, `standard_error`, `bootstrap_95`, `pairs` and `maps` for `success`, for `time_s` (episodes in which both
+        succeeded) and, if the task measures interaction, for `interaction_mean` and `interaction_p95`.
 
     Raises:
         InvalidValueError: the episodes do not have the same starts.

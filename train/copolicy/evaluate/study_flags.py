@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
 POLICY_HELP = "folder of a training run or a checkpoint, or pretrained (the model in the package)"
-_POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend")
+_POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend", "code")
 
 
 def figure_beside(result: Path) -> Path:
@@ -44,6 +44,21 @@ def add_study_flags(command: argparse.ArgumentParser, n_action_steps: int) -> No
 
 def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
     """Adds the flags of inference, of the world's settings, `--seed` and `--overwrite`."""
+    samplers, backends = ("ddpm", "ddim", "dpmsolver++"), ("auto", "torch", "onnx", "numba")
+    command.add_argument("--sampler", choices=samplers, help="diffusion sampler (default: the checkpoint's)")
+    command.add_argument("--backend", choices=backends, help="runs the network (default: the checkpoint's)")
+    steps = "denoising steps (default: the checkpoint's)"
+    add_whole_number(command, "--num-inference-steps", steps, None, 1, 1000)
+    scale, noise = number("--initial-noise-scale", 0, 10), "scale of the initial noise (default: the checkpoint's)"
+    command.add_argument("--initial-noise-scale", type=scale, help=noise)
+    codes = ("drawn", "inferred", "episode")
+    command.add_argument("--code", choices=codes, help="how cogail gets its code (default: the checkpoint's)")
+    add_world_flags(command, n_action_steps)
+    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
+
+
+def add_world_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
+    """Adds the flags of executed actions, of the world's settings and `--seed`."""
     shorter = ", or all of a shorter chunk" if n_action_steps > 1 else ""
     meaning = f"actions executed of each action chunk (default: {n_action_steps}{shorter})"
     # Without the flag, `study_policy` limits the number to the length of the policy's chunks.
@@ -54,15 +69,7 @@ def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) ->
     )
     limit = "limit of the angular acceleration, rad/s^2 (default: that of the policy's training data)"
     command.add_argument("--angular-limit", choices=ANGULAR_LIMITS, help=limit)
-    samplers, backends = ("ddpm", "ddim", "dpmsolver++"), ("auto", "torch", "onnx", "numba")
-    command.add_argument("--sampler", choices=samplers, help="diffusion sampler (default: the checkpoint's)")
-    command.add_argument("--backend", choices=backends, help="runs the network (default: the checkpoint's)")
-    steps = "denoising steps (default: the checkpoint's)"
-    add_whole_number(command, "--num-inference-steps", steps, None, 1, 1000)
-    scale, noise = number("--initial-noise-scale", 0, 10), "scale of the initial noise (default: the checkpoint's)"
-    command.add_argument("--initial-noise-scale", type=scale, help=noise)
     command.add_argument("--seed", type=seed(), default=0, help="seed of the random numbers (default: 0)")
-    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 
 
 def study_needs(arguments: argparse.Namespace) -> tuple[str, ...]:

@@ -28,8 +28,9 @@ from copolicy.dataset.task import PairTask, get_task
 
 _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
-    "preset", "past_human_action", "network", "prediction_type", "observation_features", "sampler",
-    "num_inference_steps", "planner", "backend", "initial_noise_scale", "horizon", "n_obs_steps",
+    "preset", "past_human_action", "network", "inpainting", "prediction_type", "observation_features", "sampler",
+    "num_inference_steps", "timestep_spacing", "planner", "backend", "initial_noise_scale", "horizon", "n_obs_steps",
+    "code",
 )  # fmt: skip
 _LOCK = threading.Lock()  # policies draw from torch's global generator, whose state each call sets
 

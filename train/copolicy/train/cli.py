@@ -15,19 +15,23 @@ from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
 from copolicy.dataset.files.local_path import require_repo_id, similar_path
-from copolicy.dataset.files.staging import disk_error_number, named_errors
+from copolicy.dataset.files.staging import disk_error_number, error_chain, named_errors
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
 from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers
+from .world_training import IN_WORLD, WORLD_HELP, require_right_trainer, trainer_of, with_world_defaults
 
 _PROG = "copolicy-train"
 # draccus puts this before the reason if a section of the configuration is optional.
 _UNDECODED = "Could not decode the value into any of the given types:"
+# draccus says this without the reason if the settings of a policy contradict each other.
+_NOT_MADE = "Couldn't instantiate class"
 _SETTINGS = "train_config.json"
 _HELP = """\
 usage: copolicy-train --dataset.root=FOLDER [flags of lerobot-train] [--json] [--debug]
+       copolicy-train cogail --dataset.root=FOLDER      train Co-GAIL in the world of the task (cogail --help)
        copolicy-train export CHECKPOINT --out FOLDER    write the averaged weights for publication (export --help)
        copolicy-train pretrained                        print the path of the model that comes with the package
 
@@ -63,6 +67,8 @@ copolicy-train) ... Each process trains on --batch_size different frames per ste
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status: 0 success, 1 problem of the data or the run, 2 wrong call."""
     flags = list(sys.argv[1:] if argv is None else argv)
+    in_world = flags[:1] == [IN_WORLD]
+    flags = flags[in_world:]
     if flags and not flags[0].startswith("-"):  # LeRobot's trainer has flags only
         parser, names = policy_parser()
         if flags[0] in names:
@@ -73,7 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     commandline.add_version_flag(parser)
     commandline.add_common_flags(parser)
     parser.add_argument("flags", nargs="*")
-    parser.set_defaults(handler=_train, needs=TRAINING)
+    parser.set_defaults(handler=_train, needs=TRAINING, in_world=in_world)
+    if in_world:
+        flags = with_world_defaults(flags)
     if "--help" in flags or "-h" in flags:
         parser.set_defaults(handler=_print_help, needs=())
         common = []
@@ -109,7 +117,7 @@ def _value(name: str, flags: Sequence[str]) -> str | None:
 
 
 def _print_help(arguments: argparse.Namespace) -> dict[str, Any]:
-    print(_HELP)
+    print(WORLD_HELP if arguments.in_world else _HELP)
     try:
         require_packages(*TRAINING)
     except MissingExtraError as error:
@@ -132,15 +140,15 @@ def _train(arguments: argparse.Namespace) -> dict[str, Any]:
     # LeRobot and its libraries print to stdout, which is reserved for the summary.
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
         from .episode_choice import check_local_dataset
-        from .memory_training import train_from_memory
 
         config = _parse()
         _validate(config)
+        require_right_trainer(config, arguments.in_world)
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
             with named_errors(Path(config.output_dir or "")):
-                train_from_memory(config)
+                trainer_of(arguments.in_world)(config)
         except CopolicyError:
             raise
         except Exception as error:
@@ -208,8 +216,10 @@ def _parse():
     try:
         with contextlib.redirect_stderr(printed):
             return parsed()
-    except SystemExit:
+    except SystemExit as exit:
         problem = " ".join(printed.getvalue().rpartition("error: ")[2].split())
+        if _NOT_MADE in problem:
+            problem += f" {_one_line(list(error_chain(exit))[-1])}"
         raise CopolicyError(problem.replace(f"{_UNDECODED} ", "") or "unreadable flags (see --help)") from None
     except CopolicyError:
         raise

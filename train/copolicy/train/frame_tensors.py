@@ -37,6 +37,16 @@ class FrameTensors:
         device = self._first.device
         self._offsets = {deltas: torch.tensor(deltas, device=device) for deltas in set(self._deltas_of.values())}
 
+    @property
+    def columns(self) -> Mapping[str, Tensor | list[str]]:
+        """The columns of all frames, by name."""
+        return self._columns
+
+    @property
+    def first(self) -> Tensor:
+        """`(N,)` position of the first frame of each frame's episode."""
+        return self._first
+
     def to(self, device: torch.device | str) -> "FrameTensors":
         """A copy on a device; strings stay on the host."""
         columns = {

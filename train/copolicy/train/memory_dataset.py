@@ -104,6 +104,11 @@ class MemoryDataset(Dataset[dict[str, Any]]):
         videos = set(dataset.meta.video_keys)
         return not videos if observation_keys is None else videos.isdisjoint(observation_keys)
 
+    @property
+    def frames(self) -> FrameTensors:
+        """All frames, on the host."""
+        return self._host
+
     def __len__(self) -> int:
         return self.num_frames
 

@@ -16,6 +16,7 @@ from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from lerobot.scripts import lerobot_train
 from tqdm import tqdm
 
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.listing import skipping_hidden_files
 
 from .episode_choice import recorded_episodes, resumed_episodes, selected_episodes
@@ -53,6 +54,20 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
                 # the GIL to free the tensors of the last collective: a deadlock after the last step. The reference
                 # keeps the group until the thread is idle.
                 time.sleep(0.5)
+
+
+def dataset_in_memory(config: TrainPipelineConfig) -> MemoryDataset:
+    """The data set of a training with the same checks and the same choice of episodes, for a trainer of our own.
+
+    Raises:
+        CopolicyError: the data set cannot be trained on.
+        InvalidValueError: it has stored images or is streamed, so that it cannot be loaded.
+    """
+    with _hidden_files_ignored():
+        dataset, _ = _make_datasets(config, lerobot_datasets.make_train_eval_datasets)
+    if not isinstance(dataset, MemoryDataset):
+        raise InvalidValueError("--dataset", "one without stored images that is not streamed", config.dataset.repo_id)
+    return dataset
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from copolicy.dataset.scenarios import set_label
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
+TRAINING_FILE = "train_config.json"
 
 _TRAINING = ("batch_size", "seed")
 _COUNTED_COLUMNS = ("source", "map_set", "license", "pair_id")
@@ -33,7 +34,7 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
         commands: commands that made data and policy.
 
     Raises:
-        FileFormatError: `train_config.json` or `recipe.json` cannot be read.
+        FileFormatError: `train_config.json`, `recipe.json` or `training_step.json` cannot be read.
         InvalidValueError: a command has a path in this user's home or in the working directory.
     """
     for command in commands:
@@ -45,15 +46,10 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     recipe: dict[str, Any] = {
         "weights": {"exported_from": weights_sha256, "averaged": averaged, "dtype": "float32"},
     }
-    training = read_optional_json(folder / "train_config.json", TrainingDocument, "the settings of a training")
+    training = read_optional_json(folder / TRAINING_FILE, TrainingDocument, "the settings of a training")
     if training:
-        step_file = folder.parent / "training_state" / "training_step.json"
-        reached = read_optional_json(step_file, TrainingStepDocument, "a training's step") or {}
-        steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
         recipe["training"] = {
-            **{name: training.get(name) for name in _TRAINING},
-            "steps": steps,
-            "samples": steps * training["batch_size"] * processes if steps and training.get("batch_size") else None,
+            **reached_training(folder, dict(training)),
             "optimizer": training.get("optimizer"),
             "scheduler": training.get("scheduler"),
         }
@@ -64,6 +60,27 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
     if commands:
         recipe["commands"] = list(commands)
     return recipe
+
+
+def reached_training(folder: Path, training: dict[str, Any]) -> dict[str, Any]:
+    """Batch size and seed of a training, and the steps and samples that its checkpoint has reached; None if unknown.
+
+    Args:
+        folder: folder of the checkpoint.
+        training: content of its `train_config.json`.
+
+    Raises:
+        FileFormatError: `training_step.json` cannot be read.
+    """
+    step_file = folder.parent / "training_state" / "training_step.json"
+    reached = read_optional_json(step_file, TrainingStepDocument, "a training's step") or {}
+    steps, processes = reached.get("step", training.get("steps")), reached.get("num_processes", 1)
+    batch = training.get("batch_size")
+    return {
+        **{name: training.get(name) for name in _TRAINING},
+        "steps": steps,
+        "samples": steps * batch * processes if steps and batch else None,
+    }
 
 
 def shortened_evaluation(path: Path, digests: Collection[str]) -> dict[str, Any]:

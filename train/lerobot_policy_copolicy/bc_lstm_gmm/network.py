@@ -19,8 +19,10 @@ class Mixture(NamedTuple):
 
     def distribution(self) -> MixtureSameFamily:
         """As torch's distribution over actions `(B, T, m)`."""
-        modes = Independent(Normal(self.means, self.deviations), 1)
-        return MixtureSameFamily(Categorical(logits=self.logits), modes)
+        # Without torch's checks of every value, which take a third of the time of a frame.
+        modes = Independent(Normal(self.means, self.deviations, validate_args=False), 1, validate_args=False)
+        weights = Categorical(logits=self.logits, validate_args=False)
+        return MixtureSameFamily(weights, modes, validate_args=False)
 
 
 class RecurrentMixtureNetwork(nn.Module):
@@ -55,8 +57,23 @@ class RecurrentMixtureNetwork(nn.Module):
 
     def forward(self, inputs: Tensor, state: State | None = None) -> tuple[Mixture, State]:
         """Mixtures of the frames `(B, T, input_size)`, and the state after the last; a state of None is zero."""
-        hidden, last_state = self.lstm(inputs, state)  # (B, T, width)
+        one_frame = inputs.shape[1] == 1 and not torch.is_grad_enabled()
+        hidden, last_state = self._step(inputs, state) if one_frame else self.lstm(inputs, state)  # (B, T, width)
         shape = (self.n_modes, self.action_size)
         means = torch.tanh(self.mean(hidden)).unflatten(-1, shape)
         deviations = nn.functional.softplus(self.deviation(hidden)).unflatten(-1, shape) + self.min_deviation
         return Mixture(self.logits(hidden), means, deviations), last_state
+
+    def _step(self, inputs: Tensor, state: State | None) -> tuple[Tensor, State]:
+        """As `self.lstm` for one frame `(B, 1, input_size)`; on a CPU torch.lstm reorders all weights in each call."""
+        hidden, lstm = inputs[:, 0], self.lstm
+        if state is None:
+            zeros = hidden.new_zeros(lstm.num_layers, len(hidden), lstm.hidden_size)
+            state = (zeros, zeros)
+        states = []
+        for layer in range(lstm.num_layers):
+            before = (state[0][layer], state[1][layer])
+            states.append(torch.lstm_cell(hidden, before, *lstm.all_weights[layer]))
+            hidden = states[-1][0]
+        h, c = zip(*states, strict=True)
+        return hidden[:, None], (torch.stack(h), torch.stack(c))

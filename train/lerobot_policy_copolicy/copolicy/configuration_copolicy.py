@@ -15,9 +15,10 @@ from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 
 _CHOICES = {
-    "network": ("transformer", "mlp"),
+    "network": ("transformer", "mlp", "unet"),
     "prediction_type": ("epsilon", "sample", "v_prediction"),
     "sampler": ("ddpm", "ddim", "dpmsolver++"),
+    "timestep_spacing": ("trailing", "leading"),
     "planner": ("fast", "plain"),
     "backend": tuple(BACKENDS),
 }
@@ -31,6 +32,10 @@ _BOUNDS = {
     "feedforward_width": Bounds(1),
     "attention_dropout": FRACTION,
     "embedding_dropout": FRACTION,
+    "down_widths": Bounds(1),
+    "kernel_size": Bounds(1),
+    "n_groups": Bounds(1),
+    "step_width": Bounds(4),
     "num_train_timesteps": Bounds(1, 10_000),
     "clip_sample_range": POSITIVE,
     "initial_noise_scale": Bounds(0, expected="zero or more"),
@@ -52,14 +57,16 @@ _BOUNDS = {
 class CopolicyConfig(PairPolicyConfig):
     """Settings of the diffusion co-policy, which predicts the actions of both players; see `PairPolicyConfig`.
 
-    Presets: "default", "paper" (the paper exactly) and "small" (trains on a CPU in minutes).
+    Presets: "default", "paper" (the paper exactly) and "small" (trains on a CPU in minutes); with a temporal CNN as the
+    network, "cnn" (that of Diffusion Policy, Chi et al., 2023, with the paper's horizons), "cnn-inpainting" (the
+    training configuration of the CNN that the paper's authors released) and "cnn-small" ("small" with a smaller CNN).
     """
 
     presets: ClassVar = PRESETS
     choices: ClassVar = _CHOICES
     bounds: ClassVar = _BOUNDS
 
-    past_human_action: bool = True  # condition on the human's past action (the paper's CoDP-H); false is CoDP
+    past_human_action: bool | None = None  # condition on the human's past action (the paper's CoDP-H); false is CoDP
 
     n_obs_steps: int = 3  # frames of history that the policy observes, including the current one
     horizon: int = 12  # length of the sampled action sequence, from the oldest frame of the history on
@@ -67,13 +74,18 @@ class CopolicyConfig(PairPolicyConfig):
     drop_n_last_frames: int | None = None  # frames at the end of an episode that start no training sample
     do_mask_loss_for_padding: bool = False  # leave actions beyond either end of the episode out of the loss
 
-    network: str | None = None  # "transformer" decoder or residual "mlp"
+    network: str | None = None  # "transformer" decoder, residual "mlp", or "unet", the temporal CNN
     n_layers: int | None = None  # decoder layers, or residual blocks of the mlp
     width: int | None = None  # size of the embedding, or of the mlp's hidden layers
     n_heads: int | None = None  # attention heads of the transformer
     feedforward_width: int | None = None  # hidden size of the transformer's feed-forward part
     attention_dropout: float | None = None  # dropout in the transformer's layers
     embedding_dropout: float | None = None  # dropout after the transformer's embeddings
+    down_widths: tuple[int, ...] | None = None  # channels of the unet's levels, each with half the frames of the last
+    kernel_size: int = 5  # of the unet's convolutions, odd
+    n_groups: int = 8  # of the unet's group normalisation
+    step_width: int = 256  # size of the unet's embedding of the diffusion step
+    inpainting: bool | None = None  # the unet denoises actions and observations, without another condition
 
     num_train_timesteps: int = 100  # diffusion steps in training
     beta_schedule: str = "squaredcos_cap_v2"  # noise schedule, by its name in diffusers
@@ -81,8 +93,9 @@ class CopolicyConfig(PairPolicyConfig):
     clip_sample_range: float = 1.0  # the sample is clipped to plus and minus this at each sampling step
     sampler: str | None = None  # "ddpm", "ddim" or "dpmsolver++"
     num_inference_steps: int | None = None  # denoising steps
+    timestep_spacing: str | None = None  # which training steps these are, in diffusers' words: "trailing" or "leading"
     initial_noise_scale: float | None = None  # standard deviation of the initial noise; below 1 favours the main mode
-    planner: str = "fast"  # "fast" sampler, or "plain" with diffusers' schedulers and the same result, as a reference
+    planner: str = "fast"  # "fast" sampler, or "plain" with diffusers' schedulers and the same result (always the unet)
     compile_model: bool = False  # train the network's layers with torch.compile, for long runs on a GPU
     backend: str = "auto"  # runs the network in inference: "torch", on a CPU "onnx" or "numba"; "auto" is the fastest
 
@@ -92,7 +105,7 @@ class CopolicyConfig(PairPolicyConfig):
     ema_max_decay: float = 0.9999  # upper bound of the decay
 
     optimizer_lr: float | None = None  # peak learning rate of AdamW
-    optimizer_weight_decay: float | None = None  # not applied to biases, norms and position embeddings
+    optimizer_weight_decay: float | None = None  # applied to biases, norms and position embeddings of the unet only
     optimizer_betas: tuple[float, float] | None = None  # AdamW's betas
     optimizer_grad_clip_norm: float | None = None  # largest gradient norm; 0 does not clip
     scheduler_warmup_steps: int | None = None  # updates over which the learning rate rises
@@ -116,11 +129,33 @@ class CopolicyConfig(PairPolicyConfig):
             raise InvalidValueError("width", f"a multiple of n_heads = {self.n_heads}", self.width)
         if self.backend not in (AUTO, "torch") and self.planner == "plain":
             raise InvalidValueError("backend, for planner=plain", "torch", self.backend)
+        if self.network == "unet":
+            self._validate_unet()
+        elif self.inpainting:
+            raise InvalidValueError("inpainting", f"false for network={self.network}, only the unet has it", True)
+
+    def _validate_unet(self) -> None:
+        levels, groups = len(self.filled.down_widths), self.n_groups
+        if not levels or any(width % groups for width in self.filled.down_widths) or self.filled.down_widths[0] % 8:
+            expected = f"multiples of n_groups = {groups}, the first one also of 8"
+            raise InvalidValueError("down_widths", expected, list(self.filled.down_widths))
+        if self.horizon % 2 ** (levels - 1):
+            expected = f"a multiple of {2 ** (levels - 1)}, because down_widths has {levels} levels"
+            raise InvalidValueError("horizon", expected, self.horizon)
+        if self.kernel_size % 2 == 0:
+            raise InvalidValueError("kernel_size", "an odd number", self.kernel_size)
+        if self.step_width % 2:
+            raise InvalidValueError("step_width", "an even number", self.step_width)
+        if self.backend not in (AUTO, "torch"):
+            raise InvalidValueError("backend, for network=unet", "torch", self.backend)
+        if self.inpainting and self.observation_features != "absolute":
+            expected = "absolute, whose values are in [-1, 1] like those of the sampler"
+            raise InvalidValueError("observation_features, for inpainting", expected, self.observation_features)
 
     @property
     def observation_delta_indices(self) -> list[int]:
-        """Frames of the history, relative to the current one."""
-        return list(range(1 - self.n_obs_steps, 1))
+        """Frames of the history, relative to the current one; for inpainting those of the whole sequence."""
+        return self.action_delta_indices if self.inpainting else list(range(1 - self.n_obs_steps, 1))
 
     @property
     def action_delta_indices(self) -> list[int]:

@@ -13,7 +13,7 @@ from torch import Tensor
 from copolicy.dataset.exceptions import UnknownNameError
 
 from .configuration_copolicy import CopolicyConfig
-from .fast.sampler_coefficients import SamplerCoefficients, trailing_timesteps
+from .fast.sampler_coefficients import SamplerCoefficients, leading_timesteps, trailing_timesteps
 
 
 class ClippedDpmSolver(DPMSolverMultistepScheduler):
@@ -39,6 +39,8 @@ class ClippedDpmSolver(DPMSolverMultistepScheduler):
 class ActionDiffusion:
     """Noise schedule, prediction target and sampler of a policy; has no weights.
 
+    A sequence has actions, and for inpainting also observations: n values per frame.
+
     The schedulers are diffusers'; `coefficients` is the same sampler for `FastSampler`.
     """
 
@@ -50,7 +52,8 @@ class ActionDiffusion:
         }
         clipped = {"clip_sample": True, "clip_sample_range": config.clip_sample_range}
         self._training: Any = DDPMScheduler(variance_type="fixed_small", **settings, **clipped)
-        timesteps = trailing_timesteps(config.num_train_timesteps, config.filled.num_inference_steps)
+        spaced = {"trailing": trailing_timesteps, "leading": leading_timesteps}[config.filled.timestep_spacing]
+        timesteps = spaced(config.num_train_timesteps, config.filled.num_inference_steps)
         self.scheduler: Any
         if config.sampler == "ddpm":
             self.scheduler = self._training

@@ -15,17 +15,13 @@ from copolicy.dataset.features import ACTION
 
 from ..pair_policy.modeling_pair import PairPolicy
 from .configuration_copolicy import CopolicyConfig
-from .denoiser_mlp import MlpDenoiser
-from .denoiser_transformer import TransformerDenoiser
 from .diffusion import ActionDiffusion
 from .ema import ExponentialMovingAverage
 from .fast.backend import require_backend
 from .fast.fast_sampler import FastSampler
+from .networks import make_denoiser, weight_decay_groups
 
 _PADDING = f"{ACTION}_is_pad"
-_SIZES = ("horizon", "n_obs_steps", "n_layers", "width")
-_DECODER = ("n_heads", "feedforward_width", "attention_dropout", "embedding_dropout")
-_NETWORKS = {"transformer": (TransformerDenoiser, (*_SIZES, *_DECODER)), "mlp": (MlpDenoiser, _SIZES)}
 
 
 class CopolicyPolicy(PairPolicy):
@@ -36,7 +32,8 @@ class CopolicyPolicy(PairPolicy):
     so that only the beginning is padded.
 
     Inputs and outputs are in the units of the task, [-1, 1] for actions of the table; they are scaled by the bounds of
-    the task inside the policy. To is `n_obs_steps`, T is `horizon`, m the number of values of a joint action.
+    the task inside the policy. To is `n_obs_steps`, T is `horizon`, m the number of values of a joint action. With
+    `inpainting`, the sequence that is denoised also has the observations of all T frames.
     """
 
     config_class = CopolicyConfig  # pyright: ignore[reportAssignmentType]
@@ -45,13 +42,11 @@ class CopolicyPolicy(PairPolicy):
 
     def __init__(self, config: CopolicyConfig, **kwargs):
         super().__init__(config, **kwargs)
-        network, names = _NETWORKS[config.filled.network]
-        self.denoiser: TransformerDenoiser | MlpDenoiser = network(
-            self._sizes[ACTION], self.features.size, **{name: getattr(config, name) for name in names}
-        )
+        self.denoiser = make_denoiser(config, self._sizes[ACTION], self.features.size)
         self.diffusion = ActionDiffusion(config)
         require_backend(config.backend)
-        self._fast = FastSampler(self.diffusion.coefficients, config.backend) if config.planner == "fast" else None
+        is_fast = config.planner == "fast" and config.network != "unet"
+        self._fast = FastSampler(self.diffusion.coefficients, config.backend) if is_fast else None
         self.ema = (
             ExponentialMovingAverage(self.denoiser, config.ema_power, config.ema_inv_gamma, config.ema_max_decay)
             if config.ema
@@ -66,14 +61,8 @@ class CopolicyPolicy(PairPolicy):
         self.reset()
 
     def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Two parameter groups, with and without weight decay; the moving average is in neither."""
-        decayed, plain = [], []
-        for name, parameter in self.denoiser.named_parameters():
-            weight = parameter.ndim > 1 and not name.endswith("_position")
-            (decayed if weight else plain).append(parameter)
-        # One fused kernel instead of a dozen small ones per tensor halves the optimizer's time on a CPU.
-        fused = decayed[0].device.type in ("cpu", "cuda")
-        return [{"params": decayed, "fused": fused}, {"params": plain, "weight_decay": 0.0, "fused": fused}]
+        """The network's weights in groups with and without weight decay; the moving average is in neither."""
+        return weight_decay_groups(self.config, self.denoiser)
 
     def update(self) -> None:
         """Updates the moving average; LeRobot's trainer calls this after each optimizer step.
@@ -95,9 +84,12 @@ class CopolicyPolicy(PairPolicy):
     def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> tuple[Tensor, dict]:
         """The training loss: mean squared error of the prediction over all tokens and both players.
 
+        With inpainting it is the mean over actions and observations, where an error of an observation of the history
+        counts as zero, as in Diffusion Policy.
+
         Args:
-            batch: observation columns `(B, To, n)`, `action` `(B, T, m)` of both players, and its padding mask
-                `(B, T)` if `do_mask_loss_for_padding` is set.
+            batch: observation columns `(B, To, n)`, for inpainting `(B, T, n)`; `action` `(B, T, m)` of both players;
+                and its padding mask `(B, T)` if `do_mask_loss_for_padding` is set.
             reduction: "mean", or "none" for one loss per sample (LeRobot's sample weighting).
 
         Returns:
@@ -108,11 +100,17 @@ class CopolicyPolicy(PairPolicy):
             ShapeError: a column has another shape.
             RunError: the batch has a frame of an excluded episode, or the loss of the previous step is not finite.
         """
-        sample = self._training_sample(batch, self.config.n_obs_steps, self.config.horizon)
-        noisy, steps, target = self.diffusion.add_noise(self.action_scale.scaled(sample[ACTION]))
-        prediction = self.denoiser(noisy, steps, self.features(sample))
-        error = (prediction.float() - target).square().mean(dim=-1)  # (B, T)
-        loss = self._reduced(error, batch, reduction)
+        observed, frames = self.config.n_obs_steps, len(self.config.observation_delta_indices)
+        sample = self._training_sample(batch, frames, self.config.horizon)
+        sequence, features = self.action_scale.scaled(sample[ACTION]), self.features(sample)
+        if self.config.inpainting:
+            sequence = torch.cat((sequence, features), dim=-1)  # (B, T, m + features.size)
+        noisy, steps, target = self.diffusion.add_noise(sequence)
+        prediction = self.denoiser(noisy, steps, features[:, :observed])
+        error = (prediction.float() - target).square()
+        if self.config.inpainting:
+            error[:, :observed, self._sizes[ACTION] :] = 0
+        loss = self._reduced(error.mean(dim=-1), batch, reduction)
         if self.training:
             self._loss = loss.detach()
         return loss, {}
@@ -144,7 +142,7 @@ class CopolicyPolicy(PairPolicy):
         Args:
             batch: observation columns `(B, To, n)`, oldest frame first, in physical units.
             generator: source of the noise; the global one if None.
-            noise: `(B, T, m)` standard normal initial noise; drawn if None.
+            noise: `(B, T, m)` standard normal initial noise, for inpainting `(B, T, m + features.size)`; drawn if None.
             actions: number of actions from the current frame on; all if None. Fewer are faster and have equal values.
 
         Returns:
@@ -156,7 +154,8 @@ class CopolicyPolicy(PairPolicy):
             ShapeError: a column has another shape.
         """
         condition = self.features(self._observation(batch, self.config.n_obs_steps))
-        shape = (len(condition), self.config.horizon, self._sizes[ACTION])
+        size = self._sizes[ACTION]
+        shape = (len(condition), self.config.horizon, size + self.features.size * bool(self.config.inpainting))
         if noise is None:
             # On the CPU, so that a seed gives the same noise on every device.
             noise = torch.randn(shape, generator=generator, device="cpu" if generator is None else generator.device)
@@ -168,12 +167,12 @@ class CopolicyPolicy(PairPolicy):
             sequence = self._fast.sample(network, condition, noise, tokens, generator)
         else:
             sequence = self.diffusion.sample(lambda noisy, steps: network(noisy, steps, condition), noise, generator)
-        return self.action_scale.physical(sequence[:, :tokens])
+        return self.action_scale.physical(sequence[:, :tokens, :size])
 
     @property
     def planned_with(self) -> tuple[str, ...]:
-        """Backends that have run the network in inference so far."""
-        return () if self._fast is None else tuple(sorted(self._fast.used))
+        """Backends that have run the network in inference so far; the plain sampler runs it with torch."""
+        return ("torch",) if self._fast is None else tuple(sorted(self._fast.used))
 
     @torch.no_grad()
     def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:

@@ -3,6 +3,7 @@
 PRESETS: dict[str, dict] = {
     # The paper's settings, from its training configuration and its section IV.
     "paper": {
+        "past_human_action": True,
         "network": "transformer",
         "n_layers": 8,
         "width": 256,
@@ -10,12 +11,15 @@ PRESETS: dict[str, dict] = {
         "feedforward_width": 1024,
         "attention_dropout": 0.3,
         "embedding_dropout": 0.0,
+        "down_widths": (256, 512, 1024),
+        "inpainting": False,
         "observation_features": "absolute",
         "mirror": False,
         "permute_obstacles": False,
         "prediction_type": "epsilon",
         "sampler": "ddpm",
         "num_inference_steps": 100,
+        "timestep_spacing": "trailing",
         "initial_noise_scale": 1.0,
         "drop_n_last_frames": 9,
         "optimizer_lr": 1e-4,
@@ -52,4 +56,30 @@ PRESETS["small"] = {
     "optimizer_betas": (0.9, 0.999),
     "scheduler_warmup_steps": 200,
     "scheduler_final_lr_fraction": 0.01,
+}
+
+# The CNN of Diffusion Policy (Chi et al., 2023) for low-dimensional observations, with the paper's horizons.
+PRESETS["cnn"] = {
+    **PRESETS["paper"],
+    "past_human_action": False,
+    "network": "unet",
+    "optimizer_weight_decay": 1e-6,
+    "optimizer_betas": (0.95, 0.999),
+    "scheduler_warmup_steps": 500,
+}
+
+# The training configuration of the CNN that the co-policy's authors released.
+PRESETS["cnn-inpainting"] = {
+    **PRESETS["cnn"],
+    "inpainting": True,
+    "sampler": "ddim",
+    "num_inference_steps": 8,
+    "timestep_spacing": "leading",
+}
+
+# "small" with a CNN of a size that a CPU trains.
+PRESETS["cnn-small"] = {
+    **PRESETS["small"],
+    "network": "unet",
+    "down_widths": (64, 128, 256),
 }

@@ -33,6 +33,11 @@ def environment_of_callers() -> EnvConfig | None:
     return None
 
 
+def training_steps_of_callers() -> int | None:
+    """Number of steps of the training that constructs a policy; None without one."""
+    return next((value.steps for value in _variables() if isinstance(value, TrainPipelineConfig)), None)
+
+
 def _variables() -> Iterator[Any]:
     frame = sys._getframe(2)
     while frame is not None:

@@ -48,7 +48,7 @@ class PairPolicyConfig(PreTrainedConfig):
 
     task: str | None = None  # task that defines columns, bounds, features; default: that of the data, else the table
     preset: str = "default"  # named set of values for the settings that are not given
-    past_human_action: bool = False  # condition on the human's past action
+    past_human_action: bool | None = False  # condition on the human's past action
 
     observation_features: str | None = None  # "absolute"; for the table also "relative" and "scan" (with a range scan)
     mirror: bool | None = None  # mirror half of the training samples (for the table in y)

@@ -13,7 +13,7 @@ from torch import Tensor
 from copolicy.dataset.exceptions import InvalidValueError, RunError, ShapeError
 from copolicy.dataset.features import ACTION, features_of
 from copolicy.dataset.lerobot_folder.info import task_of
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 from copolicy.train.finite_data import NonFiniteError, NonFiniteLossError
 from copolicy.train.finite_weights import non_finite_weight
 
@@ -33,6 +33,7 @@ class PairPolicy(PreTrainedPolicy):
     Attributes:
         features: encodes observation columns `(..., n)` into network inputs `(..., features.size)`.
         action_scale: scales joint actions to [-1, 1] and back.
+        symmetries: functions that augment training samples, see `PolicyFeatures`.
     """
 
     config_class = PairPolicyConfig  # pyright: ignore[reportAssignmentType]
@@ -50,7 +51,7 @@ class PairPolicy(PreTrainedPolicy):
         task = get_task(config.filled.task)
         self._sizes = {name: column["shape"][0] for name, column in features_of(task.spec).items()}
         offered = task.features
-        self._symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
+        self.symmetries = [augment for name, augment in offered.symmetries.items() if name in config.used_symmetries]
         # Excluded episodes, to be refused in a batch if the constructor cannot find out the episodes of the training.
         self._excluded = torch.tensor(sorted(prepare_training(config, meta)) if meta is not None else [])
         require_same_rate(config)
@@ -59,10 +60,14 @@ class PairPolicy(PreTrainedPolicy):
         unused = sorted((config.input_features or {}).keys() - set(config.observation_keys))
         if unused:
             logging.info("%s does not read %s", config.type, ", ".join(unused))
-        generic: dict[str, Callable] = {"absolute": AbsoluteFeatures, "raw": RawFeatures}
-        encoders = {**offered.encoders, **{name: partial(encoder, task.spec) for name, encoder in generic.items()}}
-        self.features = encoders[config.filled.observation_features](config.past_human_action)
+        self.features = self._make_features(task)
         self.action_scale = ActionScale(task.spec)
+
+    def _make_features(self, task: PairTask) -> Any:
+        """The encoder with the name `observation_features`; a subclass with encoders of its own overrides it."""
+        generic: dict[str, Callable] = {"absolute": AbsoluteFeatures, "raw": RawFeatures}
+        encoders = {**task.features.encoders, **{name: partial(make, task.spec) for name, make in generic.items()}}
+        return encoders[self.config.filled.observation_features](self.config.filled.past_human_action)
 
     def update(self) -> None:
         """LeRobot's trainer calls this after each optimizer step.
@@ -103,7 +108,7 @@ class PairPolicy(PreTrainedPolicy):
             self._require_no_excluded(batch)
         sample = self._observation(batch, frames)
         sample[ACTION] = self._column(batch, ACTION, actions)
-        for augment in self._symmetries if self.training else ():
+        for augment in self.symmetries if self.training else ():
             sample = augment(sample)
         return sample
 

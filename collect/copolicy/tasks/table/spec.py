@@ -8,9 +8,9 @@ from .map_config import MAX_OBSTACLES, WINDOW
 
 _WIDTH, _HEIGHT = (float(side) for side in WINDOW)
 _TURN = 2 * math.pi
-_SPEED, _SPIN = 50.0, math.pi / 2  # px/s, the terminal speed of an axis under two full forces; rad/s
+SPEED, _SPIN = 50.0, math.pi / 2  # px/s, the terminal speed of an axis under two full forces; rad/s
 
-_VELOCITY = (("vx", "px/s", -_SPEED, _SPEED), ("vy", "px/s", -_SPEED, _SPEED), ("omega", "rad/s", -_SPIN, _SPIN))
+_VELOCITY = (("vx", "px/s", -SPEED, SPEED), ("vy", "px/s", -SPEED, SPEED), ("omega", "rad/s", -_SPIN, _SPIN))
 _POSITION = (("x", "px", 0.0, _WIDTH), ("y", "px", 0.0, _HEIGHT))
 
 

@@ -8,6 +8,7 @@ from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import Studies
 
 from .map_config import MapConfig
+from .published import PUBLISHED, SOURCE
 
 _STILL_SPEED, _STILL_SPIN = 6.0, 0.1  # px/s, rad/s
 
@@ -26,6 +27,9 @@ class TableStudies(Studies):
         "partners": "scripted agents that choose their own route act at the human's seat, no person took part; they "
         "know every route of the map, which favours any robot",
     }
+
+    published = PUBLISHED
+    published_source = SOURCE
 
     def factors(self, scenario: MapConfig) -> dict[str, Any]:
         """Start orientation (rad) and number of obstacles of a map."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from .artist.table_view import TableView
     from .map_files import MapFiles
+    from .policy.motion import TableMotion
     from .recording import TableMessages
     from .world import TableWorld
 
@@ -214,6 +215,13 @@ class TableTask(PairTask):
         from .policy import POLICY_FEATURES  # torch
 
         return POLICY_FEATURES
+
+    @property
+    def motion(self) -> "TableMotion":
+        """Kinematics, dynamics and rewards of the table."""
+        from .policy.motion import TableMotion  # torch
+
+        return TableMotion()
 
     def settings_summary(self, settings: Physics) -> str:
         """The bound on the angular acceleration, and all other settings that differ from the default."""

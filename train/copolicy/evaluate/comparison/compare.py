@@ -33,10 +33,12 @@ def compare(methods: Sequence[Method]) -> dict[str, Any]:
         "episodes_per_run": len(first.values),
         "methods": {
             method.name: {
-                **_summary([run.values for run in method.runs]),
+                **method_summary([run.values for run in method.runs]),
                 "files": [str(run.path) for run in method.runs],
                 "per_run_success": [run.success for run in method.runs],
-                "parts": {name: _summary([select(run) for run in method.runs]) for name, select in subsets.items()},
+                "parts": {
+                    name: method_summary([select(run) for run in method.runs]) for name, select in subsets.items()
+                },
             }
             for method in methods
         },
@@ -65,7 +67,12 @@ def _subsets(first: StudyResult) -> dict[str, Subset]:
     return subsets
 
 
-def _summary(runs: Sequence[Mapping[EpisodeKey, Metrics]]) -> dict[str, Any]:
+def method_summary(runs: Sequence[Mapping[EpisodeKey, Metrics]]) -> dict[str, Any]:
+    """Success, time of successes and interaction of a method from the episodes of its training runs.
+
+    Each has its mean over runs, the standard error between runs and the largest value; the standard error of the
+    success of one run is binomial (`standard_error_of`).
+    """
     success = between_runs(_run_means(runs, "success"))
     error, source = success["standard_error"], "between runs"
     if error is None:

@@ -26,7 +26,7 @@ def markdown(comparison: Mapping[str, Any]) -> str:
         f"**{comparison['study']}, {settings.get('maps', '?')} maps**, {comparison['episodes_per_run']} episodes per "
         f"run, {settings.get('actions_per_plan', '?')} actions per chunk, each held for {settings.get('hold', '?')} "
         f"steps, at most {settings.get('step_limit', '?')} steps ({comparison['label']}).",
-        _table(["method", "runs", "success, % (max)", *labels, *(f"{part}, %" for part in parts)], rows),
+        markdown_table(["method", "runs", "success, % (max)", *labels, *(f"{part}, %" for part in parts)], rows),
     ]
     if comparison["differences"]:
         rows = [
@@ -38,7 +38,9 @@ def markdown(comparison: Mapping[str, Any]) -> str:
             ]
             for difference in comparison["differences"]
         ]
-        text.append(_table(["difference", "success, points", *labels, "McNemar p", "between runs, points"], rows))
+        text.append(
+            markdown_table(["difference", "success, points", *labels, "McNemar p", "between runs, points"], rows)
+        )
     notes = {name: comparison["definitions"][name] for name in ("success", "bootstrap_95", "between_runs")}
     text.append("\n".join(f"- {name}: {note}." for name, note in {**notes, **missing}.items()))
     return "\n\n".join(text) + "\n"
@@ -75,6 +77,7 @@ def _interval(difference: Mapping[str, Any], scale: float, digits: int) -> str:
     return f"{mean} ({low} to {high})"
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
+def markdown_table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table from its header and its rows of equal length."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -1,6 +1,7 @@
 """Statistics of paired comparisons: differences of two methods on the same starts, intervals and tests."""
 
 import math
+import warnings
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -62,23 +63,29 @@ def paired_differences(
 
 
 def clustered_mean(values: Array, clusters: Sequence[Hashable], seed: int = 0) -> dict[str, Any]:
-    """Mean of values `(n,)` with a 95 % interval from a bootstrap over clusters; nan values are left out."""
+    """Mean of values `(n,)` with standard error and 95 % interval of a bootstrap over clusters; nan is left out."""
     finite = np.isfinite(values)
     if not finite.any():
-        return {"mean": None, "bootstrap_95": None, "pairs": 0, "maps": 0}
+        return {"mean": None, "standard_error": None, "bootstrap_95": None, "pairs": 0, "maps": 0}
     indices = {name: k for k, name in enumerate(dict.fromkeys(clusters))}
     index = np.array([indices[name] for name in clusters])[finite]
     used = np.unique(index)
     sums = np.bincount(index, values[finite], minlength=len(indices))[used]
     counts = np.bincount(index, minlength=len(indices))[used]
     mean = float(sums.sum() / counts.sum())
-    interval = None
+    interval = error = None
     if len(used) > 1:
         rng = np.random.default_rng(seed)
         weights = rng.multinomial(len(used), np.full(len(used), 1 / len(used)), size=REPLICATES)
-        low, high = np.quantile((weights @ sums) / (weights @ counts), (0.025, 0.975))
-        interval = [float(low), float(high)]
-    return {"mean": mean, "bootstrap_95": interval, "pairs": int(finite.sum()), "maps": len(used)}
+        means = (weights @ sums) / (weights @ counts)
+        error, interval = float(means.std()), np.quantile(means, (0.025, 0.975)).tolist()
+    return {
+        "mean": mean,
+        "standard_error": error,
+        "bootstrap_95": interval,
+        "pairs": int(finite.sum()),
+        "maps": len(used),
+    }
 
 
 def mcnemar_exact(first: Sequence[bool], second: Sequence[bool]) -> dict[str, Any]:
@@ -111,7 +118,11 @@ def welch(first: Sequence[float], second: Sequence[float]) -> dict[str, Any] | N
         return None
     if np.ptp(first) == np.ptp(second) == 0:
         return None
-    result = stats.ttest_ind(first, second, equal_var=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", RuntimeWarning
+        )  # scipy warns if one set has no spread, which Welch's test allows
+        result = stats.ttest_ind(first, second, equal_var=False)
     low, high = result.confidence_interval(0.95)  # pyright: ignore[reportAttributeAccessIssue]
     return {"interval_95": [float(low), float(high)], "p": float(result.pvalue)}  # pyright: ignore
 

@@ -111,12 +111,18 @@ class SamplerCoefficients:
 def trailing_timesteps(num_train_timesteps: int, num_inference_steps: int) -> list[int]:
     """Evenly spaced steps from the last training step down ("trailing" in diffusers).
 
-    With fewer steps than in training, "leading" spacing (diffusers' default) would give the network pure noise at a
-    step of partly denoised input. diffusers' trailing list ends with a step -1 for some numbers of steps (29, 31, 58,
+    With fewer steps than in training, "leading" spacing gives the network pure noise at a step of partly denoised
+    input. diffusers' trailing list ends with a step -1 for some numbers of steps (29, 31, 58,
     62 and 97 of 100), by a rounding error of its range; this one does not.
     """
     steps = np.arange(num_train_timesteps, 0, -num_train_timesteps / num_inference_steps)[:num_inference_steps]
     return (np.round(steps).astype(int) - 1).tolist()
+
+
+def leading_timesteps(num_train_timesteps: int, num_inference_steps: int) -> list[int]:
+    """Evenly spaced steps down to the first training step ("leading", diffusers' default)."""
+    stride = num_train_timesteps // num_inference_steps
+    return [index * stride for index in reversed(range(num_inference_steps))]
 
 
 def _draw(like: Tensor, generator: torch.Generator | None) -> Tensor:

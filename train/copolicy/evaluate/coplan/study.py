@@ -1,0 +1,83 @@
+"""The co-planning study of one policy on one map set: its settings, and its result and figure as files."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from copolicy.dataset.files.staging import replace_json
+from copolicy.dataset.scenarios import ScenarioSet
+
+from ..study_flags import Protocol, study_settings
+from ..summary import not_measured, percent, summarise
+from .figure import save_path_figure
+from .rollouts import coplan
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+    from copolicy.train.checkpoint import Checkpoint
+
+
+def coplan_settings(arguments: argparse.Namespace, protocol: Protocol, chosen: ScenarioSet) -> dict[str, Any]:
+    """The `settings` entry of a result.
+
+    Args:
+        arguments: flags of the study: `orientations`, `limit`, `repeats`, and those of `study_settings`.
+        chosen: the scenarios, before `--limit`.
+    """
+    scenarios = chosen.scenarios[: arguments.limit]
+    return {
+        "maps": chosen.label,
+        "map_set": chosen.describe(),
+        "orientations": arguments.orientations,
+        "map_count": len(scenarios),
+        "complete_set": arguments.limit is None,
+        "repeats": arguments.repeats,
+        **study_settings(arguments, protocol, scenarios),
+    }
+
+
+def write_coplan_result(
+    policy: "Checkpoint",
+    protocol: Protocol,
+    scenarios: Sequence[Any],
+    settings: dict[str, Any],
+    out: Path,
+    bar: "tqdm[Any]",
+) -> dict[str, Any]:
+    """Runs the study, and writes its result and, if the task has an outline, the figure beside it.
+
+    Args:
+        policy: with the number of actions of a chunk that are executed.
+        settings: see `coplan_settings`.
+        out: result file, replaced if it exists.
+        bar: progress bar of finished episodes.
+    """
+    first = bar.n
+    episodes = coplan(
+        policy,
+        scenarios,
+        protocol.settings,
+        repeats=settings["repeats"],
+        fps=protocol.fps,
+        seed=settings["seed"],
+        on_step=lambda finished: bar.update(first + finished - bar.n),
+    )
+    summary = summarise(episodes, policy)
+    result = {
+        "study": "coplan",
+        "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
+        "policy": policy.describe(),
+        "settings": settings,
+        "summary": summary,
+        **not_measured(protocol.task, summary),
+        "episodes": [episode.to_json() for episode in episodes],
+    }
+    out.parent.mkdir(parents=True, exist_ok=True)
+    success = summary["success"]
+    title = f"co-planning on {settings['maps']}: {percent(success)} of {success['episodes']} episodes"
+    if protocol.task.outline is not None:
+        save_path_figure(episodes, out.with_suffix(".png"), title)
+    replace_json(out, result, indent=1)  # last, so that an existing result is always complete
+    return result
