@@ -11,6 +11,7 @@ from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import replace_json, require_new
 
 from .comparison import add_compare_command
+from .cross_play import add_cross_play_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .plans.command import add_plans_command
@@ -47,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     coplan.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
     add_study_flags(coplan, n_action_steps=8)
     add_partner_command(commands)
+    add_cross_play_command(commands)
     add_human_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)
