@@ -111,14 +111,12 @@ def _options(text: str) -> tuple[str, dict[str, float]]:
     options: dict[str, float] = {}
     while match := re.fullmatch(r"(.*),([a-z_]+)=([^,=/]*)", text):
         text, name, value = match[1], match[2], match[3]
-        largest = _LARGEST.get(name, math.inf)
         try:
             number = float(value)
         except ValueError:
             number = math.nan
-        if not (math.isfinite(number) and 0 <= number <= largest):
-            expected = f"a number from 0 to {largest:g}" if name in _LARGEST else f"one of {', '.join(_LARGEST)}"
-            raise InvalidValueError(f"--partners {name}", expected, value if name in _LARGEST else name)
+        if name in _LARGEST and not 0 <= number <= _LARGEST[name]:  # also nan
+            raise InvalidValueError(f"--partners {name}", f"a number from 0 to {_LARGEST[name]:g}", value)
         options = {name: number, **options}
     return text, options
 
