@@ -90,7 +90,8 @@ def test_each_checkpoint_records_the_pairs_of_its_run(people, tmp_path, capsys):
     assert main([*resumed, "--split=pairs:P02"]) == 2
     assert "--split: expected no such flag with --resume=true" in capsys.readouterr().err.splitlines()[-1]
     assert main(resumed) == 0
-    last = json.loads((output / "checkpoints" / "000006" / "pretrained_model" / "training_data.json").read_text())
+    record = output / "checkpoints" / "000006" / "pretrained_model" / "training_data.json"
+    last = json.loads(record.read_text(encoding="utf-8"))
     assert last["episodes"] == [0, 1, 4, 5]
     assert main([*flags(people, tmp_path / "x"), "--split=pairs:P02", "--dataset.episodes=[1]"]) == 2
     assert "--split: expected no such flag beside --dataset.episodes" in capsys.readouterr().err.splitlines()[-1]

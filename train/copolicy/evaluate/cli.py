@@ -14,6 +14,7 @@ from .comparison import add_compare_command
 from .cross_play import add_cross_play_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
+from .partners.command import add_partners_command
 from .plans.command import add_plans_command
 from .study_flags import (
     POLICY_HELP,
@@ -49,6 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_study_flags(coplan, n_action_steps=8)
     add_partner_command(commands)
     add_cross_play_command(commands)
+    add_partners_command(commands)
     add_human_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)

@@ -4,6 +4,7 @@
     [NAME=][scripted:]KIND[,delay=S][,noise=X]               a scripted kind of the task, such as stubborn
     [NAME=]human-like[,delay=S][,noise=X]                    a scripted player with people's delay and force noise
     [NAME=]replay:FOLDER[,noise=X]                           recorded human actions, without feedback
+    population:FOLDER#choosing                               a half of a population (`partners make`), or #reporting
 
 `delay` is a reaction time in s (for a scripted kind in addition to its own), `noise` the standard deviation of the
 force noise as a proportion of the force, `commit` the time in s for which a proxy executes a chunk before it looks
@@ -18,14 +19,19 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.collect.agents.simulated_players import simulated_players
-from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
+from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.task import PairTask
 
+from .population import CHOOSING, DOCUMENT, REPORTING, PopulationDocument
+
 PROXY, SCRIPTED, HUMAN_LIKE, REPLAY = "proxy", "scripted", "human-like", "replay"
+POPULATION = "population"
 
 PARTNERS_HELP = (
     "partners: kinds of scripted player (scripted:KIND or KIND), proxy:CKPT (a policy at the human's seat), "
-    "human-like, replay:FOLDER (recorded human actions); each may have a name and options, as in "
+    "human-like, replay:FOLDER (recorded human actions), population:FOLDER#choosing or #reporting; each "
+    "may have a name and options, as in "
     "slow-proxy=proxy:CKPT,delay=0.2,noise=0.3,commit=0.8"
 )
 
@@ -65,8 +71,10 @@ def parse_partners(texts: Iterable[str], task: PairTask) -> list[PartnerName]:
     Raises:
         UnknownNameError: no such kind of scripted player.
         InvalidValueError: another form, an option that the kind does not have, or two partners of one name.
+        FileFormatError: a population that is not complete.
         CopolicyError: the task has no scripted or human-like players, and one is asked for.
     """
+    texts = [text for given in texts for text in _members(given)]
     partners = [_parse(text, task) for text in dict.fromkeys(texts)]
     names = [partner.name for partner in partners]
     if not partners:
@@ -99,6 +107,23 @@ def _parse(text: str, task: PairTask) -> PartnerName:
             expected = f"options of a {kind} partner ({', '.join(_OPTIONS[kind])})"
             raise InvalidValueError(f"--partners {text}", expected, option)
     return PartnerName(name or _default_name(kind, detail, options), kind, detail, options)
+
+
+def _members(text: str) -> list[str]:
+    """The names of a half of a population; another name is itself."""
+    if not text.startswith(f"{POPULATION}:"):
+        return [text]
+    folder, sign, half = text.removeprefix(f"{POPULATION}:").rpartition("#")
+    if not sign or half not in (CHOOSING, REPORTING):
+        expected = f"{POPULATION}:FOLDER#{CHOOSING} or {POPULATION}:FOLDER#{REPORTING}"
+        raise InvalidValueError("--partners", expected, text)
+    path = Path(folder) / DOCUMENT
+    document = read_json(path, PopulationDocument, "the record of a population (copolicy-eval partners make)")
+    proxies = [name for name, recipe in document["proxies"].items() if recipe["half"] == half]
+    if missing := [name for name in proxies if not (Path(folder) / name).is_dir()]:
+        raise FileFormatError(folder, f"the proxies of the half {half}", f"none named {', '.join(missing)}")
+    others = [name for name, of in document["others"].items() if of == half]
+    return [*(f"{name}={PROXY}:{Path(folder) / name}" for name in proxies), *others]
 
 
 def _named(text: str) -> tuple[str, str]:
