@@ -16,12 +16,13 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.cross_play import cells
 from copolicy.evaluate.cross_play.measures import MEASURES, own_kind_times, summary
-from copolicy.evaluate.cross_play.score import partner_scores, reference_times, scored
+from copolicy.evaluate.cross_play.score import counts, in_time, partner_scores, references
 from copolicy.evaluate.partner_study.clearance import smallest_distance
 from copolicy.evaluate.partner_study.study import run_with_partners
 from copolicy.evaluate.partners.names import parse_partners
 from copolicy.evaluate.partners.overlap import check_overlap
 from copolicy.evaluate.partners.partner import make_partner
+from copolicy.evaluate.study_flags import Protocol
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.train.training_data import TRAINING_DATA_FILE, training_pairs
@@ -37,12 +38,23 @@ def row(map_id, time_s, success=True, start=0):
 
 def test_a_success_counts_within_one_and_a_half_times_the_own_kinds_median_on_the_map():
     own = [row("a", 10.0), row("a", 20.0), row("b", 40.0, False), row("a-90deg", 90.0, False)]
-    reference = reference_times(own)
-    assert reference is not None
-    assert {name: reference[name] for name in ("a", "b")} == {"a": 15.0, "b": 15.0}  # no success on b: over all maps
+    found = references(own)
+    assert found is not None
+    assert {name: found[name].time_s for name in ("a", "b")} == {"a": 15.0, "b": 15.0}  # no success on b: over all maps
     rows = [row("a", 22.5), row("a", 22.6), row("b", 22.0), row("a", 5.0, False)]
-    assert scored(rows, reference) == [True, False, True, False]
-    assert reference_times([row("a", 1.0, False)]) is None
+    assert [counts(each, found[each["map_id"]]) for each in rows] == [True, False, True, False]
+    assert references([row("a", 1.0, False)]) is None
+
+
+def test_a_success_against_the_partner_is_in_time_but_does_not_count():
+    own = [{**row("a", 10.0), "interaction_mean": 0.1}, {**row("a", 10.0), "interaction_mean": 0.3}]
+    found = references(own)
+    assert found is not None
+    assert found["a"].force == 0.2
+    for force, expected in ((0.3, True), (0.31, False)):
+        episode = {**row("a", 10.0), "interaction_mean": force}
+        assert in_time(episode, found["a"])
+        assert counts(episode, found["a"]) is expected
 
 
 def test_times_relate_to_the_own_kind_on_the_same_start():
@@ -244,7 +256,7 @@ def recordings(tmp_path_factory) -> Path:
 
 def test_a_replay_with_its_own_kind_is_the_recording(recordings):
     (name,) = parse_partners([f"replay:{recordings}"], TABLE)
-    protocol = type("Protocol", (), {"settings": Physics(step_limit=2000)})()
+    protocol = Protocol(TABLE, 10, Physics(step_limit=2000))
     partner = make_partner(name, TABLE, protocol, starts=2)
     assert partner.recorded is not None
     assert partner.recorded.describe()["starts"] == 2
@@ -253,7 +265,7 @@ def test_a_replay_with_its_own_kind_is_the_recording(recordings):
     assert [episode.success for episode in episodes] == [True] * 4
     assert [episode.steps for episode in episodes[::2]] == [len(actions) for actions in partner.recorded.actions]
     np.testing.assert_array_equal(episodes[0].actions, partner.recorded.actions[0])
-    protocol.settings = Physics(step_limit=2000, angular_acceleration_limit=0.5)
+    protocol = Protocol(TABLE, 10, Physics(step_limit=2000, angular_acceleration_limit=0.5))
     with pytest.raises(InvalidValueError, match="recordings under the study's world settings"):
         make_partner(name, TABLE, protocol, starts=2)
 

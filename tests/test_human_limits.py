@@ -7,6 +7,7 @@ from copolicy.collect.agents import AgentsByWorld, ConstantAgent, HumanLimits, L
 from copolicy.collect.rollout import Agent, EpisodeStart, Rollout
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import get_task
+from copolicy.tasks.table.agents import simulated_partner
 from copolicy.tasks.table.maps import MAP_SETS
 
 TABLE = get_task("table")
@@ -51,7 +52,7 @@ def test_states_and_actions_come_late_and_the_start_before_them():
 
 def test_without_limits_an_agent_acts_as_it_does_alone():
     def run(limits):
-        partner = ScriptedAgent("p", lambda seat, index, start: TABLE.agents.make_partner(start.scenario, "slow", 3))
+        partner = ScriptedAgent("p", lambda seat, index, start: simulated_partner(start.scenario, "slow", 3))
         human = partner if limits is None else LimitedAgent(partner, limits, TABLE)
         rollout = Rollout(TABLE, MAPS[:1], (ConstantAgent(np.zeros(2)), human))
         rollout.run(60)

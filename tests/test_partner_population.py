@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.simulate.recipes import RECIPES
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.task import get_task
@@ -20,7 +21,7 @@ def test_its_pairs_are_disjoint_and_in_no_published_data_set():
     pairs = [recipe.pair for recipe in PROXIES.values()]
     assert len(pairs) >= 8
     assert len(set(pairs)) == len(pairs)
-    players = TABLE.agents
+    players = simulated_players(TABLE)
     assert set(pairs) == set(players.pairs) - set(players.default_pairs)
     assert players.default_pairs == ("S01", "S02", "S03", "S04", "S05")  # of every recipe
     assert all("pairs" not in vars(recipe) for recipe in RECIPES.values())
@@ -29,7 +30,7 @@ def test_its_pairs_are_disjoint_and_in_no_published_data_set():
 def test_both_halves_have_proxies_of_different_sizes_and_lengths_and_scripted_kinds():
     halves = [half_of(half) for half in (CHOOSING, REPORTING)]
     assert all(len(proxies) == 4 and others for proxies, others in halves)
-    assert set(OTHERS) == {*TABLE.agents.partners, "human-like"}
+    assert set(OTHERS) == {*simulated_players(TABLE).partners, "human-like"}
     for proxies, _ in halves:
         recipes = [PROXIES[name] for name in proxies]
         assert len({recipe.episodes for recipe in recipes}) > 2

@@ -195,7 +195,7 @@ def _result(
 ) -> dict[str, Any]:
     from .cells import OWN_KIND
     from .measures import definitions, not_measured, own_kind_times, summary
-    from .score import TIME_FACTOR, partner_scores
+    from .score import FACTOR, partner_scores
 
     own = cells[OWN_KIND]
     times = {partner.name: own_kind_times(own[partner.name]["episodes"] if partner.name in own else None)
@@ -226,9 +226,11 @@ def _result(
         if not any(row["success"] for row in episodes)
     }
     score_text = (
-        f"proportion of episodes that succeed within {TIME_FACTOR:g} times the median time that the partner's own kind "
-        "needs with itself on that map, mean over partners; standard error and interval from a bootstrap over maps; "
-        "first in: proportion of the replicates in which the robot's score is the largest; own-kind is not ranked"
+        f"proportion of episodes that succeed within {FACTOR:g} times the median time of the partner's own kind with "
+        f"itself on that map, at a mean interaction force of at most {FACTOR:g} times its median there (if the task "
+        "measures it), mean over partners; success in time: the same without the force; standard error and interval "
+        "from a bootstrap over maps; first in: proportion of the replicates in which the robot's score is the largest; "
+        "own-kind is not ranked"
     )
     return {
         "settings": {**settings, "episodes_per_cell": settings["configurations"] * settings["repeats"]},

@@ -7,9 +7,9 @@ from typing import Any
 
 from .cells import OWN_KIND
 from .measures import MEASURES
-from .score import TIME_FACTOR
+from .score import FACTOR
 
-SCORE_LABEL = f"score: success within {TIME_FACTOR:g} x own kind's time, %"
+SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
 
 _COLUMNS = ("mean", "standard_error", "n")
 
@@ -57,8 +57,9 @@ def _scores(result: Mapping[str, Any]) -> str:
     for robot in sorted(result["cells"], key=lambda name: -scores.get(name, {"mean": 0.0})["mean"]):
         score, row = scores.get(robot), result["cells"][robot]
         first = "" if score is None or "first" not in score else f"{100 * score['first']:.0f} %"
-        rows.append([robot, _estimate(score, 100, 1), first, *(_over_partners(row, name) for name in shown)])
-    head = ["robot", "partner score, %", "first in", *(MEASURES[name].label for name in shown)]
+        timely = "none" if score is None else f"{100 * score['in_time']:.1f}"
+        rows.append([robot, _estimate(score, 100, 1), first, timely, *(_over_partners(row, name) for name in shown)])
+    head = ["robot", "partner score, %", "first in", "success in time, %", *(MEASURES[name].label for name in shown)]
     return "Scores and their parts, means over partners:\n\n" + _table(head, rows)
 
 

@@ -1,14 +1,16 @@
 """The partner score of robots, with its uncertainty and that of their ranking.
 
-The score of a robot with a partner is the proportion of episodes that succeed within `TIME_FACTOR` times the median
-time that the partner's own kind needs with itself on the same map. A success alone does not count: a capable partner
-brings the table to the goal although the robot does nothing, but takes more than twice the time. The own kind as the
-reference makes scores with slow and fast partners comparable, and the map as the unit leaves its length out. The
-partner score is the mean over partners.
+The score of a robot with a partner is the proportion of episodes that succeed within `FACTOR` times the median time of
+the partner's own kind with itself on the same map, at a mean interaction force of at most `FACTOR` times that of the
+own kind. Success alone is the partner's as much as the robot's: a capable partner reaches the goal with a robot that
+does nothing, in more than twice the time. Success in time alone is also reached by a robot that knows the map and never
+yields, against a partner that gives way; what the partner has to bear shows in the force. The own kind as the
+reference makes scores with slow and fast, strong and weak partners comparable, and the map as the unit leaves its
+length out. The partner score is the mean over partners. In a task without an interaction measure the force is left out.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,31 +19,50 @@ from copolicy.dataset.arrays import Array
 from ..comparison.paired import REPLICATES
 from .measures import Row, map_of
 
-TIME_FACTOR = 1.5
+FACTOR = 1.5
+"""Factor on the own kind's median time and force within which an episode counts."""
 
 Cells = Mapping[str, Mapping[str, Sequence[Row]]]
 """Rows by robot and partner."""
 
 
-def reference_times(own_rows: Sequence[Row]) -> dict[str, float] | None:
-    """Median time of the own kind's successes by map; a map without one gets the median over all maps.
+class Reference(NamedTuple):
+    """What a partner's own kind needs on a map: medians over its successes."""
+
+    time_s: float
+    force: float | None
+
+
+def references(own_rows: Sequence[Row]) -> dict[str, Reference] | None:
+    """The reference of each map; a map without a success of the own kind gets the medians over all maps.
 
     Returns:
         None if the own kind never succeeded.
     """
-    every = [row["time_s"] for row in own_rows if row["success"]]
+    every = [row for row in own_rows if row["success"]]
     if not every:
         return None
-    by_map: dict[str, list[float]] = {map_of(row): [] for row in own_rows}
-    for row in own_rows:
-        if row["success"]:
-            by_map[map_of(row)].append(row["time_s"])
-    return {name: float(np.median(times or every)) for name, times in by_map.items()}
+    by_map: dict[str, list[Row]] = {map_of(row): [] for row in own_rows}
+    for row in every:
+        by_map[map_of(row)].append(row)
+    return {name: _reference(rows or every) for name, rows in by_map.items()}
 
 
-def scored(rows: Sequence[Row], reference: Mapping[str, float]) -> list[bool]:
-    """Whether each episode counts."""
-    return [bool(row["success"]) and row["time_s"] <= TIME_FACTOR * reference[map_of(row)] for row in rows]
+def _reference(rows: Sequence[Row]) -> Reference:
+    forces = [row["interaction_mean"] for row in rows if row["interaction_mean"] is not None]
+    return Reference(float(np.median([row["time_s"] for row in rows])), float(np.median(forces)) if forces else None)
+
+
+def in_time(row: Row, reference: Reference) -> bool:
+    """Whether an episode succeeded within `FACTOR` times the own kind's time."""
+    return bool(row["success"]) and row["time_s"] <= FACTOR * reference.time_s
+
+
+def counts(row: Row, reference: Reference) -> bool:
+    """Whether an episode counts for the score: `in_time`, and not above `FACTOR` times the own kind's force."""
+    force = row["interaction_mean"]
+    gentle = reference.force is None or force is None or force <= FACTOR * reference.force
+    return in_time(row, reference) and gentle
 
 
 def partner_scores(
@@ -58,17 +79,19 @@ def partner_scores(
         floors: robots from which the others are to be told apart.
 
     Returns:
-        `robots` with score, standard error, interval, scores by partner and, if ranked, the proportion of replicates in
-        which it is first; `separation` of robots from floors; empty if no partner has a reference.
+        `robots` with score, standard error, interval, proportion in time, scores by partner and, if ranked, the
+        proportion of replicates in which it is first; `separation` of robots from floors; empty if no partner has a
+        reference.
     """
-    references = {name: times for name, rows in own_rows.items() if (times := reference_times(rows)) is not None}
-    if not references:
+    by_partner_maps = {name: found for name, rows in own_rows.items() if (found := references(rows)) is not None}
+    if not by_partner_maps:
         return {}
     rng = np.random.default_rng(seed)
     weights: dict[tuple[str, ...], Array] = {}
     means: dict[str, dict[str, float]] = {robot: {} for robot in cells}
     replicates: dict[str, dict[str, Array]] = {robot: {} for robot in cells}
-    for partner, reference in references.items():
+    timely: dict[str, list[float]] = {robot: [] for robot in cells}
+    for partner, reference in by_partner_maps.items():
         maps = tuple(reference)
         if maps not in weights:
             uniform = np.full(len(maps), 1 / len(maps))
@@ -77,10 +100,12 @@ def partner_scores(
         for robot, by_partner in cells.items():
             rows = by_partner[partner]
             positions = [index[map_of(row)] for row in rows]
-            sums = np.bincount(positions, scored(rows, reference), minlength=len(maps))
-            counts = np.bincount(positions, minlength=len(maps))
-            means[robot][partner] = float(sums.sum() / counts.sum())
-            replicates[robot][partner] = (weights[maps] @ sums) / (weights[maps] @ counts)
+            counted = [counts(row, reference[map_of(row)]) for row in rows]
+            timely[robot].append(float(np.mean([in_time(row, reference[map_of(row)]) for row in rows])))
+            sums = np.bincount(positions, counted, minlength=len(maps))
+            episodes = np.bincount(positions, minlength=len(maps))
+            means[robot][partner] = float(sums.sum() / episodes.sum())
+            replicates[robot][partner] = (weights[maps] @ sums) / (weights[maps] @ episodes)
     totals = {robot: np.mean(list(by_partner.values()), axis=0) for robot, by_partner in replicates.items()}
     first = _first({robot: totals[robot] for robot in ranked})
     # With one map every replicate is the same, which is no uncertainty of zero.
@@ -88,6 +113,7 @@ def partner_scores(
     robots = {
         robot: {
             **_estimate(float(np.mean(list(means[robot].values()))), totals[robot], known),
+            "in_time": float(np.mean(timely[robot])),
             "by_partner": {
                 partner: _estimate(mean, replicates[robot][partner], known) for partner, mean in means[robot].items()
             },

@@ -132,8 +132,10 @@ def _scripted(name: PartnerName, task: PairTask) -> StudyPartner:
         if name.kind == SCRIPTED:
             return players.make_partner(scenario, name.detail, seed)
         assert players.make_human_like is not None, "checked with the name"
-        delay_s = name.options.get("delay", np.random.default_rng([seed, 1]).uniform(*HUMAN_DELAY_S))
-        return players.make_human_like(scenario, seed, float(delay_s))
+        delay_s = name.options.get("delay")
+        if delay_s is None:
+            delay_s = float(np.random.default_rng([seed, 1]).uniform(*HUMAN_DELAY_S))
+        return players.make_human_like(scenario, seed, delay_s)
 
     def agent(seed: int, repeats: int) -> Agent:
         # The seed of the partners is in that of the start.
