@@ -15,7 +15,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.cross_play import cells
-from copolicy.evaluate.cross_play.measures import MEASURES, own_kind_times, summary
+from copolicy.evaluate.cross_play.measures import MEASURES, own_kind_of_start, summary
 from copolicy.evaluate.cross_play.score import counts, in_time, partner_scores, references
 from copolicy.evaluate.partner_study.clearance import smallest_distance
 from copolicy.evaluate.partner_study.study import run_with_partners
@@ -58,12 +58,15 @@ def test_a_success_against_the_partner_is_in_time_but_does_not_count():
 
 
 def test_times_relate_to_the_own_kind_on_the_same_start():
-    times = own_kind_times([row("a", 10.0, start=0), row("a", 20.0, start=0), row("a", 50.0, False, start=1)])
+    times = own_kind_of_start([row("a", 10.0, start=0), row("a", 20.0, start=0), row("a", 50.0, False, start=1)])
     measured = summary([row("a", 30.0, start=0), row("a", 30.0, start=1), row("a", 60.0, False, start=0)], times)
     assert measured["relative_time"] == {"mean": 2.0, "standard_error": None, "n": 1}
     assert measured["time_s"] == {"mean": 30.0, "standard_error": 0.0, "n": 2}
     assert measured["success"] == {"mean": 2 / 3, "standard_error": pytest.approx((2 / 27) ** 0.5), "n": 3}
-    assert measured["interaction_force"] is None
+    assert measured["interaction_force"] is measured["relative_force"] is None
+    own = own_kind_of_start([{**row("a", 10.0), "interaction_mean": 0.2}])
+    found = summary([{**row("a", 20.0, False), "interaction_mean": 0.5}], own)["relative_force"]
+    assert found == {"mean": 2.5, "standard_error": None, "n": 1}
 
 
 def test_scores_and_the_uncertainty_of_their_ranking_come_from_the_maps():

@@ -194,11 +194,11 @@ def _result(
     floors: Sequence[str],
 ) -> dict[str, Any]:
     from .cells import OWN_KIND
-    from .measures import definitions, not_measured, own_kind_times, summary
+    from .measures import definitions, not_measured, own_kind_of_start, summary
     from .score import FACTOR, partner_scores
 
     own = cells[OWN_KIND]
-    times = {partner.name: own_kind_times(own[partner.name]["episodes"] if partner.name in own else None)
+    times = {partner.name: own_kind_of_start(own[partner.name]["episodes"] if partner.name in own else None)
              for partner in partners}  # fmt: skip
     summaries = {
         robot: {
@@ -233,7 +233,11 @@ def _result(
         "own-kind is not ranked"
     )
     return {
-        "settings": {**settings, "episodes_per_cell": settings["configurations"] * settings["repeats"]},
+        "settings": {
+            **settings,
+            "episodes_per_cell": settings["configurations"] * settings["repeats"],
+            "length_unit": task.outline.unit if task.outline else "",
+        },
         "robots": {robot.name: robot.describe() for robot in robots},
         "partners": {partner.name: partner.describe() for partner in partners},
         "floors": list(floors),

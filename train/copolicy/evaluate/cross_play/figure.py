@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.files.staging import replacement
 
-from .measures import MEASURES
+from .measures import MEASURES, label
 from .report import SCORE_LABEL
 
 _COLUMNS = 2
@@ -28,7 +28,8 @@ def save_heat_maps(result: Mapping[str, Any], path: Path, title: str) -> None:
     for name, measure in MEASURES.items():
         if name not in result["not_measured"]:
             values = [[_measure(result, robot, partner, name) for partner in partners] for robot in robots]
-            panels.append((measure.label, *_arrays(values, measure.scale), measure.digits, measure.lower_is_better))
+            title_of = label(name, result["settings"]["length_unit"])
+            panels.append((title_of, *_arrays(values, measure.scale), measure.digits, measure.lower_is_better))
     rows = -(-len(panels) // _COLUMNS)
     width = 2.2 + 0.85 * len(partners)
     height = 1.5 + 0.36 * len(robots)
@@ -37,9 +38,9 @@ def save_heat_maps(result: Mapping[str, Any], path: Path, title: str) -> None:
     axes = list(figure.subplots(rows, _COLUMNS, squeeze=False).flat)
     for axis in axes[len(panels) :]:
         axis.set_visible(False)
-    for axis, (label, means, errors, digits, lower) in zip(axes, panels, strict=False):
+    for axis, (heading, means, errors, digits, lower) in zip(axes, panels, strict=False):
         _heat_map(axis, means, errors, digits, lower)
-        axis.set_title(label, fontsize=9)
+        axis.set_title(heading, fontsize=9)
         axis.set_xticks(range(len(partners)), [_short(name) for name in partners], rotation=30, ha="right", fontsize=7)
         axis.set_yticks(range(len(robots)), [_short(name) for name in robots], fontsize=7)
     figure.suptitle(title, fontsize=10)

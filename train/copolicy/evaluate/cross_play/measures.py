@@ -15,6 +15,19 @@ Row = dict[str, Any]
 """Row of an episode in the file of a cell."""
 
 
+class OwnKind(NamedTuple):
+    """What a partner's own kind needs: medians over its successes."""
+
+    time_s: float
+    force: float | None
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> "OwnKind":
+        """Of successes, at least one."""
+        forces = [row["interaction_mean"] for row in rows if row["interaction_mean"] is not None]
+        return cls(float(np.median([row["time_s"] for row in rows])), float(np.median(forces)) if forces else None)
+
+
 class Measure(NamedTuple):
     """A measure of an episode.
 
@@ -23,29 +36,33 @@ class Measure(NamedTuple):
         digits: decimals in tables.
         scale: factor in tables, 100 for a proportion in percent.
         lower_is_better: None if neither is.
-        value: value of an episode from its row and the time of the partner's own kind; None or NaN if it has none.
+        value: value of an episode from its row and its partner's own kind; None if it has none.
     """
 
     label: str
     digits: int
     scale: float
     lower_is_better: bool | None
-    value: Callable[[Row, float | None], float | None]
+    value: Callable[[Row, OwnKind | None], float | None]
 
 
-def _time(row: Row, own: float | None) -> float | None:
+def _time(row: Row, own: OwnKind | None) -> float | None:
     return row["time_s"] if row["success"] else None
 
 
-def _relative_time(row: Row, own: float | None) -> float | None:
-    return row["time_s"] / own if row["success"] and own is not None else None
+def _relative_time(row: Row, own: OwnKind | None) -> float | None:
+    return row["time_s"] / own.time_s if row["success"] and own is not None else None
 
 
-def _deadlock(row: Row, own: float | None) -> float | None:
+def _relative_force(row: Row, own: OwnKind | None) -> float | None:
+    return row["interaction_mean"] / own.force if own is not None and own.force else None
+
+
+def _deadlock(row: Row, own: OwnKind | None) -> float | None:
     return None if row["deadlock_s"] is None else row["deadlock_s"] / max(row["time_s"], 1e-9)
 
 
-def _near_miss(row: Row, own: float | None) -> float | None:
+def _near_miss(row: Row, own: OwnKind | None) -> float | None:
     return None if row["near_miss"] is None else float(row["near_miss"])
 
 
@@ -54,12 +71,19 @@ MEASURES: dict[str, Measure] = {
     "time_s": Measure("time of successes, s", 1, 1, True, _time),
     "relative_time": Measure("time / own kind's", 2, 1, True, _relative_time),
     "interaction_force": Measure("interaction force", 3, 1, True, lambda row, own: row["interaction_mean"]),
+    "relative_force": Measure("force / own kind's", 2, 1, True, _relative_force),
     "robot_share": Measure("robot's share of work", 2, 1, None, lambda row, own: row["robot_share"]),
     "deadlock": Measure("time in deadlock, %", 1, 100, True, _deadlock),
     "smallest_distance": Measure("smallest distance", 1, 1, False, lambda row, own: row["smallest_distance"]),
     "near_misses": Measure("near misses, %", 1, 100, True, _near_miss),
 }
 """By name in results, in the order of tables."""
+
+
+def label(name: str, length_unit: str) -> str:
+    """Label of a measure with its unit."""
+    text = MEASURES[name].label
+    return f"{text}, {length_unit}" if name == "smallest_distance" and length_unit else text
 
 
 def episode_row(episode: PartnerEpisodeResult) -> Row:
@@ -69,17 +93,17 @@ def episode_row(episode: PartnerEpisodeResult) -> Row:
     return {**episode.to_json(), "smallest_distance": distance, "near_miss": near}
 
 
-def own_kind_times(rows: Sequence[Row] | None) -> Callable[[Row], float | None]:
-    """Median time of the successes of a partner's own kind on the start of an episode; None if it had none there."""
-    times: dict[int, list[float]] = {}
+def own_kind_of_start(rows: Sequence[Row] | None) -> Callable[[Row], OwnKind | None]:
+    """A partner's own kind on the start of an episode; None if it did not succeed there."""
+    by_start: dict[int, list[Row]] = {}
     for row in rows or ():
         if row["success"]:
-            times.setdefault(row["map_index"], []).append(row["time_s"])
-    medians = {index: float(np.median(values)) for index, values in times.items()}
-    return lambda row: medians.get(row["map_index"])
+            by_start.setdefault(row["map_index"], []).append(row)
+    found = {index: OwnKind.of(successes) for index, successes in by_start.items()}
+    return lambda row: found.get(row["map_index"])
 
 
-def summary(rows: Sequence[Row], own: Callable[[Row], float | None]) -> dict[str, dict[str, Any] | None]:
+def summary(rows: Sequence[Row], own: Callable[[Row], OwnKind | None]) -> dict[str, dict[str, Any] | None]:
     """Mean, standard error over episodes and number of episodes of each measure; None if no episode has it."""
     result: dict[str, dict[str, Any] | None] = {}
     for name, measure in MEASURES.items():
@@ -115,6 +139,8 @@ def definitions(task: PairTask) -> dict[str, str]:
         "relative_time": "time of a success divided by the median time that the partner's own kind at the robot's seat "
         "needs on the same start; only starts on which it succeeds",
         "interaction_force": words.get("interaction_force", "magnitude of what the task measures"),
+        "relative_force": "interaction force divided by the median force of the successes of the partner's own kind on "
+        "the same start",
         "robot_share": "proportion of both players' positive work that the robot does; 0.5 is even",
         "deadlock": f"proportion of an episode in stand-stills of {DEADLOCK_S:g} s or more",
         "smallest_distance": f"smallest distance of the outlines of body and obstacles in an episode, {unit}",
@@ -128,6 +154,7 @@ def not_measured(task: PairTask, cells: Mapping[str, Mapping[str, Any]]) -> dict
     """For each measure that is null in every cell, the part that the task lacks."""
     parts = {
         "interaction_force": "interaction measure",
+        "relative_force": "interaction measure",
         "robot_share": "outline, which gives forces and paths",
         "deadlock": "measure of standing still (`studies.at_rest`)",
         "smallest_distance": "obstacles in its outline",

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .cells import OWN_KIND
-from .measures import MEASURES
+from .measures import MEASURES, label
 from .score import FACTOR
 
 SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
@@ -37,13 +37,13 @@ def markdown(result: Mapping[str, Any]) -> str:
             for robot, score in scores["robots"].items()
         ]
         text.append(f"**{SCORE_LABEL}**\n\n" + _table(["robot", *partners], rows))
-    for name, measure in MEASURES.items():
+    for name in MEASURES:
         if name in result["not_measured"]:
             continue
         rows = [
             [robot, *(_cell(row.get(partner), name) for partner in partners)] for robot, row in result["cells"].items()
         ]
-        text.append(f"**{measure.label}**\n\n" + _table(["robot", *partners], rows))
+        text.append(f"**{label(name, settings['length_unit'])}**\n\n" + _table(["robot", *partners], rows))
     notes = {**result["definitions"], **result["not_measured"], **result["no_own_kind"]}
     text.append("\n".join(f"- {name}: {note}." for name, note in notes.items()))
     return "\n\n".join(text) + "\n"
@@ -59,7 +59,13 @@ def _scores(result: Mapping[str, Any]) -> str:
         first = "" if score is None or "first" not in score else f"{100 * score['first']:.0f} %"
         timely = "none" if score is None else f"{100 * score['in_time']:.1f}"
         rows.append([robot, _estimate(score, 100, 1), first, timely, *(_over_partners(row, name) for name in shown)])
-    head = ["robot", "partner score, %", "first in", "success in time, %", *(MEASURES[name].label for name in shown)]
+    head = [
+        "robot",
+        "partner score, %",
+        "first in",
+        "success in time, %",
+        *(label(name, result["settings"]["length_unit"]) for name in shown),
+    ]
     return "Scores and their parts, means over partners:\n\n" + _table(head, rows)
 
 

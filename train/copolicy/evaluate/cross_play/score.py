@@ -10,14 +10,14 @@ length out. The partner score is the mean over partners. In a task without an in
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from copolicy.dataset.arrays import Array
 
 from ..comparison.paired import REPLICATES
-from .measures import Row, map_of
+from .measures import OwnKind, Row, map_of
 
 FACTOR = 1.5
 """Factor on the own kind's median time and force within which an episode counts."""
@@ -26,14 +26,7 @@ Cells = Mapping[str, Mapping[str, Sequence[Row]]]
 """Rows by robot and partner."""
 
 
-class Reference(NamedTuple):
-    """What a partner's own kind needs on a map: medians over its successes."""
-
-    time_s: float
-    force: float | None
-
-
-def references(own_rows: Sequence[Row]) -> dict[str, Reference] | None:
+def references(own_rows: Sequence[Row]) -> dict[str, OwnKind] | None:
     """The reference of each map; a map without a success of the own kind gets the medians over all maps.
 
     Returns:
@@ -45,20 +38,15 @@ def references(own_rows: Sequence[Row]) -> dict[str, Reference] | None:
     by_map: dict[str, list[Row]] = {map_of(row): [] for row in own_rows}
     for row in every:
         by_map[map_of(row)].append(row)
-    return {name: _reference(rows or every) for name, rows in by_map.items()}
+    return {name: OwnKind.of(rows or every) for name, rows in by_map.items()}
 
 
-def _reference(rows: Sequence[Row]) -> Reference:
-    forces = [row["interaction_mean"] for row in rows if row["interaction_mean"] is not None]
-    return Reference(float(np.median([row["time_s"] for row in rows])), float(np.median(forces)) if forces else None)
-
-
-def in_time(row: Row, reference: Reference) -> bool:
+def in_time(row: Row, reference: OwnKind) -> bool:
     """Whether an episode succeeded within `FACTOR` times the own kind's time."""
     return bool(row["success"]) and row["time_s"] <= FACTOR * reference.time_s
 
 
-def counts(row: Row, reference: Reference) -> bool:
+def counts(row: Row, reference: OwnKind) -> bool:
     """Whether an episode counts for the score: `in_time`, and not above `FACTOR` times the own kind's force."""
     force = row["interaction_mean"]
     gentle = reference.force is None or force is None or force <= FACTOR * reference.force
