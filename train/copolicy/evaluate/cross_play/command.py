@@ -81,6 +81,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partners.overlap import check_overlap
     from ..partners.partner import make_partner
     from .cells import Play
+    from .matrix import matrix_result
 
     scripted = scripted_robots(task)
     floors = [] if arguments.no_floors else ["nothing", *(task.agents.robots if task.agents else ()), "random"]
@@ -118,7 +119,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     )
     cells = _run(arguments, play, robots, partners)
     floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-    result = _result(task, settings, robots, partners, cells, floor_names)
+    result = matrix_result(task, settings, robots, partners, cells, floor_names)
     result = {"study": "cross-play", "label": partners_label(named, task), **result}
     if overlap:
         result["overlap"] = overlap
@@ -183,70 +184,6 @@ def _run(
                 cells[robot.name][partner.name] = run_cell(arguments.out, play, robot, partner, arguments.overwrite)
                 bar.update()
     return cells
-
-
-def _result(
-    task: PairTask,
-    settings: dict[str, Any],
-    robots: Sequence["StudyRobot"],
-    partners: Sequence["StudyPartner"],
-    cells: dict[str, dict[str, Any]],
-    floors: Sequence[str],
-) -> dict[str, Any]:
-    from .cells import OWN_KIND
-    from .measures import definitions, not_measured, own_kind_of_start, summary
-    from .score import FACTOR, partner_scores
-
-    own = cells[OWN_KIND]
-    times = {partner.name: own_kind_of_start(own[partner.name]["episodes"] if partner.name in own else None)
-             for partner in partners}  # fmt: skip
-    summaries = {
-        robot: {
-            partner: {
-                "measures": summary(cell["episodes"], times[partner]),
-                "wall_s": cell["wall_s"],
-                "planning_ms_per_call": cell["planning_ms_per_call"],
-                "episodes": len(cell["episodes"]),
-            }
-            for partner, cell in row.items()
-        }
-        for robot, row in cells.items()
-        if row
-    }
-    rows = {robot: {name: cell["episodes"] for name, cell in row.items()} for robot, row in cells.items() if row}
-    scored = {
-        robot: row for robot, row in rows.items() if robot != OWN_KIND or set(row) == {each.name for each in partners}
-    }
-    own_rows = {name: cell["episodes"] for name, cell in own.items()}
-    scores = partner_scores(scored, own_rows, [robot.name for robot in robots], floors)
-    missing = {each.name: each.no_own_kind for each in partners if each.own_kind is None}
-    missing |= {
-        name: "left out of the score: its own kind never succeeded"
-        for name, episodes in own_rows.items()
-        if not any(row["success"] for row in episodes)
-    }
-    score_text = (
-        f"proportion of episodes that succeed within {FACTOR:g} times the median time of the partner's own kind with "
-        f"itself on that map, at a mean interaction force of at most {FACTOR:g} times its median there (if the task "
-        "measures it), mean over partners; success in time: the same without the force; standard error and interval "
-        "from a bootstrap over maps; first in: proportion of the replicates in which the robot's score is the largest; "
-        "own-kind is not ranked"
-    )
-    return {
-        "settings": {
-            **settings,
-            "episodes_per_cell": settings["configurations"] * settings["repeats"],
-            "length_unit": task.outline.unit if task.outline else "",
-        },
-        "robots": {robot.name: robot.describe() for robot in robots},
-        "partners": {partner.name: partner.describe() for partner in partners},
-        "floors": list(floors),
-        "scores": scores,
-        "cells": summaries,
-        "definitions": {"score": score_text, **definitions(task)},
-        "not_measured": not_measured(task, summaries),
-        "no_own_kind": missing,
-    }
 
 
 def _write(out: Path, result: dict[str, Any]) -> dict[str, Any]:

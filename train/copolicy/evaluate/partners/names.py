@@ -13,7 +13,7 @@ again.
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -82,11 +82,6 @@ def parse_partners(texts: Iterable[str], task: PairTask) -> list[PartnerName]:
     if len(set(names)) < len(names):
         raise InvalidValueError("--partners", "partners of different names (NAME=... gives one)", names)
     return partners
-
-
-def scripted_names(kinds: Sequence[str]) -> list[PartnerName]:
-    """Partners of scripted kinds, under the names of the kinds."""
-    return [PartnerName(kind, SCRIPTED, kind) for kind in kinds]
 
 
 def _parse(text: str, task: PairTask) -> PartnerName:
