@@ -85,6 +85,32 @@ def test_the_partners_are_the_tasks(runs, tmp_path, capsys):
     assert "deadlock_time_share" not in told
 
 
+def test_cross_play_leaves_out_what_the_task_lacks(runs, tmp_path, capsys):
+    out = tmp_path / "crossplay"
+    partners = ["P=proxy:{1},delay=0.1,noise=0.2".format(*runs), "helper,noise=0.2", f"replay:{runs[0].parent / 'set'}"]
+    call = ["--robots", f"A={runs[0]}", "--partners", *partners, "--maps", "right", "--configurations", "2"]
+    assert main(["cross-play", *call, "--allow-overlap", "--step-limit", "100", "--out", str(out)]) == 0
+    capsys.readouterr()
+    result = json.loads((out / "matrix.json").read_text(encoding="utf-8"))
+    assert list(result["cells"]) == ["own-kind", "A", "nothing", "random"]  # its scripted robot is no floor
+    # The peg has no exchange of seats: a scripted partner cannot sit at the robot's.
+    assert result["no_own_kind"]["helper,noise=0.2"] == "left out: the task 'peg' has no exchange of seats"
+    assert set(result["cells"]["own-kind"]) == {"P", "replay:set"}
+    missing = ["interaction_force", "relative_force", "deadlock", "smallest_distance", "near_misses"]
+    assert list(result["not_measured"]) == missing
+    assert result["not_measured"]["interaction_force"] == REASON
+    measures = result["cells"]["A"]["helper,noise=0.2"]["measures"]
+    assert all(measures[name] is None for name in missing)
+    assert measures["robot_share"]["n"] == 2
+    assert result["overlap"]["shared"] == {"A": {"P": ["even", "lazy"]}}
+    assert result["cells"]["own-kind"]["replay:set"]["measures"]["success"]["mean"] == 1.0
+    assert result["scores"]["robots"]["A"]["by_partner"].keys() >= {"replay:set"}
+    assert "helper,noise=0.2" not in result["scores"]["robots"]["A"]["by_partner"]
+    text = (out / "matrix.md").read_text(encoding="utf-8")
+    assert f"- interaction_force: {REASON}." in text
+    assert "**interaction force**" not in text
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -92,6 +118,8 @@ def test_the_partners_are_the_tasks(runs, tmp_path, capsys):
         (["coplan", "--policy", "{0}", "--angular-limit", "pi/8"], "--angular-limit: expected no such flag, found"),
         (["coplan", "--policy", "{0}", "--fps", "8"], "fps: expected a divisor of 20 [1, 2, 4, 5, 10, 20], found 8"),
         (["partner", "A={0}", "--partners", "slow"], "unknown kind of partner 'slow'; available: helper, hesitant"),
+        (["partner", "A={0}", "--partners", "human-like"],
+         "expected a partner that the task has, found \"left out: the task 'peg' has no human-like player\""),
         (["partner", "A={0}", "--configurations", "4"], "--configurations: expected 1 to 3, found 4"),
         (["partner", "A={0}", "--baseline", "B=pretrained"],
          "policies: expected ones that learned the same task, found {{'A': 'peg', 'B': 'table'}}"),

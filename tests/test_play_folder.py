@@ -207,7 +207,10 @@ def test_settings_that_cannot_be(changes, message):
     ("text", "message"),
     [
         ("robot", "unknown player 'robot'; available: joystick, keyboard, policy, replay, scripted"),
-        ("scripted:S99", "unknown simulated pair 'S99'; available: S01, S02, S03, S04, S05"),
+        (
+            "scripted:S99",
+            "unknown simulated pair 'S99'; available: " + ", ".join(f"S{number:02d}" for number in range(1, 14)),
+        ),
         ("policy", "player: expected policy:CKPT, found 'policy'"),
         ("joystick:1", "player: expected joystick, found 'joystick:1'"),
     ],

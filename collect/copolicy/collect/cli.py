@@ -45,6 +45,9 @@ def parser() -> argparse.ArgumentParser:
     add_task_flag(command, use_default=False)
     add_maps_flag(command, "training", "map_set", use_default=False)
     command.add_argument(
+        "--pairs", nargs="+", metavar="PAIR", help="names of simulated pairs (default: S01 to S05, or all of a task)"
+    )
+    command.add_argument(
         "--orientations", action="store_true", default=None, help="each map with four start orientations"
     )
     command.add_argument(
@@ -102,7 +105,7 @@ def _simulate(arguments: argparse.Namespace) -> dict[str, Any]:
     from .simulate.command import simulate
 
     flags = {"--task": "task", "--seed": "seed", "--maps": "map_set", "--orientations": "orientations",
-             "--start-noise": "start_noise",
+             "--pairs": "pairs", "--start-noise": "start_noise",
              "--clearance": "clearance"}  # fmt: skip
     values = {flag: getattr(arguments, name) for flag, name in flags.items() if getattr(arguments, name) is not None}
     if arguments.recipe is None:

@@ -103,6 +103,9 @@ class SimulatedPlayers:
         make_partner: an agent from scenario, partner kind and seed; equal for equal seeds, whatever the robot.
         make_robot: an agent from scenario, name and seed.
         options: names of further keyword arguments of `make_pair`; `clearance` is set by the flag `--clearance`.
+        default_pairs: names of the pairs that `copolicy-collect simulate` uses without `--pairs`; all if empty.
+        make_human_like: an agent at the human's seat of usual habits, from scenario, seed and reaction delay (s),
+            without force noise of its own; None if the task has none.
     """
 
     pairs: Mapping[str, tuple[Any, Any]]
@@ -112,6 +115,8 @@ class SimulatedPlayers:
     make_partner: Callable[[Any, str, int], Player]
     make_robot: Callable[[Any, str, int], Player]
     options: tuple[str, ...] = ()
+    default_pairs: tuple[str, ...] = ()
+    make_human_like: Callable[[Any, int, float], Player] | None = None
 
 
 class SceneView(Protocol):
@@ -173,9 +178,12 @@ class Studies:
         definitions: definitions of measures for this task, by their names in results.
         published: published results of the co-planning study, for comparison, in the order of the publication.
         published_source: source of `published` and how it was measured.
+        near_miss: distance to an obstacle below which a pass counts as a near miss, in the unit of the outline; None if
+            not defined.
     """
 
     step_limit: int | None = None
+    near_miss: float | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
     published: tuple[PublishedMethod, ...] = ()
     published_source: str = ""

@@ -12,8 +12,10 @@ from copolicy.dataset.files.staging import require_new
 
 from .comparison import add_compare_command
 from .coplanning_table import add_table_command
+from .cross_play import add_cross_play_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
+from .partners.command import add_partners_command
 from .plans.command import add_plans_command
 from .study_flags import (
     POLICY_HELP,
@@ -48,6 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     coplan.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
     add_study_flags(coplan, n_action_steps=8)
     add_partner_command(commands)
+    add_cross_play_command(commands)
+    add_partners_command(commands)
     add_human_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)

@@ -13,12 +13,20 @@ from typing import Any
 
 from copolicy.dataset.command_line import commands as commandline
 from copolicy.dataset.command_line.extras import TRAINING, require_packages
-from copolicy.dataset.exceptions import CopolicyError, FileFormatError, MissingExtraError, OutputExistsError, RunError
+from copolicy.dataset.exceptions import (
+    CopolicyError,
+    FileFormatError,
+    InvalidValueError,
+    MissingExtraError,
+    OutputExistsError,
+    RunError,
+)
 from copolicy.dataset.files.local_path import require_repo_id, similar_path
 from copolicy.dataset.files.staging import disk_error_number, error_chain, named_errors
 from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_folder
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
+from .pair_split import SPLIT_HELP, PairSplit
 from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers
 from .world_training import IN_WORLD, WORLD_HELP, require_right_trainer, trainer_of, with_world_defaults
@@ -47,6 +55,11 @@ Defaults other than LeRobot's:
 Episodes that the data set marks as discarded or excluded are left out. Each checkpoint records the episodes of its run;
 a resumed run uses these, without episodes excluded since. A NaN, infinite or empty value is refused before the first
 step. A loss that is not finite ends the run with status 1 and keeps the last good checkpoint.
+
+--split=pairs:S04,S05 trains on the episodes of these pairs only, --split=not-pairs:S04,S05 on all others;
+--split=pairs:0.25:7 on whole pairs with about a quarter of the episodes, chosen with the seed 7 (0 if left out), and
+--split=not-pairs:0.25:7 on the rest. No person of the one is in the other. Each checkpoint records its pairs and the
+data set's content hash in training_data.json, which copolicy-eval compares for robots and partners.
 
 --config_path and --policy.path also take the folder of a run; its newest checkpoint is used.
 
@@ -106,6 +119,31 @@ def with_defaults(flags: Sequence[str]) -> list[str]:
     return [*added, *flags]
 
 
+def _without_split(flags: Sequence[str]) -> tuple[list[str], PairSplit | None]:
+    """The flags without `--split`, which LeRobot's configuration does not have, and its value."""
+    text = _value("split", flags)
+    if text is None:
+        if "--split" in flags:
+            raise InvalidValueError("--split", SPLIT_HELP, "")
+        return list(flags), None
+    position = next(index for index, flag in enumerate(flags) if flag.partition("=")[0] == "--split")
+    width = 2 if flags[position] == "--split" else 1
+    rest = [*flags[:position], *flags[position + width :]]
+    if any(flag.partition("=")[0] == "--split" for flag in rest):
+        raise InvalidValueError("--split", "the flag once", text)
+    return rest, PairSplit.parse(text)
+
+
+def _check_split(config: Any, split: PairSplit | None) -> None:
+    if split is None:
+        return
+    if config.resume:
+        expected = "no such flag with --resume=true, which trains on the episodes of the run"
+        raise InvalidValueError("--split", expected, split.text)
+    if config.dataset.episodes is not None:
+        raise InvalidValueError("--split", "no such flag beside --dataset.episodes", split.text)
+
+
 def _value(name: str, flags: Sequence[str]) -> str | None:
     """Value of `--name=value` or `--name value`."""
     for position, flag in enumerate(flags):
@@ -132,7 +170,8 @@ def _print_help(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _train(arguments: argparse.Namespace) -> dict[str, Any]:
-    flags = [_with_newest_checkpoint(flag) for flag in _joined(with_defaults(arguments.flags))]
+    own_flags, split = _without_split(arguments.flags)
+    flags = [_with_newest_checkpoint(flag) for flag in _joined(with_defaults(own_flags))]
     for name in ("config_path", "policy.path"):
         _check_local_path(name, _value(name, flags))
     for name in ("dataset.repo_id", "policy.repo_id"):
@@ -144,11 +183,12 @@ def _train(arguments: argparse.Namespace) -> dict[str, Any]:
         config = _parse()
         _validate(config)
         require_right_trainer(config, arguments.in_world)
+        _check_split(config, split)
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
         try:
             with named_errors(Path(config.output_dir or "")):
-                trainer_of(arguments.in_world)(config)
+                trainer_of(arguments.in_world)(config, split)
         except CopolicyError:
             raise
         except Exception as error:

@@ -1,9 +1,11 @@
 """Runs LeRobot's trainer on data sets in memory, after checking their episodes and numbers."""
 
 import logging
+import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -14,21 +16,29 @@ from lerobot.datasets import EpisodeAwareSampler, LeRobotDatasetMetadata, datase
 from lerobot.datasets import factory as lerobot_datasets
 from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 from lerobot.scripts import lerobot_train
+from lerobot.utils.constants import PRETRAINED_MODEL_DIR
 from tqdm import tqdm
 
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.listing import skipping_hidden_files
+from copolicy.dataset.policies.documents import TrainingDataDocument
 
 from .episode_choice import recorded_episodes, resumed_episodes, selected_episodes
 from .finite_data import NonFiniteError, replacement_statistics, require_finite_frames
 from .finite_training import guarded_functions
 from .memory_dataset import MemoryDataset
+from .pair_split import PairSplit
+from .training_data import TRAINING_DATA_FILE, training_data, write_training_data
 
 _GUARDED = ("update_policy", "save_checkpoint", "update_last_checkpoint", "make_policy")
 
 
-def train_from_memory(config: TrainPipelineConfig) -> None:
+def train_from_memory(config: TrainPipelineConfig, split: PairSplit | None = None) -> None:
     """Runs `lerobot_train.train` with data sets in memory; checkpoints, logs and evaluation are LeRobot's.
+
+    Args:
+        split: pairs to train on; all episodes if None. Each checkpoint records its pairs (`training_data.json`).
 
     Raises:
         CopolicyError: the data set cannot be trained on, or the loss, a gradient or a weight is not finite.
@@ -41,8 +51,15 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
             groups.append(torch.distributed.group.WORLD)
         return make_guarded(*arguments, **kwargs)
 
-    patches = {**guards, "make_policy": make_policy}
-    with _datasets_in_memory(), _hidden_files_ignored(), _patched(lerobot_train, patches):
+    save_guarded, facts = guards["save_checkpoint"], dict[str, Any]()
+
+    def save_checkpoint(*, checkpoint_dir: Path, **kwargs: Any) -> None:
+        save_guarded(checkpoint_dir=checkpoint_dir, **kwargs)
+        if facts:
+            write_training_data(checkpoint_dir / PRETRAINED_MODEL_DIR, facts)
+
+    patches = {**guards, "make_policy": make_policy, "save_checkpoint": save_checkpoint}
+    with _datasets_in_memory(split, facts), _hidden_files_ignored(), _patched(lerobot_train, patches):
         try:
             lerobot_train.train(config)
         finally:
@@ -56,26 +73,32 @@ def train_from_memory(config: TrainPipelineConfig) -> None:
                 time.sleep(0.5)
 
 
-def dataset_in_memory(config: TrainPipelineConfig) -> MemoryDataset:
+def dataset_in_memory(
+    config: TrainPipelineConfig, split: PairSplit | None = None
+) -> tuple[MemoryDataset, dict[str, Any]]:
     """The data set of a training with the same checks and the same choice of episodes, for a trainer of our own.
+
+    Returns:
+        The data set, and the content of `training_data.json`.
 
     Raises:
         CopolicyError: the data set cannot be trained on.
         InvalidValueError: it has stored images or is streamed, so that it cannot be loaded.
     """
+    facts: dict[str, Any] = {}
     with _hidden_files_ignored():
-        dataset, _ = _make_datasets(config, lerobot_datasets.make_train_eval_datasets)
+        dataset, _ = _make_datasets(config, lerobot_datasets.make_train_eval_datasets, split, facts)
     if not isinstance(dataset, MemoryDataset):
         raise InvalidValueError("--dataset", "one without stored images that is not streamed", config.dataset.repo_id)
-    return dataset
+    return dataset, facts
 
 
 @contextmanager
-def _datasets_in_memory() -> Iterator[None]:
+def _datasets_in_memory(split: PairSplit | None, facts: dict[str, Any]) -> Iterator[None]:
     # LeRobot's trainer has no parameter for a data set or a sampler; it looks up these names in its module at each run.
     original = lerobot_train.make_train_eval_datasets
     replacements = {
-        "make_train_eval_datasets": lambda config: _make_datasets(config, original),
+        "make_train_eval_datasets": lambda config: _make_datasets(config, original, split, facts),
         "EpisodeAwareSampler": WholeEpochSampler,
     }
     with _patched(lerobot_datasets, {"StreamingLeRobotDataset": CheckedStream}), _patched(lerobot_train, replacements):
@@ -102,28 +125,36 @@ def _hidden_files_ignored() -> Iterator[None]:
         yield
 
 
-def _make_datasets(config: TrainPipelineConfig, original: Callable) -> tuple:
+def _make_datasets(
+    config: TrainPipelineConfig, original: Callable, split: PairSplit | None, facts: dict[str, Any]
+) -> tuple:
     # The co-policy states the columns that it reads; another policy may read any.
     observation_keys = getattr(config.policy, "observation_keys", None)
     on_host = config.trainable_config.device == "cpu"
     return tuple(
         None if dataset is None else _in_memory(dataset, observation_keys, deferred=not on_host)
-        for dataset in _load(config, original)
+        for dataset in _load(config, original, split, facts)
     )
 
 
-def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
-    """Loads LeRobot's data sets of the selected episodes, which the configuration and thus checkpoints then record."""
+def _load(config: TrainPipelineConfig, original: Callable, split: PairSplit | None, facts: dict[str, Any]) -> tuple:
+    """Loads LeRobot's data sets of the selected episodes, which the configuration and thus checkpoints then record.
+
+    Args:
+        facts: is filled with the content of `training_data.json`.
+    """
     source = config.dataset
     repo_type = "bucket" if source.repo_type == "bucket" else "dataset"
     meta = LeRobotDatasetMetadata(source.repo_id, source.root, source.revision, repo_type=repo_type)
     if config.resume and config.checkpoint_path is not None:
         episodes = resumed_episodes(meta, source.episodes, recorded_episodes(config.checkpoint_path))
     else:
-        episodes = selected_episodes(meta, source.episodes)
+        episodes = selected_episodes(meta, source.episodes if split is None else split.episodes(meta))
     all_selected = episodes == list(range(meta.total_episodes))
     statistics = replacement_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
     local = source.root is not None
+    if local and _writes_checkpoints():
+        facts.update(training_data(meta.root, episodes, source.repo_id, _split_text(config, split)))
     if local:
         require_finite_frames(meta.root, episodes, meta.features)
     source.episodes = None if all_selected else episodes  # LeRobot loads a whole data set faster without a list
@@ -140,6 +171,19 @@ def _load(config: TrainPipelineConfig, original: Callable) -> tuple:
             if not local:  # downloaded by now
                 require_finite_frames(dataset.meta.root, episodes, meta.features)
     return datasets
+
+
+def _split_text(config: TrainPipelineConfig, split: PairSplit | None) -> str | None:
+    """The split of a new run, or that which a resumed run's checkpoint records."""
+    if config.resume and config.checkpoint_path is not None:
+        path = config.checkpoint_path / PRETRAINED_MODEL_DIR / TRAINING_DATA_FILE
+        return (read_optional_json(path, TrainingDataDocument, "the data of a training") or {}).get("split")
+    return None if split is None else split.text
+
+
+def _writes_checkpoints() -> bool:
+    """Whether this process writes the checkpoints, of several that train together."""
+    return os.environ.get("RANK", "0") == "0"
 
 
 def _in_memory(dataset, observation_keys: Collection[str] | None, deferred: bool):

@@ -12,8 +12,10 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.meta_files import INFO_FILE, RELEASE_FILE
 from copolicy.dataset.lerobot_folder.folder import LeRobotFolder
-from copolicy.dataset.policies.documents import TrainingDocument, TrainingStepDocument
+from copolicy.dataset.policies.documents import TrainingDataDocument, TrainingDocument, TrainingStepDocument
 from copolicy.dataset.scenarios import set_label
+
+from .training_data import TRAINING_DATA_FILE
 
 RECIPE_FILE = "recipe.json"
 EVALUATION_FILE = "eval.json"
@@ -56,7 +58,7 @@ def training_recipe(folder: Path, weights_sha256: str, averaged: bool, commands:
         # The policy's settings record these also if the data set is not on this machine.
         policy = training.get("policy") or {}
         recorded = {name: policy[name] for name in ("fps", "physics", "physics_mixture", "unseen") if policy.get(name)}
-        recipe["dataset"] = {**recorded, **_data_set(training.get("dataset") or {})}
+        recipe["dataset"] = {**recorded, **_data_set(training.get("dataset") or {}), **_recorded_data(folder)}
     if commands:
         recipe["commands"] = list(commands)
     return recipe
@@ -137,6 +139,14 @@ def _data_set(settings: dict[str, Any]) -> dict[str, Any]:
         **{column: counts for column in _COUNTED_COLUMNS if (counts := _counts(folder, column, set(used)))},
         **{key: release[key] for key in ("version", "content_hash") if key in release},
     }
+
+
+def _recorded_data(folder: Path) -> dict[str, Any]:
+    """Pairs, split and content hash of `training_data.json`, which are those of the run."""
+    data = read_optional_json(folder / TRAINING_DATA_FILE, TrainingDataDocument, "the data of a training") or {}
+    pairs = sorted((data.get("pairs") or {}).items(), key=lambda item: -item[1])
+    facts = {"pair_id": dict(pairs), **{name: data.get(name) for name in ("split", "content_hash", "people")}}
+    return {name: value for name, value in facts.items() if value}
 
 
 def _counts(folder: LeRobotFolder, column: str, used: Collection[int]) -> dict[str, int]:

@@ -5,6 +5,8 @@ from typing import Any
 
 from copolicy.dataset.exceptions import InvalidValueError
 
+from .pair_split import PairSplit
+
 IN_WORLD = "cogail"
 """Name of the command, and type of the policy that it trains."""
 
@@ -61,8 +63,8 @@ def require_right_trainer(config: Any, in_world: bool) -> None:
         raise InvalidValueError("--policy.type", expected, found)
 
 
-def trainer_of(in_world: bool) -> Callable[[Any], None]:
-    """The function that trains; imports torch and LeRobot."""
+def trainer_of(in_world: bool) -> Callable[[Any, PairSplit | None], None]:
+    """The function that trains on the pairs of a split; imports torch and LeRobot."""
     if in_world:
         from .cogail.training import train_cogail
 

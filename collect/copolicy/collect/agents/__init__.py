@@ -9,16 +9,22 @@ from copolicy.dataset.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from .checkpoint_folder import load_policy
+    from .composed import AgentsByWorld, RandomAgent
+    from .human_limits import HumanLimits, LimitedAgent
     from .people import PersonAgent
     from .policy import Policy, PolicyAgent
     from .replay import ConstantAgent, RecordedAgent, ReplayAgent
     from .scripted import ScriptedAgent
 
 __all__ = [
+    "AgentsByWorld",
     "ConstantAgent",
+    "HumanLimits",
+    "LimitedAgent",
     "PersonAgent",
     "Policy",
     "PolicyAgent",
+    "RandomAgent",
     "RecordedAgent",
     "ReplayAgent",
     "ScriptedAgent",
@@ -30,6 +36,8 @@ __getattr__, __dir__ = lazy_names(
     {
         **dict.fromkeys(("ConstantAgent", "RecordedAgent", "ReplayAgent"), "replay"),
         **dict.fromkeys(("Policy", "PolicyAgent"), "policy"),
+        **dict.fromkeys(("AgentsByWorld", "RandomAgent"), "composed"),
+        **dict.fromkeys(("HumanLimits", "LimitedAgent"), "human_limits"),
         "PersonAgent": "people",
         "ScriptedAgent": "scripted",
         "load_policy": "checkpoint_folder",

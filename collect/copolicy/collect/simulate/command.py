@@ -58,7 +58,7 @@ def simulate(
             set.
         workers: processes; by default one for each processor.
         orientations: use each map with four start orientations.
-        pairs: names of simulated pairs; by default all.
+        pairs: names of simulated pairs; by default `SimulatedPlayers.default_pairs`.
         settings: of the world; the task's default if None.
         started_ns: start time in the recordings, UTC, nanoseconds since 1970; by default now. With a fixed time,
             equal calls write equal bytes.
@@ -89,7 +89,8 @@ def simulate(
         raise InvalidValueError("--clearance", "no such flag", pair_task.missing("clearance of simulated players"))
     scenario_set = pair_task.scenario_set(map_set or next(iter(pair_task.scenario_sets)))
     scenarios = (pair_task.turned(scenario_set) if orientations else scenario_set).scheduled
-    pairs = tuple(players.pairs) if pairs is None else tuple(pair_name(pair_task, pair, "pair") for pair in pairs)
+    default = players.default_pairs or tuple(players.pairs)
+    pairs = default if pairs is None else tuple(pair_name(pair_task, pair, "pair") for pair in pairs)
     _refuse_recordings(out)
 
     anchor = WallClockAnchor.simulated(time.time_ns() if started_ns is None else started_ns)

@@ -17,6 +17,7 @@ class TableStudies(Studies):
     """See `Studies`; the step limit is the paper's."""
 
     step_limit = 2000
+    near_miss = 10.0  # px; an obstacle is 50 px wide, and 5 % of the simulated pairs' episodes come below 33 px
     definitions = {  # noqa: RUF012 (read only, as the base says)
         "success": "touch the goal",
         "interaction_force": "|(u_robot - u_partner) . e| / 2 along the table, full forces",

@@ -111,6 +111,20 @@ class RecipeDataDocument(TypedDict):
     map_set: NotRequired[dict[str, int] | None]
     license: NotRequired[dict[str, int] | None]
     pair_id: NotRequired[dict[str, int] | None]
+    split: NotRequired[str | None]
+    people: NotRequired[list[str] | None]
+
+
+class TrainingDataDocument(TypedDict):
+    """`training_data.json` of a checkpoint."""
+
+    repo_id: NotRequired[str | None]
+    content_hash: NotRequired[str | None]
+    split: NotRequired[str | None]
+    pairs: NotRequired[dict[str, int] | None]
+    people: NotRequired[list[str] | None]
+    sources: NotRequired[list[str] | None]
+    episodes: NotRequired[list[int] | None]
 
 
 class _Weights(TypedDict, total=False):

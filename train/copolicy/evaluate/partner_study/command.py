@@ -1,8 +1,8 @@
 """`copolicy-eval partner`."""
 
 import argparse
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +10,11 @@ from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.dataset.command_line.commands import Commands, add_command, progress_bar
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
-from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, require_new
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import PairTask, get_task
 
+from ..partners.names import HUMAN_LIKE, PARTNERS_HELP, PROXY, REPLAY, SCRIPTED, PartnerName, parse_partners
 from ..study_flags import (
     POLICY_HELP,
     add_study_flags,
@@ -28,6 +29,7 @@ from ..summary import not_measured, percent
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
 
 if TYPE_CHECKING:
+    from ..partners.partner import StudyPartner
     from .robots import StudyRobot
 
 _LABEL = "human-in-the-loop protocol with SIMULATED partners: "
@@ -50,8 +52,9 @@ def add_partner_command(commands: Commands) -> None:
         nargs="+",
         metavar="[NAME=]CKPT",
         help="robots to compare with, on the same starts with the same partners: other checkpoints, passive (zero "
-        "force), never-yields (a scripted agent that never yields) or scripted (a scripted agent with the default "
-        "profile) (default: passive and the task's first scripted robot, which is never-yields for the table)",
+        "force; also nothing), never-yields (a scripted agent that never yields), scripted (a scripted agent with the "
+        "default profile) or random (random forces) (default: passive and the task's first scripted robot, which is "
+        "never-yields for the table)",
     )
     command.add_argument("--no-baseline", dest="baseline", action="store_const", const=[], help="use no baselines")
     add_maps_flag(command, DEFAULT_MAPS, use_default=False)
@@ -64,13 +67,19 @@ def add_partner_command(commands: Commands) -> None:
         None,
     )
     kinds = ", ".join(simulated_players(get_task()).partners)
-    command.add_argument(
-        "--partners", nargs="+", metavar="KIND", help=f"kinds of partner; for the table {kinds} (default: all)"
-    )
+    text = f"{PARTNERS_HELP} (default: all scripted kinds; for the table {kinds})"
+    command.add_argument("--partners", nargs="+", metavar="PARTNER", help=text)
+    add_overlap_flag(command)
     add_whole_number(command, "--repeats", "partners of each kind for each start (default: 1)", 1, 1, 10_000)
     add_whole_number(command, "--partner-seed", "seed of the partners (default: 0)", 0, None, LARGEST_SEED)
     command.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
     add_study_flags(command, n_action_steps=1)
+
+
+def add_overlap_flag(command: argparse.ArgumentParser) -> None:
+    """Adds `--allow-overlap`."""
+    text = "run a robot with a proxy that learned from the same pairs; the result says so"
+    command.add_argument("--allow-overlap", action="store_true", help=text)
 
 
 def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -81,12 +90,11 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     _, path = split_name(arguments.policy)
     task = checkpoint_task(path)
     profiles = simulated_players(task).partners
-    partners = list(dict.fromkeys(profiles if arguments.partners is None else arguments.partners))
-    for kind in partners:
-        if kind not in profiles:
-            raise UnknownNameError("kind of partner", kind, profiles)
+    named = parse_partners(profiles if arguments.partners is None else arguments.partners, task)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, DEFAULT_MAPS))
     # Imported here so that `--help` and argument errors do not wait for torch.
+    from ..partners.overlap import check_overlap
+    from ..partners.partner import make_partner
     from .figure import save_partner_figure
     from .robots import scripted_robots
     from .study import run_with_partners
@@ -99,8 +107,14 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     names = [robot.name for robot in robots]
     if len(set(names)) < len(names):
         raise InvalidValueError("--baseline", "robots of different names (NAME=CKPT gives one)", names)
+    checkpoints = {robot.name: robot.policy.folder for robot in robots if robot.policy is not None}
+    proxies = {partner.name: partner.detail for partner in named if partner.kind == PROXY}
+    overlap = check_overlap(checkpoints, proxies, arguments.allow_overlap)
     policies = [(robot.name, robot.policy.conditions) for robot in robots if robot.policy is not None]
     protocol = study_protocol(arguments, policies)
+    partners = [make_partner(partner, task, protocol, arguments.device, len(scenarios)) for partner in named]
+    if partners[0].recorded is not None:
+        scenarios = partners[0].recorded.scenarios
     # Each policy acts at the rate of its training data; a scripted robot acts at every step of the world.
     rates = [
         protocol.fps if arguments.fps is not None or robot.policy is None else robot.policy.fps for robot in robots
@@ -136,7 +150,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     paired = {name: differences(by_robot[0], baseline) for name, baseline in zip(names[1:], by_robot[1:], strict=True)}
     result = {
         "study": "partner",
-        "label": _LABEL + task.studies.definitions.get("partners", _PARTNERS),
+        "label": partners_label(named, task),
         **described[0],
         "settings": {
             "maps": chosen.label,
@@ -145,11 +159,13 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
             "map_count": len(scenarios),
             "complete_set": len(scenarios) == len({scenario.digest for scenario in all_starts(chosen)}),
             "orientations": task.orientations > 1,
-            "partners": {kind: asdict(profiles[kind]) for kind in partners},
+            "partners": {partner.name: _described(partner, profiles) for partner in partners},
             "partner_seed": arguments.partner_seed,
             "repeats": arguments.repeats,
             **study_settings(arguments, protocol, scenarios),
+            **({"starts": "the recorded ones of the replay"} if partners[0].recorded is not None else {}),
         },
+        **({"overlap": overlap} if overlap else {}),
         **not_measured(task, summaries[0]),
         "definitions": definitions(task, summaries[0]),
         "baselines": described[1:],
@@ -174,6 +190,26 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def partners_label(partners: Sequence[PartnerName], task: PairTask) -> str:
+    """Says who sat at the human's seat."""
+    if all(partner.kind == SCRIPTED and not partner.options for partner in partners):
+        return _LABEL + task.studies.definitions.get("partners", _PARTNERS)
+    texts = {
+        PROXY: "policies",
+        SCRIPTED: "scripted players",
+        HUMAN_LIKE: "scripted players with people's delay",
+        REPLAY: "recorded human actions without feedback",
+    }
+    kinds = [text for kind, text in texts.items() if any(partner.kind == kind for partner in partners)]
+    return f"{_LABEL}{', '.join(kinds)} sit at the human seat, no person took part in the study"
+
+
+def _described(partner: "StudyPartner", profiles: Mapping[str, Any]) -> Mapping[str, Any]:
+    described = dict(partner.describe())
+    plain = described.get("kind") == SCRIPTED and partner.name in profiles
+    return asdict(profiles[partner.name]) if plain else described
+
+
 def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "StudyRobot"]) -> "StudyRobot":
     """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
 
@@ -181,10 +217,12 @@ def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, 
         FileFormatError: the checkpoint does not exist.
         InvalidValueError: its chunks have fewer actions than are to be executed.
     """
-    from .robots import policy_robot
+    from .robots import NOTHING, PASSIVE, policy_robot
 
     if text in scripted:
         return scripted[text]
+    if text == NOTHING:
+        return replace(scripted[PASSIVE], name=NOTHING)
     name, path = split_name(text)
     policy = study_policy(path, arguments)
     return policy_robot(name or policy.name, policy)

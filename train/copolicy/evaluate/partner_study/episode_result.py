@@ -1,6 +1,6 @@
 """Measures of one episode with a simulated partner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from copolicy.dataset.arrays import Array
 
 from ..coplan.rollouts import EpisodeResult
+from .clearance import smallest_distance
 
 DEADLOCK_S = 1.0
 """A stand-still of at least this long counts as a deadlock, s."""
@@ -22,13 +23,15 @@ class PartnerEpisodeResult(EpisodeResult):
         partner: kind of the partner.
         actions: `(steps, 2 m)` executed joint actions, robot first.
         still: `(steps,)` whether the moved object was at rest after each step; None if the task does not define it.
-        partner_changes: how often the partner changed its route choice.
+        partner_changes: how often the partner changed its route choice; None if it is no scripted player.
+        states: `(steps + 1, n)` states of the world.
     """
 
     partner: str
     actions: Array
     still: Array | None
-    partner_changes: int
+    partner_changes: int | None
+    states: Array | None = field(default=None, kw_only=True, repr=False)
 
     @cached_property
     def forces(self) -> tuple[Array, Array] | None:
@@ -66,6 +69,11 @@ class PartnerEpisodeResult(EpisodeResult):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], self.still.astype(int), [0]))))
         lengths = (edges[1::2] - edges[::2]) / self.task.spec.record_hz
         return float(lengths[lengths >= DEADLOCK_S].sum())
+
+    @property
+    def smallest_distance(self) -> float | None:
+        """Smallest distance of the body to an obstacle, see `clearance.smallest_distance`."""
+        return None if self.states is None else smallest_distance(self.task, self.scenario, self.states)
 
     def to_json(self) -> dict[str, Any]:
         """The row of `eval.json`; measures that the task lacks are null."""

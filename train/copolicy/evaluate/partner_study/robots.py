@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from copolicy.collect.agents import ConstantAgent, PolicyAgent, ScriptedAgent
+from copolicy.collect.agents import ConstantAgent, PolicyAgent, RandomAgent, ScriptedAgent
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.rollout import Agent, EpisodeStart
 from copolicy.dataset.task import PairTask, Player, get_task
@@ -14,7 +14,11 @@ from copolicy.dataset.task import PairTask, Player, get_task
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
-PASSIVE = "passive"
+PASSIVE, RANDOM = "passive", "random"
+NOTHING = "nothing"
+"""Another name of `PASSIVE`."""
+
+_RANDOM_HOLD_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -41,13 +45,23 @@ def policy_robot(name: str, policy: "Checkpoint") -> StudyRobot:
 
 
 def scripted_robots(task: PairTask) -> dict[str, StudyRobot]:
-    """The robots that `--baseline` takes by name: zero force, and the task's scripted robots."""
+    """The robots that have a name: zero force, the task's scripted robots, and random actions."""
     zero = np.zeros(len(task.spec.action))
     passive = StudyRobot(
         PASSIVE, lambda seed, fps: ConstantAgent(zero, PASSIVE), lambda: {"type": PASSIVE, "description": "zero force"}
     )
     names = task.agents.robots if task.agents is not None else ()
-    return {PASSIVE: passive, **{name: _scripted(task, name) for name in names}}
+    return {PASSIVE: passive, **{name: _scripted(task, name) for name in names}, RANDOM: _random(task)}
+
+
+def _random(task: PairTask) -> StudyRobot:
+    hold = max(1, round(_RANDOM_HOLD_S * task.spec.record_hz))
+    description = f"uniformly random actions, each held for {_RANDOM_HOLD_S:g} s"
+    return StudyRobot(
+        RANDOM,
+        lambda seed, fps: RandomAgent(task.spec.action, hold, seed),
+        lambda: {"type": RANDOM, "description": description},
+    )
 
 
 def _scripted(task: PairTask, name: str) -> StudyRobot:

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from copolicy.collect.agents import ScriptedAgent
-from copolicy.collect.agents.simulated_players import simulated_players
+from copolicy.collect.agents import AgentsByWorld, LimitedAgent, ScriptedAgent
 from copolicy.collect.rollout import Rollout
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
 from ..coplan.rollouts import episode_measures, run_traced
+from ..partners.partner import StudyPartner, scripted_partners
 from .episode_result import PartnerEpisodeResult
 from .robots import StudyRobot
 
@@ -19,7 +20,7 @@ from .robots import StudyRobot
 def run_with_partners(
     robot: StudyRobot,
     scenarios: Sequence[Any],
-    partners: Sequence[str],
+    partners: Sequence["str | StudyPartner"],
     settings: Any,
     *,
     task: PairTask | None = None,
@@ -36,6 +37,8 @@ def run_with_partners(
     waits for inference, so a chunk is never late.
 
     Args:
+        scenarios: of the study; replaced by the recorded starts of a `replay`, which must be the only partner.
+        partners: partners, or names of scripted kinds.
         settings: settings of the world.
         task: the table if None.
         repeats: partners of each kind for each start, with different random numbers.
@@ -46,23 +49,32 @@ def run_with_partners(
 
     Returns:
         One result for each scenario, kind and repeat, in that order.
+
+    Raises:
+        InvalidValueError: a `replay` beside other partners.
     """
     task = task or get_task()
-    players = simulated_players(task)
+    chosen = [scripted_partners([each], task)[0] if isinstance(each, str) else each for each in partners]
+    recorded = next((each.recorded for each in chosen if each.recorded is not None), None)
+    if recorded is not None and len(chosen) > 1:
+        names = [each.name for each in chosen]
+        raise InvalidValueError("--partners", "a replay as the only partner, since it acts in its own starts", names)
+    scenarios = scenarios if recorded is None else recorded.scenarios
     episodes = [
-        (index, scenario, kind, repeat)
+        (index, scenario, owner, repeat)
         for index, scenario in enumerate(scenarios)
-        for kind in partners
+        for owner in range(len(chosen))
         for repeat in range(repeats)
     ]
     agent = robot.agent(seed, fps)
-    partner = ScriptedAgent(
-        "partner", lambda seat, index, start: players.make_partner(start.scenario, episodes[index][2], start.seed)
+    partner = AgentsByWorld(
+        [each.agent(partner_seed, repeats) for each in chosen], [owner for _, _, owner, _ in episodes], "partner"
     )
     # The seeds depend on neither the robot nor the order of episodes: all robots get the same partner on a start.
     seeds = [_seed(partner_seed, scenario, repeat) for _, scenario, _, repeat in episodes]
     starts = [scenario for _, scenario, _, _ in episodes]
-    rollout = Rollout(task, starts, (agent, partner), seeds=seeds, settings=settings)
+    worlds = () if recorded is None else recorded.worlds(task, settings, repeats)
+    rollout = Rollout(task, starts, (agent, partner), seeds=seeds, settings=settings, worlds=worlds)
     trace = run_traced(rollout, on_step)
     return [
         PartnerEpisodeResult(
@@ -70,15 +82,23 @@ def run_with_partners(
             scenario,
             repeat,
             *episode_measures(rollout, trace, agent, k),
-            kind,
+            chosen[owner].name,
             trace.actions(k),
             task.studies.at_rest(trace.states(k)[1:]),
-            partner.players[k].changes,
+            _changes(partner, k),
             task=task,
             end=rollout.ends[k],
+            states=task.states_of(trace.states(k)),
         )
-        for k, (index, scenario, kind, repeat) in enumerate(episodes)
+        for k, (index, scenario, owner, repeat) in enumerate(episodes)
     ]
+
+
+def _changes(partner: AgentsByWorld, world: int) -> int | None:
+    """How often a scripted partner changed its route choice; None for other partners."""
+    agent = partner.agents[partner.owners[world]]
+    agent = agent.inner if isinstance(agent, LimitedAgent) else agent
+    return agent.players[partner.local[world]].changes if isinstance(agent, ScriptedAgent) else None
 
 
 def _seed(partner_seed: int, scenario: Any, repeat: int) -> int:

@@ -29,7 +29,7 @@ def definitions(task: PairTask, summary: dict[str, Any]) -> dict[str, str]:
         "deadlock": f"standing ({words.get('at_rest', 'as the task defines it')}) for {DEADLOCK_S:g} s or more: "
         "proportion of all time, and of the episodes in which it occurs",
         "partner_changes": f"how often the partner changed {words.get('change', 'its route choice')}, mean over "
-        "episodes",
+        "episodes with a scripted partner",
         "differences": f"first robot minus the other on the same starts with the same partners; 95 %: {BOOTSTRAP}; "
         "time only where both succeed",
     }
@@ -75,9 +75,10 @@ def _with_partner(episodes: Sequence[PartnerEpisodeResult]) -> dict[str, Any]:
     proportions = [proportion for episode in episodes if (proportion := episode.robot_share) is not None]
     deadlocks = [seconds for episode in episodes if (seconds := episode.deadlock_s) is not None]
     in_deadlock = sum(seconds > 0 for seconds in deadlocks) / len(episodes)
+    changes = [episode.partner_changes for episode in episodes if episode.partner_changes is not None]
     time_share = sum(deadlocks) * record_hz / steps if deadlocks else None
     return {
         "robot_share": float(np.mean(proportions)) if proportions else None,
         "deadlock": {"time_share": time_share, "episode_share": in_deadlock} if deadlocks else None,
-        "partner_changes": float(np.mean([episode.partner_changes for episode in episodes])),
+        "partner_changes": float(np.mean(changes)) if changes else None,
     }

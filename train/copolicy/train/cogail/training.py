@@ -22,6 +22,7 @@ from lerobot_policy_copolicy.cogail.network import Discriminator
 from ..finite_data import NonFiniteError
 from ..finite_weights import non_finite_weight
 from ..memory_training import dataset_in_memory
+from ..pair_split import PairSplit
 from .adversary import Adversary
 from .demonstrations import Demonstrations, EncodedFrames
 from .layers import joined
@@ -34,16 +35,19 @@ from .worlds import RestartingWorlds
 _REWARD_SAMPLE = 2048  # demonstrated frames whose rewards are averaged
 
 
-def train_cogail(config: TrainPipelineConfig) -> None:
+def train_cogail(config: TrainPipelineConfig, split: PairSplit | None = None) -> None:
     """Trains Co-GAIL in the world of the task, or continues a run from its newest checkpoint.
 
     One step is one frame of one world. The number of steps is rounded down to whole updates. Everything random comes
     from torch's generator, which checkpoints store: on one machine a resumed run continues exactly.
 
+    Args:
+        split: pairs to learn from; all if None. Each checkpoint records its pairs (`training_data.json`).
+
     Raises:
         CopolicyError: the data set cannot be trained on, a setting is out of range, or a number is not finite.
     """
-    training = CoGailTraining(config)
+    training = CoGailTraining(config, split)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # the networks are so small that more threads only wait for each other
     try:
@@ -61,7 +65,7 @@ class CoGailTraining:
         step: frames in the world so far.
     """
 
-    def __init__(self, config: TrainPipelineConfig):
+    def __init__(self, config: TrainPipelineConfig, split: PairSplit | None = None):
         self.config, self.step = config, 0
         if not isinstance(config.policy, CoGailConfig):
             found = "none" if config.policy is None else config.policy.type
@@ -78,7 +82,7 @@ class CoGailTraining:
             raise InvalidValueError("--steps", expected, config.steps)
         if config.seed is not None:
             set_seed(config.seed)
-        dataset = dataset_in_memory(config)
+        dataset, self._data = dataset_in_memory(config, split)
         policy = make_policy(cfg=settings, ds_meta=dataset.meta)
         assert isinstance(policy, CoGailPolicy)
         self.policy = policy.train()
@@ -125,7 +129,7 @@ class CoGailTraining:
                 # Of a frequency that is no multiple of an update's frames, the first update beyond.
                 due = config.save_freq > 0 and self.step // config.save_freq > (self.step - frames) // config.save_freq
                 if config.save_checkpoint and (last or due):
-                    write_checkpoint(config, self.step, self.policy, self._state())
+                    write_checkpoint(config, self.step, self.policy, self._state(), self._data)
                     log.draw(title)
 
     @property

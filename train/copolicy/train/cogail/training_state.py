@@ -21,13 +21,20 @@ from copolicy.dataset.files.staging import replacement
 from lerobot_policy_copolicy.cogail.modeling_cogail import CoGailPolicy
 
 from ..finite_training import link_last_checkpoint
+from ..training_data import write_training_data
 
 STATE_FILE = "cogail_state.pt"
 """In `training_state`: optimizers, discriminator, scale of the reward, worlds."""
 
 
-def write_checkpoint(config: TrainPipelineConfig, step: int, policy: CoGailPolicy, state: dict[str, Any]) -> Path:
+def write_checkpoint(
+    config: TrainPipelineConfig, step: int, policy: CoGailPolicy, state: dict[str, Any], data: dict[str, Any]
+) -> Path:
     """Writes a checkpoint, and links `checkpoints/last` to it when it is complete.
+
+    Args:
+        state: what LeRobot's training state lacks.
+        data: content of `training_data.json`; empty for a data set without pairs.
 
     Raises:
         NonFiniteError: a weight is NaN or infinite.
@@ -40,6 +47,8 @@ def write_checkpoint(config: TrainPipelineConfig, step: int, policy: CoGailPolic
     config.save_pretrained(folder / PRETRAINED_MODEL_DIR)
     for processor in make_pre_post_processors(policy.config):
         processor.save_pretrained(folder / PRETRAINED_MODEL_DIR)
+    if data:
+        write_training_data(folder / PRETRAINED_MODEL_DIR, data)
     save_training_state(folder, step)
     with replacement(folder / TRAINING_STATE_DIR / STATE_FILE) as partial:
         torch.save(state, partial)

@@ -8,12 +8,17 @@ import numpy as np
 
 from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.task import SimulatedPlayers
+from copolicy.dataset.task_spec import RECORD_HZ
 
 from ..map_config import MapConfig
+from .partner_pairs import PARTNER_PAIRS
 from .profiles import PAIRS, PARTNERS, ROBOTS, PlayerProfile
 
 if TYPE_CHECKING:
     from .scripted_player import ScriptedPlayer
+
+
+ALL_PAIRS = {**PAIRS, **PARTNER_PAIRS}
 
 
 def simulated_pair(
@@ -28,7 +33,7 @@ def simulated_pair(
         InvalidValueError: a negative seed.
         UnknownNameError: no such pair.
     """
-    robot, human = _lookup("simulated pair", pair_id, seed, PAIRS)
+    robot, human = _lookup("simulated pair", pair_id, seed, ALL_PAIRS)
     if clearance is not None:
         robot, human = replace(robot, clearance=clearance), replace(human, clearance=clearance)
     seeds = np.random.SeedSequence([seed, *pair_id.encode()]).generate_state(2, np.uint64)
@@ -45,6 +50,18 @@ def simulated_partner(map_config: MapConfig, kind: str, seed: int, player: int =
     profile = _lookup("kind of partner", kind, seed, PARTNERS)
     own_seed = np.random.SeedSequence([seed, *kind.encode()]).generate_state(1, np.uint64)[0]
     return _player(player, map_config, profile, int(own_seed))
+
+
+def human_like_player(map_config: MapConfig, seed: int, delay_s: float) -> "ScriptedPlayer":
+    """A player of the usual profile at the human's seat with a reaction delay, without additive noise.
+
+    Its pulses, drift of effort, pauses and slips remain; the caller adds noise that depends on the force.
+    """
+    if seed < 0:
+        raise InvalidValueError("seed", "a whole number, not negative", seed)
+    profile = PlayerProfile(delay_steps=round(delay_s * RECORD_HZ), noise=0.0)
+    own_seed = np.random.SeedSequence([seed, *b"human-like"]).generate_state(1, np.uint64)[0]
+    return _player(1, map_config, profile, int(own_seed))
 
 
 def scripted_robot(map_config: MapConfig, name: str, seed: int) -> "ScriptedPlayer":
@@ -73,6 +90,14 @@ def _player(player: int, map_config: MapConfig, profile: PlayerProfile, seed: in
 
 
 SCRIPTED_PLAYERS = SimulatedPlayers(
-    PAIRS, PARTNERS, ROBOTS, simulated_pair, simulated_partner, scripted_robot, options=("clearance",)
+    ALL_PAIRS,
+    PARTNERS,
+    ROBOTS,
+    simulated_pair,
+    simulated_partner,
+    scripted_robot,
+    options=("clearance",),
+    default_pairs=tuple(PAIRS),
+    make_human_like=human_like_player,
 )
 """The scripted players of the task, `TableTask.agents`."""

@@ -1,0 +1,309 @@
+"""Cross-play: what the score counts, that a stopped run continues, that common pairs and other settings are noticed."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from untrained_policy import save_untrained_policy
+
+from copolicy.collect.agents.checkpoint_folder import pretrained_folder
+from copolicy.collect.cli import main as collect
+from copolicy.collect.rollout import EpisodeStart
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.task import get_task
+from copolicy.evaluate.cli import main
+from copolicy.evaluate.cross_play import cells
+from copolicy.evaluate.cross_play.measures import MEASURES, own_kind_of_start, summary
+from copolicy.evaluate.cross_play.score import counts, in_time, partner_scores, references
+from copolicy.evaluate.partner_study.clearance import smallest_distance
+from copolicy.evaluate.partner_study.study import run_with_partners
+from copolicy.evaluate.partners.names import parse_partners
+from copolicy.evaluate.partners.overlap import check_overlap
+from copolicy.evaluate.partners.partner import make_partner
+from copolicy.evaluate.study_flags import Protocol
+from copolicy.tasks.table.maps import MAP_SETS
+from copolicy.tasks.table.physics import Physics
+from copolicy.train.training_data import TRAINING_DATA_FILE, training_pairs
+
+TABLE = get_task("table")
+MAPS = MAP_SETS["training"]
+
+
+def row(map_id, time_s, success=True, start=0):
+    values = dict.fromkeys(("interaction_mean", "robot_share", "deadlock_s", "smallest_distance", "near_miss"))
+    return {"map_index": start, "map_id": map_id, "time_s": time_s, "success": success, **values}
+
+
+def test_a_success_counts_within_one_and_a_half_times_the_own_kinds_median_on_the_map():
+    own = [row("a", 10.0), row("a", 20.0), row("b", 40.0, False), row("a-90deg", 90.0, False)]
+    found = references(own)
+    assert found is not None
+    assert {name: found[name].time_s for name in ("a", "b")} == {"a": 15.0, "b": 15.0}  # no success on b: over all maps
+    rows = [row("a", 22.5), row("a", 22.6), row("b", 22.0), row("a", 5.0, False)]
+    assert [counts(each, found[each["map_id"]]) for each in rows] == [True, False, True, False]
+    assert references([row("a", 1.0, False)]) is None
+
+
+def test_a_success_against_the_partner_is_in_time_but_does_not_count():
+    own = [{**row("a", 10.0), "interaction_mean": 0.1}, {**row("a", 10.0), "interaction_mean": 0.3}]
+    found = references(own)
+    assert found is not None
+    assert found["a"].force == 0.2
+    for force, expected in ((0.3, True), (0.31, False)):
+        episode = {**row("a", 10.0), "interaction_mean": force}
+        assert in_time(episode, found["a"])
+        assert counts(episode, found["a"]) is expected
+
+
+def test_times_relate_to_the_own_kind_on_the_same_start():
+    times = own_kind_of_start([row("a", 10.0, start=0), row("a", 20.0, start=0), row("a", 50.0, False, start=1)])
+    measured = summary([row("a", 30.0, start=0), row("a", 30.0, start=1), row("a", 60.0, False, start=0)], times)
+    assert measured["relative_time"] == {"mean": 2.0, "standard_error": None, "n": 1}
+    assert measured["time_s"] == {"mean": 30.0, "standard_error": 0.0, "n": 2}
+    assert measured["success"] == {"mean": 2 / 3, "standard_error": pytest.approx((2 / 27) ** 0.5), "n": 3}
+    assert measured["interaction_force"] is measured["relative_force"] is None
+    own = own_kind_of_start([{**row("a", 10.0), "interaction_mean": 0.2}])
+    found = summary([{**row("a", 20.0, False), "interaction_mean": 0.5}], own)["relative_force"]
+    assert found == {"mean": 2.5, "standard_error": None, "n": 1}
+
+
+def test_scores_and_the_uncertainty_of_their_ranking_come_from_the_maps():
+    names = [f"m{index}" for index in range(20)]
+    own = {"p": [row(name, 10.0) for name in names]}
+    good = {"p": [row(name, 10.0 if index < 14 else 90.0) for index, name in enumerate(names)]}
+    near = {"p": [row(name, 10.0 if index >= 7 else 90.0) for index, name in enumerate(names)]}
+    bad = {"p": [row(name, 90.0) for name in names]}
+    found = partner_scores({"good": good, "near": near, "bad": bad}, own, ["good", "near", "bad"], ["bad"])
+    robots = found["robots"]
+    assert [robots[name]["mean"] for name in ("good", "near", "bad")] == [0.7, 0.65, 0.0]
+    # A proportion of 20 independent maps.
+    assert robots["good"]["standard_error"] == pytest.approx((0.7 * 0.3 / 20) ** 0.5, rel=0.03)
+    assert robots["good"]["first"] > robots["near"]["first"] > 0.25
+    assert robots["bad"]["first"] == 0
+    assert sum(robots[name]["first"] for name in robots) == pytest.approx(1)
+    assert set(found["separation"]) == {"good", "near"}
+    apart = found["separation"]["good"]["bad"]
+    assert apart["standard_errors"] == pytest.approx(0.7 / robots["good"]["standard_error"], rel=1e-6)
+    assert partner_scores({"good": good}, {"p": [row("a", 1.0, False)]}, ["good"], []) == {}
+
+
+def test_a_robot_with_the_own_kinds_times_is_first_with_certainty():
+    own = {"p": [row("a", 10.0), row("b", 12.0)], "q": [row("a", 30.0), row("b", 30.0)]}
+    bad = {"p": [row("a", 99.0), row("b", 99.0)], "q": [row("a", 99.0), row("b", 99.0)]}
+    found = partner_scores({"same": own, "bad": bad}, own, ["same", "bad"], ["bad"])["robots"]
+    assert (found["same"]["mean"], found["same"]["first"]) == (1.0, 1.0)
+    assert found["same"]["by_partner"]["q"]["mean"] == 1.0
+
+
+def test_the_distance_to_an_obstacle_is_that_of_the_outlines():
+    config = MAPS[0]
+    (x, y), size = config.squares[0]
+
+    def distance(*pose):
+        return smallest_distance(TABLE, config, TABLE.states_of(np.array([[*pose, 0.0, 0.0, 0.0]])))
+
+    # The board's right half beside the obstacle: the triangle's tip reaches to 95.5 px.
+    assert distance(x - size / 2 - 95.5 - 12.0, y - 17.5, 0.0) == pytest.approx(12.0, abs=0.1)
+    # The board's long side above it, which is 29.5 px from the centre.
+    assert distance(x, y - size / 2 - 29.5 - 7.0, 0.0) == pytest.approx(7.0, abs=0.1)
+    assert distance(x, y, 0.3) == 0.0
+    path = np.array([[x - 400, y, 0.0], [x, y - size / 2 - 29.5 - 7.0, 0.0], [x, y - 300.0, 0.0]])
+    states = TABLE.states_of(np.column_stack((path, np.zeros((3, 3)))))
+    assert smallest_distance(TABLE, config, states) == pytest.approx(7.0, abs=0.1)
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory) -> Path:
+    """An untrained co-policy, which plans rest."""
+    return save_untrained_policy(tmp_path_factory.mktemp("checkpoint") / "still")
+
+
+def run(checkpoint, out, *flags):
+    limits = ("--configurations", "4", "--step-limit", "30", "--maps", "unseen")
+    partners = () if "--partners" in flags else ("--partners", "stubborn")
+    return main(["cross-play", "--robots", f"ours={checkpoint}", *partners, "--out", str(out), *limits, *flags])
+
+
+def test_each_partner_has_its_own_kind_at_the_robots_seat():
+    for partner in [make_partner(name, TABLE) for name in parse_partners(["stubborn", "human-like"], TABLE)]:
+        robot = cells.own_kind_robot(partner, 1)
+        (episode,) = run_with_partners(robot, MAPS[:1], [partner], Physics(step_limit=2000))
+        assert episode.success
+        assert episode.robot_share is not None
+        assert 0.3 < episode.robot_share < 0.7
+
+
+def test_a_human_like_player_reacts_as_late_as_people():
+    agent = make_partner(parse_partners(["human-like,noise=0"], TABLE)[0], TABLE).agent(0, 1)
+    starts = [EpisodeStart(MAPS[0], seed, TABLE.make_world(MAPS[0]).observation) for seed in range(12)]
+    agent.begin(1, starts)
+    delays = {player.profile.delay_steps / 30 for player in agent.players}  # pyright: ignore[reportAttributeAccessIssue]
+    assert delays <= {8 / 30, 9 / 30, 10 / 30}
+    assert len(delays) > 1
+
+
+def test_the_matrix_continues_and_notices_other_settings(checkpoint, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "crossplay"
+    flags = ("--partners", "stubborn", f"still=proxy:{checkpoint},delay=0.1,noise=0.2,commit=0.2", "--json")
+    assert run(checkpoint, out, *flags) == 0
+    capsys.readouterr()
+    result = json.loads((out / "matrix.json").read_text(encoding="utf-8"))
+    assert list(result["cells"]) == ["own-kind", "ours", "nothing", "never-yields", "random"]
+    assert result["floors"] == ["nothing", "never-yields", "random"]
+    assert set(result["cells"]["ours"]) == {"stubborn", "still"}
+    assert result["partners"]["still"]["n_action_steps"] == 2
+    assert result["overlap"]["unknown"] == dict.fromkeys(("ours", "still"), "the checkpoint does not record its pairs")
+    cell = result["cells"]["nothing"]["stubborn"]
+    assert cell["episodes"] == 4
+    assert cell["measures"]["interaction_force"]["mean"] > 0.1
+    assert cell["measures"]["smallest_distance"]["mean"] > 100
+    # 30 steps reach no goal, so that no own kind gives a time.
+    assert result["scores"] == {}
+    assert set(result["no_own_kind"]) == {"stubborn", "still"}
+    text = (out / "matrix.md").read_text(encoding="utf-8")
+    assert "| robot | stubborn | still |" in text
+    rows = list(csv.DictReader((out / "matrix.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 10
+    assert rows[0]["is_own_kind"] == "true"
+    assert set(MEASURES) == {name.removesuffix("_mean") for name in rows[0] if name.endswith("_mean")} - {"score"}
+    assert (out / "matrix.png").read_bytes().startswith(b"\x89PNG")
+
+    # One cell is lost, one robot is new: only their cells run.
+    lost = next((out / "cells").glob("random--stubborn*"))
+    before = lost.read_text(encoding="utf-8")
+    lost.unlink()
+    ran = []
+    original = cells.run_with_partners
+    monkeypatch.setattr(
+        cells,
+        "run_with_partners",
+        lambda robot, *rest, **more: ran.append(robot.name) or original(robot, *rest, **more),
+    )
+    assert run(checkpoint, out, *flags) == 0
+    assert ran == ["random"]
+    again = json.loads(lost.read_text(encoding="utf-8"))
+    assert again["episodes"] == json.loads(before)["episodes"]
+    assert run(checkpoint, out, "--partners", "stubborn", "--robots", f"ours={checkpoint}", "scripted") == 0
+    assert ran == ["random", "scripted"]
+    capsys.readouterr()
+
+    assert run(checkpoint, out, "--seed", "1") == 2
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "expected seed 1 as in this run (another --out, or --overwrite), found 'seed 0'" in told
+    assert run(checkpoint, out, "--seed", "1", "--overwrite") == 0
+
+
+def record_pairs(checkpoint, folder, pairs, **more):
+    """A copy of a checkpoint that says which pairs it learned from."""
+    folder.mkdir()
+    for path in checkpoint.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    facts = {"repo_id": "lab/a", "content_hash": "x", "pairs": pairs, "sources": ["human"], "people": [], **more}
+    (folder / TRAINING_DATA_FILE).write_text(json.dumps(facts), encoding="utf-8")
+    return folder
+
+
+def test_common_pairs_are_refused_unless_allowed(checkpoint, tmp_path, capsys):
+    robot = record_pairs(checkpoint, tmp_path / "robot", {"P01": 3, "P02": 1})
+    proxy = record_pairs(checkpoint, tmp_path / "proxy", {"P02": 2, "P03": 2})
+    other = record_pairs(checkpoint, tmp_path / "other", {"P03": 2})
+    assert run(robot, tmp_path / "out", "--partners", f"proxy:{proxy}") == 2
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert told.endswith(
+        "expected a robot and a proxy (ours and proxy:proxy) that share no pair, or --allow-overlap, found 'P02'"
+    )
+    assert not (tmp_path / "out").exists()
+    call = ["partner", f"ours={robot}", "--partners", f"proxy:{proxy}", "--configurations", "4", "--step-limit", "10"]
+    assert main([*call, "--out", str(tmp_path / "partner.json")]) == 2
+    assert main([*call, "--allow-overlap", "--out", str(tmp_path / "partner.json")]) == 0
+    result = json.loads((tmp_path / "partner.json").read_text(encoding="utf-8"))
+    assert result["overlap"]["shared"] == {"ours": {"proxy:proxy": ["P02"]}}
+    assert result["summary"]["partner_changes"] is None
+    assert result["settings"]["partners"]["proxy:proxy"]["kind"] == "proxy"
+    assert "shared" not in check_overlap({"r": robot}, {"p": other}, False)
+
+
+def test_equal_names_are_the_same_pair_only_of_the_same_data_or_if_simulated(checkpoint, tmp_path):
+    def pairs(name, **more):
+        found = training_pairs(record_pairs(checkpoint, tmp_path / name, {"P01": 1}, **more))
+        assert found is not None
+        return found
+
+    one = pairs("one")
+    other_lab = pairs("other_lab", repo_id="lab/b", content_hash="y")
+    assert one.shared_with(other_lab) == []
+    assert one.shared_with(pairs("new_version", content_hash="z")) == ["P01"]
+    simulated = [pairs(f"simulated{k}", sources=["simulated"], repo_id=f"lab/{k}", content_hash=str(k)) for k in (1, 2)]
+    assert simulated[0].shared_with(simulated[1]) == ["P01"]
+    assert one.shared_with(pairs("unknown", repo_id=None, content_hash=None)) == ["P01"]
+    found = check_overlap({"r": tmp_path / "one"}, {"p": tmp_path / "other_lab"}, False)
+    assert found["same_names"] == {"r": {"p": ["P01"]}}
+
+
+def test_the_shipped_policy_records_its_pairs():
+    found = training_pairs(pretrained_folder())
+    assert found is not None
+    assert (sorted(found.pairs), found.simulated) == (["S01", "S02", "S03", "S04", "S05"], True)
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory) -> Path:
+    """Three simulated episodes."""
+    folder = tmp_path_factory.mktemp("recordings") / "three"
+    call = ["--episodes", "3", "--seed", "2", "--maps", "training", "--start-noise", "1", "--workers", "1"]
+    assert collect(["simulate", *call, "--pairs", "S06", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_a_replay_with_its_own_kind_is_the_recording(recordings):
+    (name,) = parse_partners([f"replay:{recordings}"], TABLE)
+    protocol = Protocol(TABLE, 10, Physics(step_limit=2000))
+    partner = make_partner(name, TABLE, protocol, starts=2)
+    assert partner.recorded is not None
+    assert partner.recorded.describe()["starts"] == 2
+    robot = cells.own_kind_robot(partner, 2)
+    episodes = run_with_partners(robot, (), [partner], Physics(step_limit=2000), repeats=2)
+    assert [episode.success for episode in episodes] == [True] * 4
+    assert [episode.steps for episode in episodes[::2]] == [len(actions) for actions in partner.recorded.actions]
+    np.testing.assert_array_equal(episodes[0].actions, partner.recorded.actions[0])
+    protocol = Protocol(TABLE, 10, Physics(step_limit=2000, angular_acceleration_limit=0.5))
+    with pytest.raises(InvalidValueError, match="recordings under the study's world settings"):
+        make_partner(name, TABLE, protocol, starts=2)
+
+
+def test_a_replay_is_the_only_partner_of_a_partner_study(checkpoint, recordings, tmp_path, capsys):
+    call = [
+        "partner",
+        str(checkpoint),
+        "--configurations",
+        "4",
+        "--step-limit",
+        "20",
+        "--out",
+        str(tmp_path / "p.json"),
+    ]
+    assert main([*call, "--partners", f"replay:{recordings}", "stubborn"]) == 2
+    assert "expected a replay as the only partner" in capsys.readouterr().err.splitlines()[-1]
+    assert main([*call, "--partners", f"replay:{recordings}", "--no-baseline"]) == 0
+    result = json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))
+    assert result["settings"]["configurations"] == len(result["episodes"]) <= 3
+    assert run(checkpoint, tmp_path / "x", "--partners", f"replay:{recordings}", "slow", "--no-floors") == 0
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
+        (["--partners", "replay:nowhere"], "nowhere: expected a folder of recordings or a data set, found no such"),
+        (["--robots", "own-kind={0}"], "--robots: expected robots of different names (NAME=CKPT gives one), other"),
+        (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
+        (["--partners", "still=proxy:{0},commit=9"], "proxy still: commit: expected at most 1 s, a whole chunk, found"),
+    ],
+)
+def test_a_wrong_call_is_one_line(checkpoint, tmp_path, capsys, flags, message):
+    assert run(checkpoint, tmp_path / "out", *(flag.format(checkpoint) for flag in flags)) == 2
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert told.startswith(f"copolicy-eval: {message}")
+    assert not (tmp_path / "out").exists()

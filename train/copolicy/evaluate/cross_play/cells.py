@@ -1,0 +1,141 @@
+"""Runs the cells of a cross-play and stores each in a file, so that a stopped run continues."""
+
+import json
+import re
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, TypedDict
+
+import numpy as np
+
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.json_file import read_json
+from copolicy.dataset.files.staging import replace_json
+from copolicy.dataset.task import PairTask
+
+from ..partner_study.robots import StudyRobot
+from ..partner_study.study import run_with_partners
+from ..partners.partner import StudyPartner
+from .measures import Row, episode_row
+
+OWN_KIND = "own-kind"
+"""Row of the matrix in which each partner meets its own kind."""
+
+_FOLDER = "cells"
+_OF_A_RUN = ("checkpoint", "planned_with")  # entries of a description that do not determine the episodes
+
+
+class CellDocument(TypedDict):
+    """The file of a cell."""
+
+    study: str
+    robot: str
+    partner: str
+    settings: dict[str, Any]
+    wall_s: float
+    planning_ms_per_call: float | None
+    episodes: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Play:
+    """What all cells of a cross-play share.
+
+    Attributes:
+        scenarios: starts, except of a `replay`.
+        settings: of the world.
+        fps: actions per second of a robot.
+        described: settings that determine the episodes, for the files of the cells.
+    """
+
+    task: PairTask
+    scenarios: Sequence[Any]
+    settings: Any
+    fps: Callable[[StudyRobot], int]
+    repeats: int
+    seed: int
+    partner_seed: int
+    described: Mapping[str, Any]
+
+
+def own_kind_robot(partner: StudyPartner, repeats: int) -> StudyRobot:
+    """A robot of a partner's own kind; `partner.own_kind` must not be None."""
+    own_kind = partner.own_kind
+    assert own_kind is not None, partner.no_own_kind
+    described = {"type": OWN_KIND, "of": partner.name}
+    return StudyRobot(OWN_KIND, lambda seed, fps: own_kind(seed, repeats), lambda: described, partner.own_policy)
+
+
+def cell_file(out: Path, robot: str, partner: str) -> Path:
+    """The file of a cell: readable names, and a check sum of the exact ones."""
+    readable = "--".join(re.sub(r"[^A-Za-z0-9._=-]+", "_", name)[:60] for name in (robot, partner))
+    return out / _FOLDER / f"{readable}--{zlib.crc32(repr((robot, partner)).encode()):08x}.json"
+
+
+def run_cell(out: Path, play: Play, robot: StudyRobot, partner: StudyPartner, overwrite: bool = False) -> CellDocument:
+    """The episodes of a robot with a partner: read from the cell's file if it is there, else run and stored.
+
+    Raises:
+        InvalidValueError: the file has other settings than this run.
+        FileFormatError: the file is no cell.
+    """
+    path = cell_file(out, robot.name, partner.name)
+    settings = _described(play, robot, partner)
+    if path.exists() and not overwrite:
+        stored = read_json(path, CellDocument, "a cell of a cross-play")
+        _require_same(path, stored["settings"], settings)
+        return stored
+    already = 0 if robot.policy is None else len(robot.policy.inference_seconds)
+    started = perf_counter()
+    episodes = run_with_partners(
+        robot,
+        play.scenarios,
+        [partner],
+        play.settings,
+        task=play.task,
+        repeats=play.repeats,
+        fps=play.fps(robot),
+        seed=play.seed,
+        partner_seed=play.partner_seed,
+    )
+    wall_s = perf_counter() - started
+    inference = [] if robot.policy is None else robot.policy.inference_seconds[already:]
+    rows: list[Row] = [episode_row(episode) for episode in episodes]
+    cell: CellDocument = {
+        "study": "cross-play cell",
+        "robot": robot.name,
+        "partner": partner.name,
+        "settings": settings,
+        "wall_s": wall_s,
+        "planning_ms_per_call": 1e3 * float(np.median(inference)) if inference else None,
+        "episodes": rows,
+    }
+    replace_json(path, cell, indent=1)
+    return cell
+
+
+def _described(play: Play, robot: StudyRobot, partner: StudyPartner) -> dict[str, Any]:
+    described = {
+        **play.described,
+        "fps": play.fps(robot),
+        "robot": _without_run(robot.describe()),
+        "partner": _without_run(partner.describe()),
+    }
+    return json.loads(json.dumps(described))  # as it is read again: tuples are lists
+
+
+def _without_run(described: Any) -> Any:
+    if not isinstance(described, Mapping):
+        return described
+    return {name: _without_run(value) for name, value in described.items() if name not in _OF_A_RUN}
+
+
+def _require_same(path: Path, stored: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    for name in (*now, *stored):
+        if stored.get(name) != now.get(name):
+            first, second = (json.dumps(each.get(name))[:80] for each in (now, stored))
+            expected = f"{name} {first} as in this run (another --out, or --overwrite)"
+            raise InvalidValueError(str(path), expected, f"{name} {second}")

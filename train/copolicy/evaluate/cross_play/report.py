@@ -1,0 +1,114 @@
+"""The matrix of a cross-play as Markdown and CSV."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .cells import OWN_KIND
+from .measures import MEASURES, label
+from .score import FACTOR
+
+SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
+
+_COLUMNS = ("mean", "standard_error", "n")
+
+
+def markdown(result: Mapping[str, Any]) -> str:
+    """Scores and their parts, separation from floors, a table of robots and partners for each measure, definitions."""
+    settings, scores = result["settings"], result["scores"]
+    text = [
+        f"**Cross-play, {settings['maps']} maps**: {settings['episodes_per_cell']} episodes per cell on "
+        f"{settings['configurations']} starts, {settings['actions_per_plan']} action(s) per chunk, at most "
+        f"{settings['step_limit']} steps. {result['label']}.",
+        _scores(result),
+    ]
+    if separation := scores.get("separation"):
+        rows = [
+            [robot, floor, _estimate(difference, 100, 1), _ratio(difference["standard_errors"])]
+            for robot, floors in separation.items()
+            for floor, difference in floors.items()
+        ]
+        text.append(_table(["robot", "floor", "difference of scores, points", "in standard errors"], rows))
+    partners = list(result["partners"])
+    if scores:
+        rows = [
+            [robot, *(_estimate(score["by_partner"].get(partner), 100, 1) for partner in partners)]
+            for robot, score in scores["robots"].items()
+        ]
+        text.append(f"**{SCORE_LABEL}**\n\n" + _table(["robot", *partners], rows))
+    for name in MEASURES:
+        if name in result["not_measured"]:
+            continue
+        rows = [
+            [robot, *(_cell(row.get(partner), name) for partner in partners)] for robot, row in result["cells"].items()
+        ]
+        text.append(f"**{label(name, settings['length_unit'])}**\n\n" + _table(["robot", *partners], rows))
+    notes = {**result["definitions"], **result["not_measured"], **result["no_own_kind"]}
+    text.append("\n".join(f"- {name}: {note}." for name, note in notes.items()))
+    return "\n\n".join(text) + "\n"
+
+
+def _scores(result: Mapping[str, Any]) -> str:
+    """Robots in the order of their scores, with means over partners of the other measures."""
+    scores = result["scores"].get("robots", {})
+    shown = [name for name in MEASURES if name not in result["not_measured"]]
+    rows = []
+    for robot in sorted(result["cells"], key=lambda name: -scores.get(name, {"mean": 0.0})["mean"]):
+        score, row = scores.get(robot), result["cells"][robot]
+        first = "" if score is None or "first" not in score else f"{100 * score['first']:.0f} %"
+        timely = "none" if score is None else f"{100 * score['in_time']:.1f}"
+        rows.append([robot, _estimate(score, 100, 1), first, timely, *(_over_partners(row, name) for name in shown)])
+    head = [
+        "robot",
+        "partner score, %",
+        "first in",
+        "success in time, %",
+        *(label(name, result["settings"]["length_unit"]) for name in shown),
+    ]
+    return "Scores and their parts, means over partners:\n\n" + _table(head, rows)
+
+
+def _over_partners(row: Mapping[str, Any], name: str) -> str:
+    measure = MEASURES[name]
+    values = [found["mean"] for cell in row.values() if (found := cell["measures"][name]) is not None]
+    return f"{measure.scale * sum(values) / len(values):.{measure.digits}f}" if values else "none"
+
+
+def _cell(cell: Mapping[str, Any] | None, name: str) -> str:
+    measure = MEASURES[name]
+    return "none" if cell is None else _estimate(cell["measures"][name], measure.scale, measure.digits)
+
+
+def _estimate(value: Mapping[str, Any] | None, scale: float, digits: int) -> str:
+    if value is None:
+        return "none"
+    error = value["standard_error"]
+    mean = f"{scale * value['mean']:.{digits}f}"
+    return mean if error is None else f"{mean} ± {scale * error:.{digits}f}"
+
+
+def _ratio(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1f}"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def csv_text(result: Mapping[str, Any]) -> str:
+    """One row per cell: mean, standard error and number of episodes of each measure, the score, the wall time."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    scores = result["scores"].get("robots", {})
+    names = [f"{name}_{column}" for name in MEASURES for column in _COLUMNS]
+    writer.writerow(["robot", "partner", "is_own_kind", "score_mean", "score_standard_error", *names, "wall_s"])
+    for robot, row in result["cells"].items():
+        for partner, cell in row.items():
+            score = scores.get(robot, {}).get("by_partner", {}).get(partner) or {}
+            values = [(cell["measures"][name] or {}).get(column, "") for name in MEASURES for column in _COLUMNS]
+            parts = [score.get("mean", ""), score.get("standard_error", ""), *values, cell["wall_s"]]
+            own = str(robot == OWN_KIND).lower()
+            writer.writerow([robot, partner, own, *("" if part is None else part for part in parts)])
+    return buffer.getvalue()

@@ -1,0 +1,142 @@
+"""The partner score of robots, with its uncertainty and that of their ranking.
+
+The score of a robot with a partner is the proportion of episodes that succeed within `FACTOR` times the median time of
+the partner's own kind with itself on the same map, at a mean interaction force of at most `FACTOR` times that of the
+own kind. Success alone is the partner's as much as the robot's: a capable partner reaches the goal with a robot that
+does nothing, in more than twice the time. Success in time alone is also reached by a robot that knows the map and never
+yields, against a partner that gives way; what the partner has to bear shows in the force. The own kind as the
+reference makes scores with slow and fast, strong and weak partners comparable, and the map as the unit leaves its
+length out. The partner score is the mean over partners. In a task without an interaction measure the force is left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from copolicy.dataset.arrays import Array
+
+from ..comparison.paired import REPLICATES
+from .measures import OwnKind, Row, map_of
+
+FACTOR = 1.5
+"""Factor on the own kind's median time and force within which an episode counts."""
+
+Cells = Mapping[str, Mapping[str, Sequence[Row]]]
+"""Rows by robot and partner."""
+
+
+def references(own_rows: Sequence[Row]) -> dict[str, OwnKind] | None:
+    """The reference of each map; a map without a success of the own kind gets the medians over all maps.
+
+    Returns:
+        None if the own kind never succeeded.
+    """
+    every = [row for row in own_rows if row["success"]]
+    if not every:
+        return None
+    by_map: dict[str, list[Row]] = {map_of(row): [] for row in own_rows}
+    for row in every:
+        by_map[map_of(row)].append(row)
+    return {name: OwnKind.of(rows or every) for name, rows in by_map.items()}
+
+
+def in_time(row: Row, reference: OwnKind) -> bool:
+    """Whether an episode succeeded within `FACTOR` times the own kind's time."""
+    return bool(row["success"]) and row["time_s"] <= FACTOR * reference.time_s
+
+
+def counts(row: Row, reference: OwnKind) -> bool:
+    """Whether an episode counts for the score: `in_time`, and not above `FACTOR` times the own kind's force."""
+    force = row["interaction_mean"]
+    gentle = reference.force is None or force is None or force <= FACTOR * reference.force
+    return in_time(row, reference) and gentle
+
+
+def partner_scores(
+    cells: Cells, own_rows: Mapping[str, Sequence[Row]], ranked: Sequence[str], floors: Sequence[str], seed: int = 0
+) -> dict[str, Any]:
+    """Scores of all robots, and the ranking of some.
+
+    The bootstrap draws maps, with all episodes of a map together: the same maps for all robots, and for all partners
+    with the same starts.
+
+    Args:
+        own_rows: rows of each partner's own kind; partners without are left out of the score.
+        ranked: robots to rank.
+        floors: robots from which the others are to be told apart.
+
+    Returns:
+        `robots` with score, standard error, interval, proportion in time, scores by partner and, if ranked, the
+        proportion of replicates in which it is first; `separation` of robots from floors; empty if no partner has a
+        reference.
+    """
+    by_partner_maps = {name: found for name, rows in own_rows.items() if (found := references(rows)) is not None}
+    if not by_partner_maps:
+        return {}
+    rng = np.random.default_rng(seed)
+    weights: dict[tuple[str, ...], Array] = {}
+    means: dict[str, dict[str, float]] = {robot: {} for robot in cells}
+    replicates: dict[str, dict[str, Array]] = {robot: {} for robot in cells}
+    timely: dict[str, list[float]] = {robot: [] for robot in cells}
+    for partner, reference in by_partner_maps.items():
+        maps = tuple(reference)
+        if maps not in weights:
+            uniform = np.full(len(maps), 1 / len(maps))
+            weights[maps] = rng.multinomial(len(maps), uniform, size=REPLICATES).astype(float)
+        index = {name: position for position, name in enumerate(maps)}
+        for robot, by_partner in cells.items():
+            rows = by_partner[partner]
+            positions = [index[map_of(row)] for row in rows]
+            counted = [counts(row, reference[map_of(row)]) for row in rows]
+            timely[robot].append(float(np.mean([in_time(row, reference[map_of(row)]) for row in rows])))
+            sums = np.bincount(positions, counted, minlength=len(maps))
+            episodes = np.bincount(positions, minlength=len(maps))
+            means[robot][partner] = float(sums.sum() / episodes.sum())
+            replicates[robot][partner] = (weights[maps] @ sums) / (weights[maps] @ episodes)
+    totals = {robot: np.mean(list(by_partner.values()), axis=0) for robot, by_partner in replicates.items()}
+    first = _first({robot: totals[robot] for robot in ranked})
+    # With one map every replicate is the same, which is no uncertainty of zero.
+    known = all(len(maps) > 1 for maps in weights)
+    robots = {
+        robot: {
+            **_estimate(float(np.mean(list(means[robot].values()))), totals[robot], known),
+            "in_time": float(np.mean(timely[robot])),
+            "by_partner": {
+                partner: _estimate(mean, replicates[robot][partner], known) for partner, mean in means[robot].items()
+            },
+            **({"first": first[robot]} if robot in first else {}),
+        }
+        for robot in cells
+    }
+    separation = {
+        robot: {
+            floor: _difference(robots[robot]["mean"] - robots[floor]["mean"], totals[robot] - totals[floor], known)
+            for floor in floors
+        }
+        for robot in ranked
+        if robot not in floors
+    }
+    return {"robots": robots, "separation": separation, "maps": max(map(len, weights)), "replicates": REPLICATES}
+
+
+def _estimate(mean: float, values: Array, known: bool) -> dict[str, Any]:
+    if not known:
+        return {"mean": mean, "standard_error": None, "bootstrap_95": None}
+    low, high = np.quantile(values, (0.025, 0.975))
+    return {"mean": mean, "standard_error": float(values.std()), "bootstrap_95": [float(low), float(high)]}
+
+
+def _difference(mean: float, values: Array, known: bool) -> dict[str, Any]:
+    estimate = _estimate(mean, values, known)
+    error = estimate["standard_error"]
+    return {**estimate, "standard_errors": mean / error if error else None}
+
+
+def _first(totals: Mapping[str, Array]) -> dict[str, float]:
+    """Proportion of replicates in which each robot has the largest score; equal ones share it."""
+    if not totals:
+        return {}
+    values = np.array(list(totals.values()))  # (robots, replicates)
+    best = np.isclose(values, values.max(axis=0))
+    return dict(zip(totals, (best / best.sum(axis=0)).mean(axis=1).tolist(), strict=True))

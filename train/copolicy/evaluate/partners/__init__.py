@@ -1,0 +1,1 @@
+"""Partners at the human's seat of a study: learned proxies, scripted players, recorded people."""
