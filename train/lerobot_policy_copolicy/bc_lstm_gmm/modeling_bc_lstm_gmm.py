@@ -10,7 +10,7 @@ from copolicy.dataset.features import ACTION
 
 from ..pair_policy.modeling_pair import PairPolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
-from .network import Mixture, RecurrentMixtureNetwork, State
+from .network import RecurrentMixtureNetwork, State
 
 
 class BcLstmGmmPolicy(PairPolicy):
@@ -83,8 +83,7 @@ class BcLstmGmmPolicy(PairPolicy):
         self._frames += 1
         inputs = self.features(self._observation(batch, None))[:, None]  # (B, 1, size)
         mixture, self._state = self.network(inputs, self._state)
-        modes = torch.full_like(mixture.deviations, self.config.execution_deviation)
-        drawn = Mixture(mixture.logits, mixture.means, modes.clamp(min=1e-12)).distribution().sample()[:, 0]
+        drawn = mixture.sample(self.config.execution_deviation)[:, 0]
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))
 
     def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
