@@ -190,7 +190,7 @@ def test_differences_are_paired_and_times_count_where_both_succeed():
     slow = _episode(np.zeros((60, 4)), np.zeros((61, 2)), np.zeros(60))
     lost = _episode(np.zeros((90, 4)), np.zeros((91, 2)), np.zeros(90), success=False)
     found = differences([fast], [slow])["all"]
-    assert found["time_s"] == {"mean": -1.0, "bootstrap_95": None, "pairs": 1, "maps": 1}
+    assert found["time_s"] == {"mean": -1.0, "standard_error": None, "bootstrap_95": None, "pairs": 1, "maps": 1}
     assert differences([fast], [lost])["slow"]["success"]["mean"] == 1.0
     assert differences([fast], [lost])["slow"]["time_s"]["mean"] is None
 

@@ -118,7 +118,7 @@ def test_defaults_do_not_override_what_is_given():
         (["--dataset.root={tmp}/nothing"], "{tmp}/nothing: expected the folder of a LeRobot v3 data set"),
         (["--dataset.root={data}", "--nonsense=1"], "unrecognized arguments: --nonsense=1"),
         (["--dataset.root={data}", "--steps=two"], "`steps`: Couldn't parse 'two' into an int"),
-        (["--dataset.root={data}", "--policy.preset=big"], "unknown preset 'big'; available: default, paper, small"),
+        (["--dataset.root={data}", "--policy.preset=big"], "unknown preset 'big'; available: cnn, cnn-inpainting, "),
         (["--dataset.root={data}", "--policy.n_action_steps=11"], "n_action_steps: expected 1 to 10"),
         (["--dataset.root={data}", "--output_dir={tmp}"], "{tmp}: expected a path that does not exist yet"),
         (["--dataset.root={data}", "--policy.push_to_hub=true"], "'repo_id' argument missing"),

@@ -94,7 +94,7 @@ def dataset_in_memory(
 
 
 @contextmanager
-def _datasets_in_memory(split: PairSplit | None, facts: dict[str, Any]) -> Iterator[None]:
+def _datasets_in_memory(split: PairSplit | None = None, facts: dict[str, Any] | None = None) -> Iterator[None]:
     # LeRobot's trainer has no parameter for a data set or a sampler; it looks up these names in its module at each run.
     original = lerobot_train.make_train_eval_datasets
     replacements = {
@@ -126,7 +126,10 @@ def _hidden_files_ignored() -> Iterator[None]:
 
 
 def _make_datasets(
-    config: TrainPipelineConfig, original: Callable, split: PairSplit | None, facts: dict[str, Any]
+    config: TrainPipelineConfig,
+    original: Callable,
+    split: PairSplit | None = None,
+    facts: dict[str, Any] | None = None,
 ) -> tuple:
     # The co-policy states the columns that it reads; another policy may read any.
     observation_keys = getattr(config.policy, "observation_keys", None)
@@ -137,11 +140,13 @@ def _make_datasets(
     )
 
 
-def _load(config: TrainPipelineConfig, original: Callable, split: PairSplit | None, facts: dict[str, Any]) -> tuple:
+def _load(
+    config: TrainPipelineConfig, original: Callable, split: PairSplit | None, facts: dict[str, Any] | None
+) -> tuple:
     """Loads LeRobot's data sets of the selected episodes, which the configuration and thus checkpoints then record.
 
     Args:
-        facts: is filled with the content of `training_data.json`.
+        facts: is filled with the content of `training_data.json`; None if nobody writes it.
     """
     source = config.dataset
     repo_type = "bucket" if source.repo_type == "bucket" else "dataset"
@@ -153,7 +158,7 @@ def _load(config: TrainPipelineConfig, original: Callable, split: PairSplit | No
     all_selected = episodes == list(range(meta.total_episodes))
     statistics = replacement_statistics(meta.root, meta.stats, episodes, meta.total_episodes)
     local = source.root is not None
-    if local and _writes_checkpoints():
+    if local and facts is not None and _writes_checkpoints():
         facts.update(training_data(meta.root, episodes, source.repo_id, _split_text(config, split)))
     if local:
         require_finite_frames(meta.root, episodes, meta.features)

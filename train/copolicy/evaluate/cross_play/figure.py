@@ -19,7 +19,7 @@ _NAME = 22  # characters of a name that fit
 
 
 def save_heat_maps(result: Mapping[str, Any], path: Path, title: str) -> None:
-    """Draws the score and each measured measure into a PNG. Green is better; grey measures have no better end."""
+    """Draws the score and each measured measure into a PNG. Blue is better; grey measures have no better end."""
     robots, partners = list(result["cells"]), list(result["partners"])
     panels: list[tuple[str, Array, Array, int, bool | None]] = []
     if result["scores"]:
@@ -49,7 +49,7 @@ def save_heat_maps(result: Mapping[str, Any], path: Path, title: str) -> None:
 
 
 def _heat_map(axis: Any, means: Array, errors: Array, digits: int, lower_is_better: bool | None) -> None:
-    colours = "Greys" if lower_is_better is None else "RdYlGn_r" if lower_is_better else "RdYlGn"
+    colours = "Greys" if lower_is_better is None else "RdYlBu_r" if lower_is_better else "RdYlBu"
     finite = means[np.isfinite(means)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     span = max(high - low, 1e-9)
