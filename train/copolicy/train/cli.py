@@ -228,6 +228,7 @@ def _lerobot(flags: Sequence[str]) -> Iterator[None]:
     logger.addFilter(_not_about_decoders)
     before, sys.argv = sys.argv, [_PROG, *flags]
     try:
+        import lerobot.policies  # noqa: F401 (registers LeRobot's own types of policies)
         from lerobot.utils.import_utils import register_third_party_plugins
 
         register_third_party_plugins()

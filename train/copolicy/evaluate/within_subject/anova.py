@@ -36,11 +36,11 @@ def analysis_of_variance(measurements: Measurements) -> list[dict[str, Any]] | N
             dv="value",
             within=factors if len(factors) > 1 else factors[0],
             subject="unit",
-            correction=True,
+            correction=True,  # pyright: ignore[reportArgumentType] (annotated as a text, documented as a bool)
             detailed=True,
             effsize="ng2",
         )
-    rows = table.to_dict("records")
+    rows: list[dict[str, Any]] = table.to_dict("records")  # pyright: ignore[reportAssignmentType] (keys are names)
     degrees = [(int(row["ddof1"]), int(row["ddof2"])) for row in rows] if "ddof1" in rows[0] else [
         (int(rows[0]["DF"]), int(rows[1]["DF"]))
     ]  # fmt: skip

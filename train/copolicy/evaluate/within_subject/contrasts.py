@@ -65,7 +65,8 @@ def holm(tests: Sequence[dict[str, Any] | None]) -> None:
         return
     from statsmodels.stats.multitest import multipletests  # takes a second to import
 
-    for test, p in zip(found, multipletests([test["p"] for test in found], method="holm")[1], strict=True):
+    adjusted: Any = multipletests([test["p"] for test in found], method="holm")[1]
+    for test, p in zip(found, adjusted, strict=True):
         test["p_holm"] = float(p)
 
 

@@ -104,7 +104,7 @@ class _Laplace:
         beta, sigmas = parameters[:p], np.exp(parameters[p:])
         precision = np.repeat(sigmas**-2.0, self._sizes)
         offset = self._fixed @ beta
-        u = self._intercepts
+        u, curvature = self._intercepts, np.diag(precision)
         for _ in range(50):  # Newton's method for the intercepts' most probable values
             probability = special.expit(offset + self._design @ u)
             weighted = self._design * (probability * (1 - probability))[:, None]

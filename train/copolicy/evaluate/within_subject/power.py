@@ -34,6 +34,9 @@ def people_needed(
             raise InvalidValueError(name, expected, value)
     from pingouin import power_rm_anova  # takes seconds to import
 
+    def power_of(n: int) -> float:
+        return float(power_rm_anova(n=n, **settings))  # pyright: ignore[reportArgumentType] (a number if n is given)
+
     settings = {"eta_squared": eta_squared, "m": conditions, "alpha": alpha, "corr": correlation, "epsilon": epsilon}
     result = {"conditions": conditions, "partial_eta_squared": eta_squared, "correlation": correlation,
               "epsilon": epsilon, "alpha": alpha}  # fmt: skip
@@ -41,13 +44,13 @@ def people_needed(
         return {
             **result,
             "people": people,
-            "power": float(power_rm_anova(n=people, **settings)),
+            "power": power_of(people),
             "definition": DEFINITION,
         }
     n = 2
-    while n < 100_000 and float(power_rm_anova(n=n, **settings)) < power:
+    while n < 100_000 and power_of(n) < power:
         n += 1 if n < 200 else n // 20
     return {
-        **result, "people": n, "power": float(power_rm_anova(n=n, **settings)), "wanted_power": power,
+        **result, "people": n, "power": power_of(n), "wanted_power": power,
         "definition": DEFINITION,
     }  # fmt: skip
