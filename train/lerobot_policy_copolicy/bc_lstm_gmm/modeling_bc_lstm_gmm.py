@@ -8,12 +8,12 @@ from torch import Tensor
 
 from copolicy.dataset.features import ACTION
 
-from ..pair_policy.modeling_pair import PairPolicy
+from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
 from .network import RecurrentMixtureNetwork, State
 
 
-class BcLstmGmmPolicy(PairPolicy):
+class BcLstmGmmPolicy(FramePolicy):
     """Predicts the next joint action from the current frame and the state of an LSTM.
 
     As robomimic's `BC_RNN_GMM`: the loss is the negative log-likelihood over all frames of a window that starts with
@@ -34,11 +34,6 @@ class BcLstmGmmPolicy(PairPolicy):
             self.features.size, self._sizes[ACTION], config.width, config.n_layers, config.n_modes, config.min_deviation
         )
         self.reset()
-
-    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """All weights in one group."""
-        parameters = list(self.network.parameters())
-        return [{"params": parameters, "fused": parameters[0].device.type in ("cpu", "cuda")}]
 
     def reset(self) -> None:
         """Resets the state of the LSTM; call it whenever the environment is reset."""
@@ -85,11 +80,3 @@ class BcLstmGmmPolicy(PairPolicy):
         mixture, self._state = self.network(inputs, self._state)
         drawn = mixture.sample(self.config.execution_deviation)[:, 0]
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))
-
-    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
-        """Not offered: the policy keeps a state from frame to frame.
-
-        Raises:
-            NotImplementedError: always; call `select_action`.
-        """
-        raise NotImplementedError("bc_lstm_gmm acts frame by frame: call select_action")

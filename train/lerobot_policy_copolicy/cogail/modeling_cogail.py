@@ -10,14 +10,14 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import get_task
 
-from ..pair_policy.modeling_pair import PairPolicy
+from ..pair_policy.modeling_frame import FramePolicy
 from .codes import EXECUTED_POINT, GRID, draw_codes
 from .configuration_cogail import CoGailConfig
 from .inputs import HistoryInputs, first_history, next_history
 from .network import CoGailNetwork
 
 
-class CoGailPolicy(PairPolicy):
+class CoGailPolicy(FramePolicy):
     """Predicts the next joint action from a history of states and a code, as a deterministic mean.
 
     The code stands for the partner's strategy. In execution it is drawn or inferred, see `CoGailConfig`. A code is
@@ -42,10 +42,6 @@ class CoGailPolicy(PairPolicy):
         self.inputs = HistoryInputs(get_task(filled.task).spec, config.history, encoder, filled.input_range)
         self.network = CoGailNetwork(self.inputs.size, self._sizes[ACTION], config.width, filled.initial_deviation)
         self.reset()
-
-    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """All weights in one group."""
-        return [{"params": list(self.network.parameters())}]
 
     def reset(self) -> None:
         """Clears history and code; call it whenever the environment is reset."""
@@ -85,14 +81,6 @@ class CoGailPolicy(PairPolicy):
     def _scaled_partner(self, actions: Tensor) -> Tensor:
         """The partner's actions `(B, m)` scaled to [-1, 1]."""
         return self.action_scale.scaled(torch.cat((actions, actions), dim=-1))[..., actions.shape[-1] :]
-
-    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
-        """Not offered: the policy keeps a history from frame to frame.
-
-        Raises:
-            NotImplementedError: always; call `select_action`.
-        """
-        raise NotImplementedError("cogail acts frame by frame: call select_action")
 
     def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> NoReturn:
         """Not offered: the policy is trained in the world.

@@ -11,7 +11,7 @@ from copolicy.dataset.features import ENVIRONMENT_STATE, STATE
 from copolicy.dataset.task import BodyMotion, PairTask, get_task
 
 from ..pair_policy.callers import training_steps_of_callers
-from ..pair_policy.modeling_pair import PairPolicy
+from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_vrnn import VrnnConfig
 from .loss import balanced_loss, kl_weight, published_loss
 from .motion_rows import MOTION, MotionRows, PointFeatures
@@ -22,7 +22,7 @@ from .prediction import encode, free_run
 _PADDING = f"{STATE}_is_pad"
 
 
-class VrnnPolicy(PairPolicy):
+class VrnnPolicy(FramePolicy):
     """Plans the motion of the body, and acts for both players to follow the plan.
 
     A variational recurrent network learns the body's motion from `window_frames`: latent variables of the first
@@ -70,11 +70,6 @@ class VrnnPolicy(PairPolicy):
         features = PointFeatures(_motion_of(task), settings.scaled_rows, bounds)
         features.repeat_last, features.velocity_as_goal = settings.repeat_last_obstacle, settings.velocity_as_goal
         return features
-
-    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """All weights in one group."""
-        parameters = list(self.network.parameters())
-        return [{"params": parameters, "fused": parameters[0].device.type in ("cpu", "cuda")}]
 
     def update(self) -> None:
         """Counts the steps of the divergence's weight; LeRobot's trainer calls this after each optimizer step.
@@ -158,14 +153,6 @@ class VrnnPolicy(PairPolicy):
         actions = self._planner.follow(self._path, self._age, state)
         self._age += 1
         return actions
-
-    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
-        """Not offered: the policy controls the motion at every frame.
-
-        Raises:
-            NotImplementedError: always; call `select_action`.
-        """
-        raise NotImplementedError("vrnn acts frame by frame: call select_action")
 
 
 def _motion_of(task: PairTask) -> BodyMotion:

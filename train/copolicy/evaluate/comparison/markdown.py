@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ..markdown_table import markdown_table
+
 
 def markdown(comparison: Mapping[str, Any]) -> str:
     """Returns a table of the methods, a table of the differences, and the definitions of the measures."""
@@ -75,9 +77,3 @@ def _interval(difference: Mapping[str, Any], scale: float, digits: int) -> str:
         return mean
     low, high = (f"{scale * bound:+.{digits}f}" for bound in difference["bootstrap_95"])
     return f"{mean} ({low} to {high})"
-
-
-def markdown_table(head: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table from its header and its rows of equal length."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..comparison.markdown import markdown_table
+from ..markdown_table import markdown_table
 
 _ERROR = "standard_error"
 

@@ -2,9 +2,10 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
+from ..markdown_table import markdown_table
 from .cells import OWN_KIND
 from .measures import MEASURES, label
 from .score import FACTOR
@@ -29,21 +30,21 @@ def markdown(result: Mapping[str, Any]) -> str:
             for robot, floors in separation.items()
             for floor, difference in floors.items()
         ]
-        text.append(_table(["robot", "floor", "difference of scores, points", "in standard errors"], rows))
+        text.append(markdown_table(["robot", "floor", "difference of scores, points", "in standard errors"], rows))
     partners = list(result["partners"])
     if scores:
         rows = [
             [robot, *(_estimate(score["by_partner"].get(partner), 100, 1) for partner in partners)]
             for robot, score in scores["robots"].items()
         ]
-        text.append(f"**{SCORE_LABEL}**\n\n" + _table(["robot", *partners], rows))
+        text.append(f"**{SCORE_LABEL}**\n\n" + markdown_table(["robot", *partners], rows))
     for name in MEASURES:
         if name in result["not_measured"]:
             continue
         rows = [
             [robot, *(_cell(row.get(partner), name) for partner in partners)] for robot, row in result["cells"].items()
         ]
-        text.append(f"**{label(name, settings['length_unit'])}**\n\n" + _table(["robot", *partners], rows))
+        text.append(f"**{label(name, settings['length_unit'])}**\n\n" + markdown_table(["robot", *partners], rows))
     notes = {**result["definitions"], **result["not_measured"], **result["no_own_kind"]}
     text.append("\n".join(f"- {name}: {note}." for name, note in notes.items()))
     return "\n\n".join(text) + "\n"
@@ -66,7 +67,7 @@ def _scores(result: Mapping[str, Any]) -> str:
         "success in time, %",
         *(label(name, result["settings"]["length_unit"]) for name in shown),
     ]
-    return "Scores and their parts, means over partners:\n\n" + _table(head, rows)
+    return "Scores and their parts, means over partners:\n\n" + markdown_table(head, rows)
 
 
 def _over_partners(row: Mapping[str, Any], name: str) -> str:
@@ -90,11 +91,6 @@ def _estimate(value: Mapping[str, Any] | None, scale: float, digits: int) -> str
 
 def _ratio(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.1f}"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
 def csv_text(result: Mapping[str, Any]) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..markdown_table import markdown_table
 from .anova import NORMALITY_LEVEL, analysis_of_variance, rank_test, residual_normality
 from .contrasts import contrasts, tukey
 from .measurements import Measurements
@@ -66,7 +67,7 @@ def markdown(analysis: dict[str, Any]) -> str:
     factors = list(analysis["factors"])
     blocks = [
         f"**{analysis['measure']}** by {' and '.join(factors)}; {analysis['unit_of_analysis']}.",
-        _table(
+        markdown_table(
             [*factors, "mean", "SD", "SE"],
             [[*(cell[name] for name in factors), *map(_number, (cell["mean"], cell["sd"], cell["standard_error"]))]
              for cell in analysis["cells"]],
@@ -76,7 +77,7 @@ def markdown(analysis: dict[str, Any]) -> str:
         blocks.append("No ANOVA: it needs at least two units and levels, and some spread within units.")
     else:
         head = ["effect", "F", "p", "Greenhouse-Geisser p (epsilon)", "Mauchly W (p)", "partial eta²"]
-        blocks.append(_table(head, [_effect_row(effect) for effect in analysis["anova"]]))
+        blocks.append(markdown_table(head, [_effect_row(effect) for effect in analysis["anova"]]))
     for name, test in analysis["rank_tests"].items():
         if test is not None:
             blocks.append(f"{test['test']}, {name}: statistic {test['statistic']:.3f}, p = {_p(test['p'])}.")
@@ -87,7 +88,7 @@ def markdown(analysis: dict[str, Any]) -> str:
     name = "wilcoxon" if analysis["recommended"] == "rank tests" else "paired_t"
     for question, pairs in analysis["contrasts"].items():
         head = [question, "difference", "Wilcoxon p" if name == "wilcoxon" else "t", "p (Holm)", "Hedges' g"]
-        blocks.append(_table(head, [_contrast_row(pair, name) for pair in pairs]))
+        blocks.append(markdown_table(head, [_contrast_row(pair, name) for pair in pairs]))
     return "\n\n".join(blocks) + "\n"
 
 
@@ -118,8 +119,3 @@ def _number(value: float | None) -> str:
 
 def _p(value: float) -> str:
     return "< .0001" if value < 1e-4 else f"{value:.4f}".lstrip("0")
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

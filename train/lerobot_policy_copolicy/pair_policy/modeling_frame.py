@@ -1,0 +1,31 @@
+"""Base of the policies that act frame by frame, with a state that they keep from frame to frame."""
+
+from typing import Any, Unpack
+
+from lerobot.policies.pretrained import ActionSelectKwargs
+from torch import Tensor
+
+from .modeling_pair import PairPolicy
+
+
+class FramePolicy(PairPolicy):
+    """Predicts one joint action from each frame, by `select_action`; all weights are trained alike.
+
+    Attributes:
+        network: has the weights.
+    """
+
+    network: Any
+
+    def get_optim_params(self) -> list[dict]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """All weights in one group."""
+        parameters = list(self.network.parameters())
+        return [{"params": parameters, "fused": parameters[0].device.type in ("cpu", "cuda")}]
+
+    def predict_action_chunk(self, batch: dict[str, Tensor], **kwargs: Unpack[ActionSelectKwargs]) -> Tensor:
+        """Not offered: the policy keeps a state from frame to frame.
+
+        Raises:
+            NotImplementedError: always; call `select_action`.
+        """
+        raise NotImplementedError(f"{self.name} acts frame by frame: call select_action")
