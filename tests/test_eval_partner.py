@@ -162,8 +162,8 @@ def test_every_robot_meets_the_same_partner():
 def _episode(actions, path, still, success=True):
     steps = len(actions)
     return PartnerEpisodeResult(
-        0, MAPS[0], 0, success, "goal", 1, np.array(path, float), np.zeros(steps), "slow", np.array(actions, float),
-        np.array(still, bool), 2,
+        0, MAPS[0], 0, success, "goal", 1, np.array(path, float), np.zeros(steps), "slow", np.array(still, bool), 2,
+        actions=np.array(actions, float),
     )  # fmt: skip
 
 

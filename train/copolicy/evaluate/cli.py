@@ -26,6 +26,7 @@ from .study_flags import (
     study_policy,
     study_protocol,
 )
+from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file
 from .within_subject.command import add_power_command
 
 _DEFAULT_MAPS = "holdout"
@@ -47,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     coplan.add_argument("--orientations", action="store_true", help="run each map with four start orientations")
     add_whole_number(coplan, "--repeats", "episodes per map (default: 1)", 1, 1, 10_000)
     add_whole_number(coplan, "--limit", "use only the first N maps; recorded in the result")
+    add_trajectories_flag(coplan, BESIDE_RESULT)
     coplan.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
     add_study_flags(coplan, n_action_steps=8)
     add_partner_command(commands)
@@ -61,8 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure = figure_beside(arguments.out)
-    require_new(arguments.out, figure, overwrite=arguments.overwrite)
+    figure, trajectories = figure_beside(arguments.out), trajectories_file(arguments)
+    require_new(arguments.out, figure, *([trajectories] if trajectories else []), overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     if arguments.orientations:
@@ -76,7 +78,9 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
     scenarios = chosen.scenarios[: arguments.limit]
     with progress_bar(len(scenarios) * arguments.repeats, "episodes") as bar:
         settings = coplan_settings(arguments, protocol, chosen)
-        result = write_coplan_result(policy, protocol, scenarios, settings, arguments.out, bar)
+        result = write_coplan_result(
+            policy, protocol, scenarios, settings, arguments.out, bar, trajectories=arguments.trajectories
+        )
     summary, task = result["summary"], protocol.task
     success, force = summary["success"], summary["interaction_force"]
     return {
@@ -88,5 +92,6 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
         "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
         "result": str(arguments.out),
         "figure": str(figure) if task.outline is not None else task.missing("outline"),
+        **({"trajectories": str(trajectories)} if trajectories else {}),
         **{name: result[name] for name in ("not_measured",) if name in result},
     }

@@ -26,6 +26,8 @@ class EpisodeResult:
         chunks: number of action chunks that were predicted.
         path: `(steps + 1, 2)` of the task's tracked point, in the unit of its outline; None if it has no outline.
         interaction: `(steps,)` the task's interaction measure; None if it has none.
+        states: `(steps + 1, n)` states of the world.
+        actions: `(steps, 2 m)` executed joint actions, robot first.
     """
 
     map_index: int
@@ -38,6 +40,8 @@ class EpisodeResult:
     interaction: Array | None
     task: PairTask = field(default_factory=get_task, kw_only=True, repr=False)
     end: int | None = field(default=None, kw_only=True, repr=False)
+    states: Array | None = field(default=None, kw_only=True, repr=False)
+    actions: Array | None = field(default=None, kw_only=True, repr=False)
 
     @property
     def steps(self) -> int:
@@ -95,7 +99,7 @@ def coplan(
     rollout = coplanning_rollout(agent, [scenario for _, scenario, _ in episodes], settings)
     trace = run_traced(rollout, on_step)
     return [
-        EpisodeResult(*episode, *episode_measures(rollout, trace, agent, k), task=rollout.task, end=rollout.ends[k])
+        EpisodeResult(*episode, *episode_measures(rollout, trace, agent, k), **motion(rollout, trace, k))
         for k, episode in enumerate(episodes)
     ]
 
@@ -122,6 +126,13 @@ def episode_measures(
     interaction = rollout.task.interaction_recorded(states[1:], trace.actions(index))
     chunks = int(agent.chunks[index]) if isinstance(agent, PolicyAgent) else 0
     return outcome.success, outcome.reason, chunks, _tracked_path(rollout.task, states), interaction
+
+
+def motion(rollout: Rollout, trace: Trace, index: int) -> dict[str, Any]:
+    """The fields `task`, `end`, `states` and `actions` of a world's `EpisodeResult`."""
+    task = rollout.task
+    states = task.states_of(trace.states(index))
+    return {"task": task, "end": rollout.ends[index], "states": states, "actions": trace.actions(index)}
 
 
 def _tracked_path(task: PairTask, recorded: Array) -> Array | None:

@@ -10,6 +10,7 @@ from copolicy.dataset.scenarios import ScenarioSet
 
 from ..study_flags import Protocol, study_settings
 from ..summary import not_measured, percent, summarise
+from ..trajectories import trajectories_beside, write_trajectories
 from .figure import save_path_figure
 from .rollouts import coplan
 
@@ -45,6 +46,7 @@ def write_coplan_result(
     settings: dict[str, Any],
     out: Path,
     bar: "tqdm[Any]",
+    trajectories: bool = False,
 ) -> dict[str, Any]:
     """Runs the study, and writes its result and, if the task has an outline, the figure beside it.
 
@@ -53,6 +55,7 @@ def write_coplan_result(
         settings: see `coplan_settings`.
         out: result file, replaced if it exists.
         bar: progress bar of finished episodes.
+        trajectories: also write the trajectories beside the result.
     """
     first = bar.n
     episodes = coplan(
@@ -79,5 +82,8 @@ def write_coplan_result(
     title = f"co-planning on {settings['maps']}: {percent(success)} of {success['episodes']} episodes"
     if protocol.task.outline is not None:
         save_path_figure(episodes, out.with_suffix(".png"), title)
+    if trajectories:
+        named = ((policy.name, episode) for episode in episodes)
+        write_trajectories(trajectories_beside(out), protocol.task, result["label"], named)
     replace_json(out, result, indent=1)  # last, so that an existing result is always complete
     return result

@@ -19,6 +19,7 @@ from copolicy.dataset.task import PairTask
 from ..partner_study.robots import StudyRobot
 from ..partner_study.study import run_with_partners
 from ..partners.partner import StudyPartner
+from ..trajectories import trajectories_beside, write_trajectories
 from .measures import Row, episode_row
 
 OWN_KIND = "own-kind"
@@ -75,8 +76,18 @@ def cell_file(out: Path, robot: str, partner: str) -> Path:
     return out / _FOLDER / f"{readable}--{zlib.crc32(repr((robot, partner)).encode()):08x}.json"
 
 
-def run_cell(out: Path, play: Play, robot: StudyRobot, partner: StudyPartner, overwrite: bool = False) -> CellDocument:
+def run_cell(
+    out: Path,
+    play: Play,
+    robot: StudyRobot,
+    partner: StudyPartner,
+    overwrite: bool = False,
+    trajectories: bool = False,
+) -> CellDocument:
     """The episodes of a robot with a partner: read from the cell's file if it is there, else run and stored.
+
+    Args:
+        trajectories: also store the trajectories; a cell without them is run again.
 
     Raises:
         InvalidValueError: the file has other settings than this run.
@@ -87,7 +98,8 @@ def run_cell(out: Path, play: Play, robot: StudyRobot, partner: StudyPartner, ov
     if path.exists() and not overwrite:
         stored = read_json(path, CellDocument, "a cell of a cross-play")
         _require_same(path, stored["settings"], settings)
-        return stored
+        if not trajectories or trajectories_beside(path).exists():
+            return stored
     already = 0 if robot.policy is None else len(robot.policy.inference_seconds)
     started = perf_counter()
     episodes = run_with_partners(
@@ -113,6 +125,10 @@ def run_cell(out: Path, play: Play, robot: StudyRobot, partner: StudyPartner, ov
         "planning_ms_per_call": 1e3 * float(np.median(inference)) if inference else None,
         "episodes": rows,
     }
+    if trajectories:
+        label = f"{robot.name} with {partner.name}, no person took part in the study"
+        named = ((robot.name, episode) for episode in episodes)
+        write_trajectories(trajectories_beside(path), play.task, label, named)
     replace_json(path, cell, indent=1)
     return cell
 

@@ -18,6 +18,7 @@ from ..partner_study.command import add_overlap_flag, make_robot, partners_label
 from ..partner_study.configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
 from ..partners.names import PARTNERS_HELP, PROXY, PartnerName, parse_partners
 from ..study_flags import POLICY_HELP, add_study_flags, checkpoint_task, study_needs, study_protocol, study_settings
+from ..trajectories import add_trajectories_flag
 
 if TYPE_CHECKING:
     from ..partner_study.robots import StudyRobot
@@ -66,6 +67,7 @@ def add_cross_play_command(commands: Commands) -> None:
         help="folder of matrix.md, .csv, .json, .png and one file per cell; a second call continues a stopped run, and "
         "adds robots and partners",
     )
+    add_trajectories_flag(command, "beside the file of each cell")
     add_study_flags(command, n_action_steps=1)
 
 
@@ -181,7 +183,9 @@ def _run(
         for partner in partners:
             own = [] if partner.own_kind is None else [own_kind_robot(partner, arguments.repeats)]
             for robot in (*own, *robots):
-                cells[robot.name][partner.name] = run_cell(arguments.out, play, robot, partner, arguments.overwrite)
+                cells[robot.name][partner.name] = run_cell(
+                    arguments.out, play, robot, partner, arguments.overwrite, arguments.trajectories
+                )
                 bar.update()
     return cells
 

@@ -26,6 +26,7 @@ from ..study_flags import (
     study_settings,
 )
 from ..summary import not_measured, percent
+from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def add_partner_command(commands: Commands) -> None:
     add_whole_number(command, "--repeats", "partners of each kind for each start (default: 1)", 1, 1, 10_000)
     add_whole_number(command, "--partner-seed", "seed of the partners (default: 0)", 0, None, LARGEST_SEED)
     command.add_argument("--out", required=True, type=Path, help="result file (JSON); the figure is written beside it")
+    add_trajectories_flag(command, BESIDE_RESULT)
     add_study_flags(command, n_action_steps=1)
 
 
@@ -83,8 +85,8 @@ def add_overlap_flag(command: argparse.ArgumentParser) -> None:
 
 
 def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure = figure_beside(arguments.out)
-    require_new(arguments.out, figure, overwrite=arguments.overwrite)
+    figure, trajectories = figure_beside(arguments.out), trajectories_file(arguments)
+    require_new(arguments.out, figure, *([trajectories] if trajectories else []), overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     _, path = split_name(arguments.policy)
@@ -176,6 +178,9 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     size = f"{len(scenarios)} starts, {episodes_per_robot} episodes per robot"
     title = f"simulated partners on {chosen.label}: {size}, no person"
     save_partner_figure(by_name, figure, title)
+    if trajectories:
+        named = ((robot.name, episode) for robot, episodes in pairs for episode in episodes)
+        write_trajectories(trajectories, task, result["label"], named)
     replace_json(arguments.out, result, indent=1)
     return {
         "label": "simulated partners, no person took part",
@@ -186,6 +191,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
         },
         "result": str(arguments.out),
         "figure": str(figure),
+        **({"trajectories": str(trajectories)} if trajectories else {}),
         **not_measured(task, summaries[0]),
     }
 

@@ -1,6 +1,6 @@
 """Measures of one episode with a simulated partner."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,22 +21,18 @@ class PartnerEpisodeResult(EpisodeResult):
 
     Attributes:
         partner: kind of the partner.
-        actions: `(steps, 2 m)` executed joint actions, robot first.
         still: `(steps,)` whether the moved object was at rest after each step; None if the task does not define it.
         partner_changes: how often the partner changed its route choice; None if it is no scripted player.
-        states: `(steps + 1, n)` states of the world.
     """
 
     partner: str
-    actions: Array
     still: Array | None
     partner_changes: int | None
-    states: Array | None = field(default=None, kw_only=True, repr=False)
 
     @cached_property
     def forces(self) -> tuple[Array, Array] | None:
         """`(steps, 2)` forces of robot and of partner, in full forces; None if the task has no outline."""
-        if self.task.outline is None:
+        if self.task.outline is None or self.actions is None:
             return None
         forces = self.task.outline.forces(self.actions)
         return forces[:, :2], forces[:, 2:]

@@ -11,7 +11,7 @@ from copolicy.collect.rollout import Rollout
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..coplan.rollouts import episode_measures, run_traced
+from ..coplan.rollouts import episode_measures, motion, run_traced
 from ..partners.partner import StudyPartner, scripted_partners
 from .episode_result import PartnerEpisodeResult
 from .robots import StudyRobot
@@ -83,12 +83,9 @@ def run_with_partners(
             repeat,
             *episode_measures(rollout, trace, agent, k),
             chosen[owner].name,
-            trace.actions(k),
             task.studies.at_rest(trace.states(k)[1:]),
             _changes(partner, k),
-            task=task,
-            end=rollout.ends[k],
-            states=task.states_of(trace.states(k)),
+            **motion(rollout, trace, k),
         )
         for k, (index, scenario, owner, repeat) in enumerate(episodes)
     ]
