@@ -147,8 +147,24 @@ class SceneView(Protocol):
 
 
 @dataclass(frozen=True)
+class PublishedPeople:
+    """Published results of a method in the studies with people of a task.
+
+    Attributes:
+        success: mean over people of the study in simulation, in [0, 1].
+        wall_time_s: mean wall time of its successes, s.
+        fronts: successes, trials, and the standard deviation between people of their success, by set-up (see
+            `Studies.fronts`), of the study with a real robot.
+    """
+
+    success: float
+    wall_time_s: float
+    fronts: Mapping[str, tuple[int, int, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class PublishedMethod:
-    """Published results of a method in the co-planning study of a task.
+    """Published results of a method in the studies of a task.
 
     Attributes:
         name: name in the publication.
@@ -157,6 +173,7 @@ class PublishedMethod:
         best: successes and episodes of the best training seed, by scenario set.
         mean: successes and episodes of all training seeds, by scenario set.
         planning_ms: mean time of one decision, ms; None if it was not published.
+        people: its results beside people; None if they were not published.
     """
 
     name: str
@@ -164,6 +181,7 @@ class PublishedMethod:
     best: Mapping[str, tuple[int, int]]
     mean: Mapping[str, tuple[int, int]]
     planning_ms: float | None = None
+    people: PublishedPeople | None = None
 
     def is_of(self, config: Mapping[str, Any]) -> bool:
         """Whether a policy with these settings is an implementation of the method."""
@@ -178,6 +196,9 @@ class Studies:
         definitions: definitions of measures for this task, by their names in results.
         published: published results of the co-planning study, for comparison, in the order of the publication.
         published_source: source of `published` and how it was measured.
+        published_people_source: source of the results beside people, and how they were measured.
+        fronts: names of the set-ups of a study with people: whose end of the body points to the goal; empty for a task
+            without ends.
         near_miss: distance to an obstacle below which a pass counts as a near miss, in the unit of the outline; None if
             not defined.
     """
@@ -187,6 +208,16 @@ class Studies:
     definitions: Mapping[str, str] = MappingProxyType({})
     published: tuple[PublishedMethod, ...] = ()
     published_source: str = ""
+    published_people_source: str = ""
+    fronts: tuple[str, ...] = ()
+
+    def front(self, scenario: Any) -> str:
+        """The set-up of a scenario, one of `fronts`; empty if neither end points to the goal."""
+        return ""
+
+    def with_front(self, scenario: Any, front: str) -> Any:
+        """The scenario in a set-up, one of `fronts`."""
+        raise NotImplementedError(f"a task with fronts turns its scenarios: {front}")
 
     def factors(self, scenario: Any) -> dict[str, Any]:
         """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""

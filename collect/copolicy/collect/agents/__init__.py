@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .human_limits import HumanLimits, LimitedAgent
     from .people import PersonAgent
     from .policy import Policy, PolicyAgent
+    from .policy_process import PolicyProcess
     from .replay import ConstantAgent, RecordedAgent, ReplayAgent
     from .scripted import ScriptedAgent
 
@@ -24,6 +25,7 @@ __all__ = [
     "PersonAgent",
     "Policy",
     "PolicyAgent",
+    "PolicyProcess",
     "RandomAgent",
     "RecordedAgent",
     "ReplayAgent",
@@ -39,6 +41,7 @@ __getattr__, __dir__ = lazy_names(
         **dict.fromkeys(("AgentsByWorld", "RandomAgent"), "composed"),
         **dict.fromkeys(("HumanLimits", "LimitedAgent"), "human_limits"),
         "PersonAgent": "people",
+        "PolicyProcess": "policy_process",
         "ScriptedAgent": "scripted",
         "load_policy": "checkpoint_folder",
     },

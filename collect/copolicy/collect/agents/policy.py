@@ -61,14 +61,14 @@ class PolicyAgent(Agent):
         observe   o0    o1    o2    o3    o4       state, and the partner's action of the previous frame
         chunk A   a0    a1    a2    ..
         chunk B                     b0    b1       simulated time: predicted after n_action_steps actions of A
-        chunk B               (o2)  b1    b2       real time: requested one frame earlier; b0 is due during inference
+        chunk B               (o2)b0 b1   b2       real time: requested one frame earlier, followed once it is ready
 
     A frame's action is held for record_hz / fps steps, at the rate of the data that the policy learned from. One call
     of the policy predicts the chunks of all worlds.
 
     In real time inference runs in its own thread; a late action chunk does not block the control loop. The first chunk
-    is requested at the start, while the world is at rest. A chunk is executed from the first frame after it is ready,
-    starting at the action of that frame; after the last action of a chunk the action is zero.
+    is requested at the start, while the world is at rest. Every step looks for a new chunk and executes it from there
+    on, also within a frame, with its action of the present frame; after the last action of a chunk the action is zero.
 
     A policy acts as the robot. At the human's seat it observes the world with exchanged seats (`PairTask.exchange`); in
     a task without this exchange, the human's half of its joint actions is executed.
@@ -152,6 +152,8 @@ class PolicyAgent(Agent):
             if frame > 0:
                 self._observe(states, worlds)
             self._next_action(frame, worlds)
+        elif self._accept_pending(frame):
+            self._execute(frame)
         actions = self.half(self._seat, worlds)
         if self._worker is not None:
             age = self._clock() - self._observed_ns if self._observed_ns else 0
@@ -209,14 +211,24 @@ class PolicyAgent(Agent):
             history[worlds] = np.concatenate((history[worlds, 1:], newest[:, None]), axis=1)
 
     def _next_action(self, frame: int, worlds: Array) -> None:
-        if self._pending is not None and self._pending.done():
-            self._accept_chunk(self._pending.result())
+        self._accept_pending(frame)
         ahead = int(self._worker is not None)
         if self._pending is None:
             chunk = self._chunk
             if chunk is None or frame - chunk.frame + ahead >= min(self._policy.n_action_steps, chunk.actions.shape[1]):
                 # In real time a single action is ready one frame later.
                 self._request_chunk(frame + ahead * self._policy.keeps_history, worlds)
+        self._execute(frame)
+
+    def _accept_pending(self, frame: int) -> bool:
+        """Takes the requested chunk if it is ready and its first action is due; returns whether it did."""
+        if self._pending is None or not self._pending.done() or self._pending.result().frame > frame:
+            return False
+        self._accept_chunk(self._pending.result())
+        return True
+
+    def _execute(self, frame: int) -> None:
+        """Sets the joint actions to those of the present chunk for a frame."""
         chunk = self._chunk
         if chunk is None or frame - chunk.frame >= chunk.actions.shape[1]:
             self._joint, self._observed_ns = np.zeros_like(self._joint), 0

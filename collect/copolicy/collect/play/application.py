@@ -9,11 +9,13 @@ from ..screen.dialogs import draw_help, draw_toast
 from ..screen.window import Window
 from ..sdl import pygame
 from ..ticker import Tick
+from .break_phase import Break
 from .finished import Failure, Finished
 from .game import Game
 from .lobby import Lobby
 from .paused import Paused
 from .phase import NextPhase, Phase
+from .questions import Questions
 from .ready import Countdown, Ready
 from .result import ResultPhase
 from .running import Running
@@ -25,6 +27,8 @@ _PHASES: dict[NextPhase, type[Phase]] = {
     NextPhase.RUNNING: Running,
     NextPhase.PAUSED: Paused,
     NextPhase.RESULT: ResultPhase,
+    NextPhase.QUESTIONS: Questions,
+    NextPhase.BREAK: Break,
     NextPhase.FAILURE: Failure,
     NextPhase.FINISHED: Finished,
 }
@@ -72,11 +76,19 @@ class Application:
                     self._draw()
                 else:
                     self._sleep(remaining)
+            self._leave()
             self._end_trial()
         except BaseException as error:
             if game.trial is not None:
                 game.trial.abandon(error)
             raise
+
+    def _leave(self) -> None:
+        try:
+            self.phase.leave()
+        except OSError as error:
+            self.game.problem = error.strerror or str(error)
+            raise self.game.storage_error() from None
 
     def _end_trial(self) -> None:
         game = self.game

@@ -2,6 +2,7 @@
 
 import logging
 from contextlib import ExitStack
+from pathlib import Path
 
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import get_task
@@ -13,8 +14,9 @@ from ..session import CollectionLock, SessionFolder
 from ..ticker import MonotonicClock
 from .application import Application
 from .game import Game
+from .interludes import Interludes
 from .loading import Loading
-from .phase import NextPhase
+from .phase import NextPhase, before_next_episode
 from .player import default_players, make_players, warn_other_settings
 from .roster import Roster
 from .settings import PlaySettings
@@ -59,7 +61,12 @@ def assemble(
         stack.callback(player.agent.close)
     warn_other_settings(players, settings.world_settings, task)
     keys = (settings.out, settings.pair, settings.session_settings(), settings.episodes, settings.new_session)
-    folder = loading.run("earlier episodes", lambda: SessionFolder(*keys, settings.task))
+
+    def has_open_questions(path: Path) -> bool:
+        questions = Interludes(path, settings.interludes()).open_questionnaire(settings.episodes)
+        return questions is not None and bool(settings.answered_by())
+
+    folder = loading.run("earlier episodes", lambda: SessionFolder(*keys, settings.task, has_open_questions))
     sounds = Sounds(settings.mute or settings.headless)
     stack.callback(sounds.close)
     game = Game(settings, Roster(players, gamepads, store, folder.journal, clock), folder, sounds, clock)
@@ -67,8 +74,10 @@ def assemble(
         game.show_message(f"{len(recovered)} interrupted recording(s) recovered")
     if settings.headless:
         _assign_devices(game)
-    first = NextPhase.READY if settings.headless else NextPhase.LOBBY
-    return Application(game, window, first if not game.finished else NextPhase.FINISHED)
+    following = before_next_episode(game)
+    return Application(
+        game, window, following if settings.headless or following is NextPhase.FINISHED else NextPhase.LOBBY
+    )
 
 
 def _assign_devices(game: Game) -> None:

@@ -10,7 +10,7 @@ from ..screen.palette import GREEN, MUTED, VERMILION
 from ..ticker import Tick
 from .game import Game
 from .menu_phase import MenuPhase
-from .phase import NextPhase
+from .phase import NextPhase, before_next_episode
 
 _UNATTENDED_S = 2.0  # a session without people then closes
 
@@ -46,19 +46,20 @@ class Finished(MenuPhase):
         outcomes = Counter(outcome for outcome, verdict in self.game.results if verdict == "keep")
         successes = self.game.task.spec.successes
         count, noun = sum(outcomes[reason] for reason in successes), "goals" if "goal" in successes else "successes"
+        people = [player for player in self.game.players if player.person]
         lines = [
             Line(f"episodes kept: {self.game.folder.counts.kept_in_session.total()}", 38),
             Line(f"{noun} today: {count} of {outcomes.total()}", 30, MUTED),
-            Line("Thank you both.", 34),
+            Line("Thank you both." if len(people) == 2 else "Thank you.", 34),
         ]
         draw_dialog(canvas, self.menu.title, lines, self.menu.labels, self.menu.cursor, GREEN)
 
 
 class Failure(MenuPhase):
-    """A recording could not be written: it stays as `.part`, and earlier ones are complete."""
+    """A recording or an answer could not be written: a recording stays as `.part`, and earlier ones are complete."""
 
     def __init__(self, game: Game):
-        super().__init__(game, "The recording cannot be written", [("try again", "again"), ("quit", "quit")])
+        super().__init__(game, "A file cannot be written", [("try again", "again"), ("quit", "quit")])
         self._problem = game.problem
 
     def enter(self) -> None:
@@ -77,14 +78,14 @@ class Failure(MenuPhase):
         if choice == "quit":
             self.game.stop = self._problem
             return NextPhase.END
-        return NextPhase.READY if choice == "again" else NextPhase.STAY
+        return before_next_episode(self.game) if choice == "again" else NextPhase.STAY
 
     def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the message."""
         canvas.box(0, 0, *SIZE)
         lines = [
             Line(self._problem, 36, VERMILION),
-            Line("Finished episodes are safe. The recorded part of this one", 26, MUTED),
-            Line("stays in the session's folder and can be recovered.", 26, MUTED),
+            Line("Finished episodes and saved answers are safe. The part of an", 26, MUTED),
+            Line("episode stays in the session's folder and can be recovered.", 26, MUTED),
         ]
         draw_dialog(canvas, self.menu.title, lines, self.menu.labels, self.menu.cursor, VERMILION, 860)

@@ -10,12 +10,14 @@ from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.task import SceneView, get_task
 
+from ..questionnaire import Questionnaire
 from ..recording.wall_clock import WallClockAnchor
 from ..rollout import Agent
 from ..screen.hud import Hud, SeatStatus
 from ..screen.outline_view import scene_view
 from ..session import BalancedSchedule, SessionFolder
 from ..ticker import MonotonicClock, Ticker
+from .interludes import Interlude, Interludes
 from .player import SeatedPlayer, replayed_scenario
 from .roster import Roster
 from .settings import PlaySettings
@@ -37,7 +39,8 @@ class Game:
         trial: the current or next episode.
         stop: why the session is to end; empty while it goes on.
         pause_reason: of the last pause, `player`, `device_lost` or `focus_lost`.
-        problem: why the last recording could not be written.
+        problem: why the last recording or answer could not be written.
+        interludes: questionnaires and breaks between blocks.
         results: outcome and verdict of every episode of this run.
     """
 
@@ -74,6 +77,7 @@ class Game:
         self.pause_reason = "player"
         self.problem = ""
         self.results: list[tuple[str, str]] = []
+        self.interludes = Interludes(folder.path, settings.interludes())
         self._redo: tuple[Any, int] | None = None
         self._last_seating: int | None = None
         self._toast = ("", 0)
@@ -85,8 +89,18 @@ class Game:
 
     @property
     def finished(self) -> bool:
-        """The session has kept all its episodes."""
-        return self.practice_left == 0 and self.folder.counts.kept_in_session.total() >= self.settings.episodes
+        """The session has kept all its episodes, and all questions are answered."""
+        complete = self.practice_left == 0 and self.kept >= self.settings.episodes
+        return complete and self.open_questionnaire() is None
+
+    @property
+    def kept(self) -> int:
+        """Number of kept episodes of the session."""
+        return self.folder.counts.kept_in_session.total()
+
+    def open_questionnaire(self) -> tuple[Interlude, Questionnaire] | None:
+        """The questionnaire that is to be answered now, if there is one and somebody can answer."""
+        return self.interludes.open_questionnaire(self.kept) if self.settings.answered_by() else None
 
     def next_trial(self) -> Trial:
         """Prepares the next episode: that of the schedule, or the last one again after a redo."""
@@ -104,12 +118,16 @@ class Game:
         self._last_seating = trial.seating
         return trial
 
-    def exchange_seats(self) -> None:
-        """Swaps the seats of the players, in the next episode and all later ones."""
+    def exchange_seats(self) -> bool:
+        """Swaps the seats of the players, in the next episode and all later ones; False where seats are fixed."""
+        if not self.settings.may_exchange_seats:
+            self.show_message("the study fixes the seats")
+            return False
         self.swapped = not self.swapped
         self.folder.journal("swap", swapped=self.swapped)
         if self.trial is not None and not self.trial.began:
             self.trial = self._make_trial(self.trial.scenario, self._scheduled_seating, self.trial.practice)
+        return True
 
     def _make_trial(self, scenario: Any, scheduled_seating: int, practice: bool) -> Trial:
         self._scheduled_seating = scheduled_seating
@@ -136,7 +154,7 @@ class Game:
         agents = (robot.agent, human.agent)
         return Trial(
             self.folder.next_path(), self.task, scenario, seating, agents, meta, self.anchor,
-            self.settings.world_settings, practice, self.clock,
+            self.settings.world_settings, practice, self.schedule.planned, self.clock,
         )  # fmt: skip
 
     def close_trial(self, verdict: str, reason: str = "") -> None:
@@ -205,6 +223,8 @@ class Game:
             self.practice_left -= verdict != "redo" and trial.outcome.done
         else:
             self.folder.count(trial.meta.map_id, trial.seating, verdict == "keep")
+            if verdict == "keep":
+                self.interludes.kept(self.kept)
         self.folder.journal(
             verdict, file=trial.path.name, outcome=trial.outcome.reason or "interrupted", reason=reason,
             practice=trial.practice,

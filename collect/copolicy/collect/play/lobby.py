@@ -8,7 +8,7 @@ from ..sdl import pygame
 from ..ticker import Tick
 from .game import Game
 from .menu import Menu, TextEntry
-from .phase import NextPhase, Phase
+from .phase import NextPhase, Phase, before_next_episode
 from .player import SeatedPlayer
 from .stick_setup import StickSetup
 
@@ -86,7 +86,7 @@ class Lobby(Phase):
         if self.entry is None and all(player.ready and not player.lacks_device for player in game.players):
             self._ready_ticks += 1
             if self._ready_ticks > _READY_TICKS:
-                return NextPhase.READY
+                return before_next_episode(game)
         else:
             self._ready_ticks = 0
         return NextPhase.STAY
@@ -174,7 +174,8 @@ class Lobby(Phase):
                 setup.refresh(player.device, player.person.calibration)
                 return setup.submenu
             items += setup.items(player.device, player.person.calibration)
-        items += [("swap seats", "swap"), ("release this device", "leave"), ("quit", "quit")]
+        items += [("swap seats", "swap")] * self.game.settings.may_exchange_seats
+        items += [("release this device", "leave"), ("quit", "quit")]
         menu = self._menus.setdefault(player.index, Menu("", items))
         menu.items = items
         menu.cursor = min(menu.cursor, len(items) - 1)
@@ -208,8 +209,8 @@ class Lobby(Phase):
         self._quit = not busy
 
     def _swap(self) -> None:
-        self.game.exchange_seats()
-        self.game.sounds.play("choose")
+        if self.game.exchange_seats():
+            self.game.sounds.play("choose")
 
     def _close_entry(self) -> None:
         entry = self.entry

@@ -25,9 +25,20 @@ class NextPhase(Enum):
     RUNNING = auto()
     PAUSED = auto()
     RESULT = auto()
+    QUESTIONS = auto()
+    BREAK = auto()
     FAILURE = auto()
     FINISHED = auto()
     END = auto()
+
+
+def before_next_episode(game: Game) -> NextPhase:
+    """Returns the phase between two episodes: open questions, the end of the session, a break, or the next episode."""
+    if game.open_questionnaire() is not None:
+        return NextPhase.QUESTIONS
+    if game.finished:
+        return NextPhase.FINISHED
+    return NextPhase.BREAK if game.interludes.break_due(game.kept) else NextPhase.READY
 
 
 class Phase:
@@ -46,6 +57,9 @@ class Phase:
 
     def enter(self) -> None:
         """Called once when the phase begins."""
+
+    def leave(self) -> None:
+        """Called once when the session ends in this phase."""
 
     def consume(self, event: pygame.event.Event) -> bool:
         """Handles a raw gamepad event; returns True if it must not be read as a command."""

@@ -22,7 +22,8 @@ class Ready(MenuPhase):
     shortcuts: ClassVar = {Command.SWAP: "swap", Command.UNDO: "undo", Command.PAUSE: "quit?"}
 
     def __init__(self, game: Game):
-        items = [("start", "start"), ("swap seats", "swap"), ("back to the lobby", "lobby"), ("quit for now", "quit")]
+        items = [("start", "start"), ("back to the lobby", "lobby"), ("quit for now", "quit")]
+        items[1:1] = [("swap seats", "swap")] * game.settings.may_exchange_seats
         super().__init__(game, "", items, STRIP_ROWS)
 
     def enter(self) -> None:
@@ -30,7 +31,7 @@ class Ready(MenuPhase):
         game = self.game
         game.next_trial()
         if game.folder.kept_recordings:
-            self.top.items.insert(2, ("undo the last keep", "undo"))
+            self.top.items.insert(-2, ("undo the last keep", "undo"))
 
     def handle(self, press: Press) -> None:
         """Chooses by a shortcut, even one that the menu lacks, or moves in the menu."""

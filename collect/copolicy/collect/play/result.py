@@ -9,7 +9,7 @@ from ..screen.palette import MUTED, YELLOW
 from ..ticker import Tick
 from .game import Game
 from .menu_phase import NotesPhase
-from .phase import NextPhase
+from .phase import NextPhase, before_next_episode
 
 _DIALOG_X = 310.0
 _UNATTENDED_S = 1.5  # a session without people then keeps the episode
@@ -63,7 +63,7 @@ class ResultPhase(NotesPhase):
                 return NextPhase.END
             case _:
                 return super().follow(choice)
-        return NextPhase.FINISHED if game.finished else NextPhase.READY
+        return before_next_episode(game)
 
     def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the result over the world."""

@@ -13,6 +13,7 @@ from copolicy.dataset.task import TABLE, get_task
 
 from ..agents.simulated_players import pair_name
 from ..angular_limit import angular_limit_of, with_angular_limit
+from .interludes import Interlude
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 PLAYER_KINDS = ("joystick", "keyboard", "scripted", "replay", "policy")
@@ -75,6 +76,7 @@ class PlaySettings:
         config_folder: folder of calibrations and mappings; the user's own if None.
         countdown_s: seconds before each episode.
         task: its name.
+        may_exchange_seats: the players may exchange seats by hand.
     """
 
     pair: str
@@ -97,6 +99,7 @@ class PlaySettings:
     new_session: bool = False
     countdown_s: float = 3.0
     task: str = TABLE
+    may_exchange_seats: bool = True
 
     def __post_init__(self) -> None:
         ids = {"pair": self.pair, **{f"consent-{k}": text for k, text in enumerate(self.consents) if text}}
@@ -137,6 +140,16 @@ class PlaySettings:
     def scenarios(self) -> tuple[Any, ...]:
         """The scenarios to play."""
         return self.scenario_set.scenarios
+
+    def interludes(self) -> tuple[Interlude, ...]:
+        """Questionnaires and breaks between the blocks of the session; none in an ordinary one."""
+        return ()
+
+    def answered_by(self) -> str:
+        """Who answers questionnaires: `human`, `simulated`, or empty if a person has no window to read them in."""
+        if not any(player.is_person for player in self.players or (PlayerSpec("keyboard"),)):
+            return "simulated"
+        return "" if self.headless else "human"
 
     def session_settings(self) -> dict[str, Any]:
         """Returns the settings that must not change within a session, JSON-able."""

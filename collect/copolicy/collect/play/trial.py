@@ -38,6 +38,7 @@ class Trial:
         agents: of the robot seat and the human seat.
         settings: of the world.
         practice: the episode does not count.
+        planned: what a study plans for the episode, recorded as the event `planned`; empty without a plan.
         outcome: of the world after the last step.
         pose: of the body.
         previous_pose: pose before the last step.
@@ -59,6 +60,7 @@ class Trial:
     anchor: WallClockAnchor
     settings: Any
     practice: bool
+    planned: str = ""
     clock: Callable[[], int] = time.monotonic_ns
 
     def __post_init__(self) -> None:
@@ -78,6 +80,8 @@ class Trial:
         self.notes: list[str] = []
         self.pauses = 0
         self.step_ns = self.clock()
+        self._first_step_ns: int | None = None
+        self._paused_ns = self._pause_began_ns = 0
         self._off_centre: set[int] = set()
         self._stack = ExitStack()
         self._recorder: EpisodeRecorder | None = None
@@ -116,6 +120,8 @@ class Trial:
         self._recorder = self._stack.enter_context(recorder)
         if self.practice:
             self.event("practice")  # a recording that a crash cuts short must be marked too
+        if self.planned:
+            self.event("planned", self.planned)
 
     def step(self, tick: Tick) -> None:
         """Makes one step: reads the state and both players, records, advances the world.
@@ -125,6 +131,8 @@ class Trial:
         """
         world = self.world
         self.previous_pose, self.step_ns = self.pose, tick.start_ns
+        if self._first_step_ns is None:
+            self._first_step_ns = tick.start_ns
         self._rollout.step()
         self._record_off_centre_sticks()
         (action,), (self.outcome,) = self._rollout.actions, self._rollout.outcomes
@@ -177,6 +185,7 @@ class Trial:
     def pause(self, reason: str) -> None:
         """Records a pause; zero forces are shown."""
         self.pauses += 1
+        self._pause_began_ns = self.clock()
         self.forces = (0.0, 0.0, 0.0, 0.0)
         self.previous_pose = self.pose
         self.event("pause", reason)
@@ -184,6 +193,7 @@ class Trial:
     def resume(self) -> None:
         """Records the end of a pause, whose duration the loop's timing excludes."""
         self.loop.pause()
+        self._paused_ns += self.clock() - self._pause_began_ns
         self.event("resume")
 
     def note(self, text: str) -> None:
@@ -225,6 +235,7 @@ class Trial:
             flags = (*flags, OFF_CENTRE)
         self.event("verdict", "discard" if discarded else "keep")
         self.event("loop", self.loop.summary())
+        self.event("duration", self._durations())
         latencies = _latency_summary(self.agents)
         if latencies:
             self.event("plans", latencies)
@@ -240,6 +251,13 @@ class Trial:
         )
         self._stack.close()
 
+    def _durations(self) -> str:
+        """Simulated time, and wall time without the pauses: until the end of the last step."""
+        wall_s = 0.0
+        if self._first_step_ns is not None:
+            wall_s = (self.step_ns - self._first_step_ns - self._paused_ns) / 1e9 + 1 / self.task.spec.record_hz
+        return f"simulated {self.seconds:.3f} s, wall {wall_s:.3f} s, paused {self._paused_ns / 1e9:.3f} s"
+
     @property
     def _opened(self) -> EpisodeRecorder:
         assert self._recorder is not None, "the recording is not open"
@@ -252,5 +270,7 @@ def _latency_summary(agents: Sequence[Agent]) -> str:
     for seat, agent in enumerate(agents):
         if isinstance(agent, PolicyAgent) and agent.latencies:
             p50, maximum = np.percentile(agent.latencies, (50, 100)) * 1e3
-            lines.append(f"seat {seat}: {len(agent.latencies)} plans, p50 {p50:.0f} ms, max {maximum:.0f} ms")
+            mean = np.mean(agent.latencies) * 1e3
+            times = f"p50 {p50:.3f} ms, mean {mean:.3f} ms, max {maximum:.3f} ms"
+            lines.append(f"seat {seat}: {len(agent.latencies)} plans, {times}")
     return "; ".join(lines)

@@ -38,6 +38,18 @@ def text_size(text: str, size: float) -> tuple[int, int]:
     return _font(max(8, round(size))).size(text)
 
 
+def wrapped(text: str, size: float, width: float) -> list[str]:
+    """The lines of a text that fit in a width, px; a longer word has a line of its own."""
+    lines: list[str] = []
+    for word in text.split():
+        joined = f"{lines[-1]} {word}" if lines else word
+        if lines and text_size(joined, size)[0] > width:
+            lines.append(word)
+        else:
+            lines[-1:] = [joined]
+    return lines
+
+
 @functools.lru_cache(maxsize=512)
 def _fitted(text: str, size: int, colour: Colour, max_width: int | None) -> pygame.Surface:
     if max_width is not None:

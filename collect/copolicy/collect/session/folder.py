@@ -5,7 +5,7 @@ import logging
 import os
 import re
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,7 @@ class SessionFolder:
         episodes: int,
         new_session: bool = False,
         task: str = TABLE,
+        is_open: Callable[[Path], bool] = lambda path: False,
     ):
         """Continues the pair's last session if it is unfinished, else begins a new one.
 
@@ -65,6 +66,7 @@ class SessionFolder:
             episodes: number of episodes to keep in the session.
             new_session: begin a new session in any case.
             task: name of the task whose recordings count.
+            is_open: whether a session whose episodes were all kept is unfinished nevertheless, by its folder.
 
         Raises:
             InvalidValueError: the unfinished session has other settings.
@@ -79,7 +81,7 @@ class SessionFolder:
             header = self._read_header()
             self.session_id: str = header["session_id"]
             self._count(summaries)
-            if self.counts.kept_in_session.total() < episodes:
+            if self.counts.kept_in_session.total() < episodes or is_open(self.path):
                 if header["settings"] != dict(settings):
                     raise InvalidValueError(
                         str(self.path), f"the settings that it began with, {header['settings']}, or --new-session",

@@ -38,7 +38,12 @@ class BalancedSchedule:
     discarded episode is repeated after the others.
 
     Seats change once, in the middle of a session. A session begins with the seating that was kept less often.
+
+    Attributes:
+        planned: what the plan of a study says of the episode that was chosen last, for its recording; empty without.
     """
+
+    planned = ""
 
     def __init__(
         self,

@@ -40,7 +40,8 @@ _HOLDOUT = (
     "0 02 1 0 120 210 0 1 20 12 10"
 ).split()
 _ANGLE = re.compile(r"-\d+deg$")
-_ORIENTATIONS = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
+ORIENTATIONS = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
+"""Start orientations of the paper's studies with people, rad."""
 
 
 def _pixels(fraction: tuple[float, float]) -> tuple[float, float]:
@@ -143,7 +144,7 @@ def turned(map_set: ScenarioSet) -> ScenarioSet:
     for index, (config, weight) in enumerate(zip(map_set.scenarios, map_set.weights, strict=True)):
         bases.setdefault(index if config.named is None else _ANGLE.sub("", config.named.scenario), (config, weight))
     scenarios = tuple(turned for config, _ in bases.values() for turned in _orientations(config))
-    weights = tuple(weight for _, weight in bases.values() for _ in _ORIENTATIONS)
+    weights = tuple(weight for _, weight in bases.values() for _ in ORIENTATIONS)
     return replace(map_set, scenarios=scenarios, weights=weights)
 
 
@@ -157,4 +158,4 @@ def start_at(config: MapConfig, theta: float) -> MapConfig:
 
 
 def _orientations(config: MapConfig) -> list[MapConfig]:
-    return [start_at(config, theta) for theta in _ORIENTATIONS]
+    return [start_at(config, theta) for theta in ORIENTATIONS]

@@ -1,5 +1,6 @@
 """Definitions and limits of studies with the table."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import Studies
 
 from .map_config import MapConfig
-from .published import PUBLISHED, SOURCE
+from .maps import ORIENTATIONS, start_at
+from .published import PEOPLE_SOURCE, PUBLISHED, SOURCE
 
 _STILL_SPEED, _STILL_SPIN = 6.0, 0.1  # px/s, rad/s
 
@@ -31,6 +33,21 @@ class TableStudies(Studies):
 
     published = PUBLISHED
     published_source = SOURCE
+    published_people_source = PEOPLE_SOURCE
+    fronts = ("human_front", "robot_front")
+
+    def front(self, scenario: MapConfig) -> str:
+        """Whose end of the table points to the goal, within 45 degrees; empty if the table lies across."""
+        ahead = _robot_ahead(scenario)
+        if abs(ahead) < math.cos(math.pi / 4):
+            return ""
+        return "robot_front" if ahead > 0 else "human_front"
+
+    def with_front(self, scenario: MapConfig, front: str) -> MapConfig:
+        """The map in that of the four start orientations in which the end points to the goal best."""
+        sign = 1 if front == "robot_front" else -1
+        turned = [start_at(scenario, theta) for theta in ORIENTATIONS]
+        return max(turned, key=lambda config: sign * _robot_ahead(config))
 
     def factors(self, scenario: MapConfig) -> dict[str, Any]:
         """Start orientation (rad) and number of obstacles of a map."""
@@ -40,3 +57,10 @@ class TableStudies(Studies):
         """`(T,)` whether speed and spin of the table are below the limits."""
         vx, vy, omega = recorded[:, 3:].T
         return (vx * vx + vy * vy < _STILL_SPEED**2) & (np.abs(omega) < _STILL_SPIN)
+
+
+def _robot_ahead(config: MapConfig) -> float:
+    """Cosine of the angle between the direction from the table's centre to the robot's end and that to the goal."""
+    x, y, theta = config.start
+    dx, dy = config.goal[0] - x, config.goal[1] - y
+    return (math.cos(theta) * dx - math.sin(theta) * dy) / (math.hypot(dx, dy) or 1.0)
