@@ -18,8 +18,9 @@ from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.recording.reader import read_episode
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan, williams_square
-from copolicy.evaluate.human_study.questionnaire import read_ratings
+from copolicy.evaluate.human_study.design import make_plan, williams_square
+from copolicy.evaluate.human_study.plan import Robot, StudyPlan
+from copolicy.evaluate.human_study.ratings import read_ratings
 from copolicy.evaluate.human_study.schedule import BlindPolicy
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
@@ -110,7 +111,7 @@ def test_a_summary_is_within_persons_and_says_who_they_were():
     assert (a["success"]["mean"], b["success"]["mean"]) == (1.0, 0.5)
     assert b["success"]["standard_error"] == pytest.approx(0.5 / np.sqrt(3))
     assert (b["time_s"]["mean"], b["time_s"]["participants"]) == (13.0, 2)  # the third never succeeded with B
-    assert a["planning_ms"] == {"mean": None, "standard_error": None, "participants": 0}
+    assert a["planning_ms"] == {"mean": None, "sd": None, "standard_error": None, "participants": 0}
     assert summary["tests"]["success"]["anova"][0]["F"] == pytest.approx(3.0)
     assert len(summary["tests"]["time_s"]["units"]) == 2
     assert summary["tests"]["interaction_mean"]["anova"] is None  # the same difference for everybody: no spread
@@ -192,7 +193,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     plan = StudyPlan.read(study / "plan.json")
     out = tmp_path / "recordings"
     flags = ["--participant", "P01", "--out", str(out), "--human", "scripted:S02", "--headless", "--json"]
-    flags += ["--practice", "1", "--countdown", "0"]
+    flags += ["--practice", "1", "--countdown", "0", "--planner", "thread"]
     assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["complete"] is True
@@ -265,7 +266,7 @@ def test_the_plan_command_deals_sixty_starts_among_five_people(study, tmp_path, 
     told = json.loads(capsys.readouterr().out)
     assert told["participants"] == ["P01", "P02", "P03", "P04", "P05"]
     assert told["episodes_per_participant"] == 24
-    assert told["counterbalanced"] == "2 orders of robots: complete only with a multiple of 2 participants"
+    assert told["counterbalanced"] == "4 orders of robots and set-ups: complete only with a multiple of 4 participants"
     plan = StudyPlan.read(tmp_path / "plan.json")
     assert Counter(t.configuration for trials in plan.trials.values() for t in trials) == dict.fromkeys(range(60), 2)
     assert main(["human", "plan", *flags]) == 2

@@ -89,14 +89,35 @@ def _run(agent, world, steps, human=(0.0, 0.0), wait=True):
     return np.array(forces)
 
 
-def test_each_action_is_held_for_three_steps_and_plans_follow_each_other(agent, counter):
+def test_a_new_plan_acts_from_the_step_on_at_which_it_is_ready(agent, counter):
     forces = _run(agent, TableWorld(MAP), 24)
-    # Plan 1 from frame 0; the next is asked for at frame 2, and taken up at frame 3, at its second action.
-    first = [[0.1, 0.0], [0.1, 0.1], [0.1, 0.2]]
-    second, third = [[0.2, 0.1], [0.2, 0.2]], [[0.3, 0.1], [0.3, 0.2]]
-    np.testing.assert_allclose(forces[::3][:7], [*first, *second, *third])
-    np.testing.assert_array_equal(forces[::3].repeat(3, axis=0), forces)
+    # Plan 1 from frame 0; the next is asked for at frame 2, and is there a step later: it acts from within frame 2 on.
+    first = [[0.1, 0.0]] * 3 + [[0.1, 0.1]] * 3 + [[0.1, 0.2]]
+    second = [[0.2, 0.0]] * 2 + [[0.2, 0.1]] * 3 + [[0.2, 0.2]]
+    third = [[0.3, 0.0]] * 2 + [[0.3, 0.1]] * 3 + [[0.3, 0.2]]
+    np.testing.assert_allclose(forces[:19], [*first, *second, *third])
     assert counter.seeds == [5]
+
+
+def test_a_plan_that_is_asked_for_at_every_frame_acts_at_every_step(counter):
+    counter.n_action_steps = 1
+    agent = PolicyAgent(counter, real_time=True)
+    begin(agent)
+    forces = _run(agent, TableWorld(MAP), 9)
+    agent.close()
+    # Frame 0 has the plan of the start; from then on each frame's own plan acts from its second step.
+    np.testing.assert_allclose(forces[:, 0], [0.1, 0.2, 0.2, 0.2, 0.3, 0.3, 0.3, 0.4, 0.4])
+    np.testing.assert_allclose(forces[:, 1], [0, 0, 0, 0.1, 0, 0, 0.1, 0, 0])
+
+
+def test_a_plan_for_the_next_frame_waits_for_that_frame(counter):
+    counter.n_action_steps, counter.keeps_history = 1, True
+    agent = PolicyAgent(counter, real_time=True)
+    begin(agent)
+    forces = _run(agent, TableWorld(MAP), 9)
+    agent.close()
+    np.testing.assert_array_equal(forces[::3].repeat(3, axis=0), forces)
+    np.testing.assert_allclose(forces[::3, 0], [0.1, 0.2, 0.3])
 
 
 def test_at_the_humans_seat_a_policy_sees_the_seats_exchanged(counter):

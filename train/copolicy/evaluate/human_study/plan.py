@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
+from copolicy.collect.agents.training_conditions import training_conditions
 from copolicy.collect.angular_limit import LIMIT_SETTING
+from copolicy.collect.questionnaire import Questionnaire
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, UnknownNameError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
@@ -30,11 +30,13 @@ class Robot:
     Attributes:
         checkpoint: path of the checkpoint, or `pretrained`.
         weights_sha256: sha256 of its weights when the plan was made.
+        method: name of the published method that it implements; empty if it is none.
     """
 
     name: str
     checkpoint: str
     weights_sha256: str
+    method: str = ""
 
     @classmethod
     def from_checkpoint(cls, name: str, checkpoint: str) -> "Robot":
@@ -42,7 +44,11 @@ class Robot:
         Raises:
             FileFormatError: the checkpoint does not exist.
         """
-        return cls(name, checkpoint, weights_digest(checkpoint))
+        folder = checkpoint_folder(checkpoint)
+        config = read_json(folder / "config.json", dict[str, Any], "the configuration of a policy")
+        published = get_task(training_conditions(folder).task).studies.published
+        method = next((method.name for method in published if method.is_of(config)), "")
+        return cls(name, checkpoint, weights_digest(checkpoint), method)
 
 
 @dataclass(frozen=True)
@@ -54,12 +60,14 @@ class PlannedTrial:
         block: number of the block, from 1; the robot is the same within a block.
         robot: name of the robot.
         configuration: index of the start.
+        front: set-up of the start, see `Studies.fronts`; empty in a plan without set-ups.
     """
 
     code: str
     block: int
     robot: str
     configuration: int
+    front: str = ""
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,7 @@ class StudyPlan:
         trials: trials of each participant, in order.
         world: settings of the world, from `recorded_settings`; defaults for those that are absent.
         settings: settings of the policies that flags override, such as `num_inference_steps`.
+        questionnaires: asked after each block.
     """
 
     plan_id: str
@@ -84,6 +93,7 @@ class StudyPlan:
     world: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
     task_name: str = TABLE
+    questionnaires: tuple[Questionnaire, ...] = ()
 
     @property
     def task(self) -> PairTask:
@@ -125,6 +135,16 @@ class StudyPlan:
             **_content(self, configurations),
         }
 
+    def blocks_of(self, participant: str) -> dict[int, str]:
+        """The robot of each block of a participant, in order."""
+        return {trial.block: trial.robot for trial in self.trials_of(participant)}
+
+    @property
+    def fronts(self) -> tuple[str, ...]:
+        """The set-ups of the plan, in the order of the task's; empty without."""
+        used = {trial.front for trials in self.trials.values() for trial in trials}
+        return tuple(front for front in self.task.studies.fronts if front in used)
+
     @classmethod
     def read(cls, path: Path) -> "StudyPlan":
         """
@@ -136,6 +156,9 @@ class StudyPlan:
             if content["study_plan"] != _VERSION:
                 raise FileFormatError(path, f"{_EXPECTED}, version {_VERSION}", f"version {content['study_plan']}")
             content["task_name"] = content.pop("task", TABLE)
+            content["questionnaires"] = tuple(
+                Questionnaire.from_json(json.dumps(form), path) for form in content.get("questionnaires", ())
+            )
             content["world"] = {name: content[name] for name in _WORLD if name in content}
             fields = {name: content[name] for name in cls.__dataclass_fields__}
             task = get_task(content["task_name"])
@@ -145,58 +168,13 @@ class StudyPlan:
                 name: tuple(PlannedTrial(**entry) for entry in trials) for name, trials in content["trials"].items()
             }
             plan = cls(**fields)
-            digest = _digest(plan)
+            digest = plan_digest(plan)
             plan.world_settings  # noqa: B018 (checks the settings)
         except (KeyError, TypeError, AttributeError, ValueError, InvalidValueError) as error:
             raise FileFormatError(path, _EXPECTED, f"none: {type(error).__name__} {error}") from None
         if plan.plan_id != digest:
             raise FileFormatError(path, f"the plan {plan.plan_id} as it was made", f"a changed one, {digest}")
         return plan
-
-
-def make_plan(
-    robots: Sequence[Robot],
-    maps: str,
-    configurations: Sequence[Any],
-    participants: int,
-    episodes_per_robot: int,
-    seed: int,
-    **settings: Any,
-) -> StudyPlan:
-    """Makes the plan of a within-subject study.
-
-    Each participant has one block of `episodes_per_robot` episodes with each robot, on the same starts, so that robots
-    are compared within a person on equal starts and can be rated one by one. The order of robots follows a Williams
-    design over participants. Starts are dealt to participants in turn and shuffled in each block.
-
-    Args:
-        settings: further fields of the plan.
-
-    Raises:
-        InvalidValueError: fewer than two robots, equal names, no participant, or more episodes than starts.
-    """
-    names = [robot.name for robot in robots]
-    if len(names) < 2 or len(set(names)) < len(names):
-        raise InvalidValueError("CKPT", "at least two robots of different names", names)
-    if participants < 1:
-        raise InvalidValueError("--participants", "at least 1", participants)
-    if not 1 <= episodes_per_robot <= len(configurations):
-        raise InvalidValueError("--episodes-per-robot", f"1 to {len(configurations)}", episodes_per_robot)
-    rng = np.random.default_rng(seed)
-    shuffled = [names[k] for k in rng.permutation(len(names))]
-    square = williams_square(len(names))
-    trials: dict[str, tuple[PlannedTrial, ...]] = {}
-    for person in range(participants):
-        first = person * episodes_per_robot
-        own = [(first + k) % len(configurations) for k in range(episodes_per_robot)]
-        planned: list[PlannedTrial] = []
-        for block, robot in enumerate(square[person % len(square)], 1):
-            for k in rng.permutation(len(own)):
-                code = f"B{block}T{len(planned) + 1:02d}"
-                planned.append(PlannedTrial(code, block, shuffled[robot], own[int(k)]))
-        trials[f"P{person + 1:02d}"] = tuple(planned)
-    plan = StudyPlan("", maps, tuple(robots), tuple(configurations), trials, seed, **settings)
-    return StudyPlan(**{**vars(plan), "plan_id": _digest(plan)})
 
 
 def weights_digest(checkpoint: str) -> str:
@@ -225,15 +203,25 @@ def _scenario(task: PairTask, entry: dict[str, Any]) -> Any:
 def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """The fields of a plan as in its file; a file without `task` is of the table."""
     content: dict[str, Any] = {}
-    for name, value in asdict(replace(plan, configurations=())).items():
+    for name, value in asdict(replace(plan, configurations=(), questionnaires=())).items():
         content |= value if name == "world" else {name: value}
     content["configurations"] = list(configurations)
+    content["questionnaires"] = [form.to_json() for form in plan.questionnaires]
+    # Plans made before these fields existed keep their digest.
+    if not plan.questionnaires:
+        del content["questionnaires"]
+    for entry, name in [(robot, "method") for robot in content["robots"]] + [
+        (trial, "front") for trials in content["trials"].values() for trial in trials
+    ]:
+        if not entry[name]:
+            del entry[name]
     if (task := content.pop("task_name")) != TABLE:
         content["task"] = task
     return content
 
 
-def _digest(plan: StudyPlan) -> str:
+def plan_digest(plan: StudyPlan) -> str:
+    """Eight hexadecimal digits of the hash of a plan's content without its id."""
     configurations = [
         asdict(scenario) if is_dataclass(type(scenario)) else json.loads(scenario.to_json())
         for scenario in plan.configurations
@@ -244,17 +232,3 @@ def _digest(plan: StudyPlan) -> str:
                 del entry[name]
     content = {**_content(plan, configurations), "plan_id": ""}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]
-
-
-def williams_square(count: int) -> list[list[int]]:
-    """Williams' design (1949): each row is an order of `count` conditions, used by participants in turn.
-
-    An even `count` gives `count` rows; an odd one gives these and their reversals.
-    """
-    first = [0]
-    low, high = 1, count - 1
-    while len(first) < count:
-        first.append(low if len(first) % 2 else high)
-        low, high = (low + 1, high) if len(first) % 2 == 0 else (low, high - 1)
-    square = [[(condition + row) % count for condition in first] for row in range(count)]
-    return square if count % 2 == 0 or count == 1 else square + [row[::-1] for row in square]

@@ -1,6 +1,7 @@
 """Reads the recordings of a study as rows, one per episode."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,12 @@ from ..study_flags import task_entry
 from .plan import StudyPlan
 from .schedule import CODE_PREFIX
 
-_CHUNK_TIMES = re.compile(r"seat 0: \d+ plans, p50 (\d+) ms")
+_CHUNK_TIMES = re.compile(r"seat 0: \d+ plans, p50 (?P<p50>[\d.]+) ms(?:, mean (?P<mean>[\d.]+) ms)?")
+_DURATION = re.compile(r"wall (?P<wall>[\d.]+) s, paused (?P<paused>[\d.]+) s")
 
 
-def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Reads the counted episodes in a folder, and counts the others by the reason for which they are left out.
+def study_rows(folders: Sequence[Path], plan: StudyPlan | None) -> tuple[list[dict[str, Any]], dict[str, int]]:
+    """Reads the counted episodes in folders, and counts the others by the reason for which they are left out.
 
     Args:
         plan: plan of the study; if None, robots are named as in the recordings.
@@ -33,7 +35,7 @@ def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any
     rows: list[dict[str, Any]] = []
     left_out: dict[str, int] = {}
     paths: dict[tuple[str, str], Path] = {}
-    for file in iter_recordings(folder):
+    for file in (recording for folder in folders for recording in iter_recordings(folder)):
         recording = read_recording(file.path)
         reason = _reason_left_out(recording.episode, file.counts, plan)
         if reason:
@@ -46,7 +48,8 @@ def study_rows(folder: Path, plan: StudyPlan | None) -> tuple[list[dict[str, Any
         paths[trial] = file.path
         rows.append(row)
     if not rows:
-        raise RunError(f"{folder}: expected kept recordings of the study, found none (left out: {left_out or 'none'})")
+        names = ", ".join(map(str, folders))
+        raise RunError(f"{names}: expected kept recordings of the study, found none (left out: {left_out or 'none'})")
     return rows, left_out
 
 
@@ -74,13 +77,17 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
         "human": meta.controller_1,
         "source": meta.source,
         "map_id": meta.map_id,
+        "front": task.studies.front(episode.map_config),
         **task.studies.factors(episode.map_config),
         "success": meta.success,
         "reason": meta.termination_reason,
         "steps": len(episode.actions),
         "time_s": len(episode.actions) / task.spec.record_hz,
+        "wall_time_s": _event_number(recording, "duration", _DURATION, "wall"),
+        "paused_s": _event_number(recording, "duration", _DURATION, "paused"),
         **interaction_columns(task.interaction(after, episode.actions)),
-        "planning_ms": _planning_ms(recording),
+        "planning_ms": _event_number(recording, "plans", _CHUNK_TIMES, "mean"),
+        "planning_p50_ms": _event_number(recording, "plans", _CHUNK_TIMES, "p50"),
         "quality_flags": meta.quality_flags,
         "recording": path.name,
         "session_id": meta.session_id,
@@ -99,10 +106,10 @@ def _row(path: Path, recording: Recording, plan: StudyPlan | None) -> dict[str, 
     return {**row, "trial": code, "block": trial.block, "robot": trial.robot}
 
 
-def _planning_ms(recording: Recording) -> float | None:
-    """Median time of predicting a chunk, ms, from the recording's event; None if it has no such event."""
+def _event_number(recording: Recording, kind: str, pattern: re.Pattern[str], name: str) -> float | None:
+    """A number in the text of an event; None if the recording has none, being of an earlier version."""
     for event in recording.events:
-        median = _CHUNK_TIMES.search(event.detail) if event.kind == "plans" else None
-        if median:
-            return float(median[1])
+        found = pattern.search(event.detail) if event.kind == kind else None
+        if found and found[name] is not None:
+            return float(found[name])
     return None

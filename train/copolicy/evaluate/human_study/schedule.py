@@ -1,25 +1,34 @@
 """Schedule of a study session: start and robot of each episode, with the robots hidden behind one name."""
 
+import json
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from copolicy.collect.agents import Policy, PolicyAgent
+from copolicy.collect.play.interludes import Interlude
 from copolicy.collect.play.settings import PlaySettings
 from copolicy.collect.session import BalancedSchedule, EpisodeCounts
 from copolicy.dataset.arrays import Array
 
-from .plan import PlannedTrial, StudyPlan
+from .plan import StudyPlan
 
 CODE_PREFIX = "study"
 
 
 @dataclass(frozen=True)
 class StudySettings(PlaySettings):
-    """Settings of a `copolicy-collect play` session on the starts of a plan; the pair is the participant."""
+    """Settings of a `copolicy-collect play` session on the starts of a plan; the pair is the participant.
+
+    Attributes:
+        break_s: shortest break between two blocks, s; none if 0.
+    """
 
     plan: StudyPlan = field(kw_only=True)
+    break_s: float = 0.0
 
     @property
     def world_settings(self) -> Any:
@@ -30,6 +39,12 @@ class StudySettings(PlaySettings):
     def scenarios(self) -> tuple[Any, ...]:
         """The plan's starts."""
         return self.plan.configurations
+
+    def interludes(self) -> tuple[Interlude, ...]:
+        """The plan's questionnaires, and a break, after each block."""
+        trials = self.plan.trials_of(self.pair)
+        ends = {trial.block: number for number, trial in enumerate(trials, 1)}
+        return tuple(Interlude(block, end, self.plan.questionnaires, self.break_s) for block, end in ends.items())
 
     def session_settings(self) -> dict[str, Any]:
         """What must not change when a session is continued: plan and participant."""
@@ -81,15 +96,31 @@ class StudySchedule(BalancedSchedule):
     def next(self, counts: EpisodeCounts) -> tuple[Any, int]:
         """Start and seats of the next trial; selects its robot."""
         trial = self._trials[min(counts.kept_in_session.total(), len(self._trials) - 1)]
-        return self._play(trial, trial.code), 0
+        return self._play(trial.robot, trial.configuration, trial.code, trial.block), 0
 
     def practice(self, number: int) -> Any:
-        """Start of a practice episode: the robots in turn, on the participant's own starts."""
-        blocks = list({trial.block: trial for trial in reversed(self._trials)}.values())[::-1]
-        return self._play(blocks[number % len(blocks)], "practice")
+        """Start of a practice episode: the robots and the set-ups in turn, on starts of other participants if any."""
+        plan, own = self._plan, {trial.configuration for trial in self._trials}
+        fronts = plan.fronts or ("",)
+        front = fronts[number % len(fronts)]
+        fitting = [
+            index
+            for index, scenario in enumerate(plan.configurations)
+            if not front or plan.task.studies.front(scenario) == front
+        ]
+        spare = [index for index in fitting if index not in own] or fitting
+        order = np.random.default_rng([plan.seed, *self._participant.encode(), 1 << 20]).permutation(len(spare))
+        robots = list(plan.blocks_of(self._participant).values())
+        return self._play(robots[number % len(robots)], spare[int(order[number % len(spare)])], "practice", 0)
 
-    def _play(self, trial: PlannedTrial, code: str) -> Any:
-        self._policy.choose(trial.robot)
-        self._agent.name = f"{CODE_PREFIX}:{self._plan.plan_id}:{self._participant}:{code}"
+    def _play(self, robot: str, configuration: int, code: str, block: int) -> Any:
+        plan, scenario = self._plan, self._plan.configurations[configuration]
+        self._policy.choose(robot)
+        self._agent.name = f"{CODE_PREFIX}:{plan.plan_id}:{self._participant}:{code}"
         self._agent.latencies.clear()  # a recording has the latencies of its own episode only
-        return self._plan.configurations[trial.configuration]
+        # The front follows from the start, also in a plan whose starts are not dealt by set-up.
+        front = plan.task.studies.front(scenario) if plan.task.studies.fronts else ""
+        self.planned = json.dumps(
+            {"plan": plan.plan_id, "participant": self._participant, "trial": code, "block": block, "front": front}
+        )
+        return scenario

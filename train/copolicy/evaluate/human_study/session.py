@@ -1,22 +1,31 @@
 """Runs one session of the study with `copolicy-collect play`, a person or a scripted agent at the human's seat."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from copolicy.collect.agents import PolicyAgent
+from copolicy.collect.agents import Policy, PolicyAgent, PolicyProcess
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
-from copolicy.train.checkpoint import Checkpoint
 
-from .plan import StudyPlan, weights_digest
+from .plan import Robot, StudyPlan, weights_digest
 from .schedule import BlindPolicy, StudySchedule, StudySettings
+
+PLANNERS = ("process", "thread")
+"""Where the robots plan: in a process of their own, or in a thread beside the control loop."""
 
 
 def run_session(
-    plan: StudyPlan, participant: str, human: PlayerSpec, out: Path, device: str = "cpu", **play: Any
+    plan: StudyPlan,
+    participant: str,
+    human: PlayerSpec,
+    out: Path,
+    device: str = "cpu",
+    planner: str = "process",
+    **play: Any,
 ) -> dict[str, Any]:
     """Runs or continues a participant's session until it is complete or is ended.
 
@@ -24,7 +33,8 @@ def run_session(
         human: agent at the human's seat: a joystick, the keyboard, or a scripted agent.
         out: folder of all sessions.
         device: device of the policies.
-        play: further `PlaySettings`.
+        planner: one of `PLANNERS`.
+        play: further `StudySettings`.
 
     Returns:
         Summary of the recorded episodes; it can be written as JSON.
@@ -44,13 +54,25 @@ def run_session(
         episodes=len(trials),
         seed=plan.seed,
         swap_seats=False,
+        may_exchange_seats=False,
         plan=plan,
         task=plan.task_name,
         **play,
     )
-    robots: dict[str, Checkpoint] = {}
-    load = ("the robots of the study, with torch and LeRobot", lambda: robots.update(load_robots(plan, device)))
-    with prepared(settings, load) as application, ExitStack() as stack:
+    robots: dict[str, Policy] = {}
+    with ExitStack() as stack:
+
+        def load() -> None:
+            require_planned_weights(plan)
+            loader = partial(load_robots, plan.robots, plan.settings, device)
+            if planner == "thread":
+                robots.update(loader())
+                return
+            process = PolicyProcess(loader)
+            stack.callback(process.close)
+            robots.update(process.policies)
+
+        application = stack.enter_context(prepared(settings, ("the robots of the study, with torch and LeRobot", load)))
         policy: Any = BlindPolicy(robots, plan.actions_per_plan)
         agent = PolicyAgent(policy, plan.task, real_time=True)
         stack.callback(agent.close)
@@ -58,21 +80,35 @@ def run_session(
         game.set_schedule(StudySchedule(plan, participant, policy, agent), agent)
         with stopped_by_signals(game):
             application.run()
-        return {"participant": participant, "plan": plan.plan_id, **application.summary()}
+        summary = application.summary()
+    questions = {"questionnaires": "not asked: no window"} if plan.questionnaires and not settings.answered_by() else {}
+    return {"participant": participant, "plan": plan.plan_id, **summary, **questions}
 
 
-def load_robots(plan: StudyPlan, device: str = "cpu") -> Mapping[str, Checkpoint]:
-    """Loads the plan's checkpoints by name.
+def require_planned_weights(plan: StudyPlan) -> None:
+    """Compares the weights of the robots with those of the plan.
 
     Raises:
-        FileFormatError: a checkpoint is missing, or its weights are not those of the plan.
+        FileFormatError: a checkpoint is missing, or has other weights.
     """
-    robots = {}
     for robot in plan.robots:
         digest = weights_digest(robot.checkpoint)
         if digest != robot.weights_sha256:
             raise FileFormatError(
                 robot.checkpoint, f"the plan's weights {robot.weights_sha256[:12]}", f"weights {digest[:12]}"
             )
-        robots[robot.name] = Checkpoint(robot.checkpoint, device, plan.settings)
-    return robots
+
+
+def load_robots(robots: Sequence[Robot], settings: Mapping[str, Any], device: str = "cpu") -> Mapping[str, Policy]:
+    """Loads checkpoints by the names of the robots.
+
+    Args:
+        settings: of the policies, see `StudyPlan`.
+
+    Raises:
+        FileFormatError: a checkpoint cannot be loaded.
+    """
+    # Imported here, since only the process that plans needs torch.
+    from copolicy.train.checkpoint import Checkpoint
+
+    return {robot.name: Checkpoint(robot.checkpoint, device, settings) for robot in robots}

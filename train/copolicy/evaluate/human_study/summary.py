@@ -15,20 +15,27 @@ from ..within_subject.analysis import DEFINITIONS, analyse
 from ..within_subject.anova import rank_test
 from ..within_subject.measurements import Measurements
 from ..within_subject.mixed_logistic import mixed_logistic
-from .questionnaire import questions
+from .ratings import questions
 
 LABELS = {
     "human": "human-in-the-loop study: people at the human seat",
     "simulated": "SIMULATED: a scripted player sat at the human seat, no person took part; a trial of the procedure",
 }
-_ROBOTS = "mean over participants of a participant's mean, standard error between participants; time of successes only"
+_ROBOTS = (
+    "mean over participants of a participant's mean; sd and standard error (sd / square root of the participants) "
+    "between participants; times of successes only"
+)
 _DEFINITIONS = {
     "unit_of_analysis": "the participant: mean of a participant's episodes with a robot; only participants who have a "
     "value with every robot",
     **DEFINITIONS,
+    "time_s": "simulated time: steps / rate",
+    "wall_time_s": "by the clock, from the first step to the end of the last, without pauses",
+    "planning_ms": "mean time until an action chunk is there, with the way to the planner's process and back",
+    "fronts": "robot x set-up; a participant without a value in every cell is left out of the test, by name",
     "ratings": "Friedman's test, with two robots Wilcoxon's signed-rank test, over participants who rated every robot",
 }
-_MEASURES = ("success", "time_s", "interaction_mean", "interaction_p95", "planning_ms")
+_MEASURES = ("success", "time_s", "wall_time_s", "interaction_mean", "interaction_p95", "planning_ms")
 _TESTED = ("success", "time_s", "interaction_mean")
 
 
@@ -54,13 +61,11 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
             robot: {
                 "episodes": sum(row["robot"] == robot for row in rows),
                 "pooled_success": success_rate([bool(row["success"]) for row in rows if row["robot"] == robot]),
-                **{
-                    measure: _between([_mean(rows, measure, person, robot) for person in people])
-                    for measure in _MEASURES
-                },
+                **_measures([row for row in rows if row["robot"] == robot], people),
             }
             for robot in robots
         },
+        **_by_front(rows, robots, people, task.studies.fronts),
         "tests": tests,
         "mixed_logistic": mixed_logistic(rows, "robot", ("participant", "map_id")) if _has_groups(rows) else None,
     }
@@ -73,14 +78,40 @@ def summarise_study(rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping
     return {**result, "definitions": {"robots": f"{_ROBOTS}; interaction force {force}", **_DEFINITIONS}}
 
 
-def _tests(rows: Sequence[Mapping[str, Any]], measure: str) -> dict[str, Any]:
+def _by_front(
+    rows: Sequence[Mapping[str, Any]], robots: Sequence[str], people: Sequence[str], fronts: Sequence[str]
+) -> dict[str, Any]:
+    """Measures of each robot in each set-up and the tests of robot x set-up; empty without rows in two set-ups."""
+    used = [front for front in fronts if any(row.get("front") == front for row in rows)]
+    if len(used) < 2:
+        return {}
+    counted = [row for row in rows if row.get("front") in used]
+    cells = {
+        robot: {
+            front: {
+                "episodes": sum((row["robot"], row["front"]) == (robot, front) for row in counted),
+                **_measures([row for row in counted if (row["robot"], row["front"]) == (robot, front)], people),
+            }
+            for front in used
+        }
+        for robot in robots
+    }
+    measures = [name for name in _TESTED if any(row[name] is not None for row in counted)]
+    return {"fronts": cells, "front_tests": {name: _tests(counted, name, ("robot", "front")) for name in measures}}
+
+
+def _measures(rows: Sequence[Mapping[str, Any]], people: Sequence[str]) -> dict[str, dict[str, Any]]:
+    return {measure: _between([_mean(rows, measure, person) for person in people]) for measure in _MEASURES}
+
+
+def _tests(rows: Sequence[Mapping[str, Any]], measure: str, factors: Sequence[str] = ("robot",)) -> dict[str, Any]:
     """The within-subject analysis of a measure; the time of a failure is no time to completion."""
     counted = [row for row in rows if row["success"] or measure != "time_s"]
     robots = sorted({row["robot"] for row in rows})
     ordered = sorted(counted, key=lambda row: robots.index(row["robot"]))
     if {row["robot"] for row in counted} != set(robots):
         return {"unit_of_analysis": "none: a robot has no value", "units": [], "anova": None, "contrasts": {}}
-    analysis = analyse(Measurements.of_rows(ordered, measure, "participant", ("robot",)))
+    analysis = analyse(Measurements.of_rows(ordered, measure, "participant", factors))
     return {name: value for name, value in analysis.items() if name not in ("definitions", "measure", "cells")}
 
 
@@ -111,18 +142,23 @@ def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _between(values: Sequence[float]) -> dict[str, Any]:
-    spread = between_runs(values)
-    return {"mean": spread["mean"], "standard_error": spread["standard_error"], "participants": spread["runs"]}
+    spread, known = between_runs(values), [value for value in values if np.isfinite(value)]
+    return {
+        "mean": spread["mean"],
+        "sd": float(np.std(known, ddof=1)) if len(known) > 1 else None,
+        "standard_error": spread["standard_error"],
+        "participants": spread["runs"],
+    }
 
 
-def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str, robot: str) -> float:
-    """A participant's mean of a measure with a robot; nan without values."""
+def _mean(rows: Sequence[Mapping[str, Any]], measure: str, person: str) -> float:
+    """A participant's mean of a measure; nan without values."""
     values = [
         float(row[measure])
         for row in rows
-        if (row["participant"], row["robot"]) == (person, robot)
-        and row[measure] is not None
-        and (row["success"] or measure != "time_s")
+        if row["participant"] == person
+        and row.get(measure) is not None
+        and (row["success"] or measure not in ("time_s", "wall_time_s"))
     ]
     return float(np.mean(values)) if values else float("nan")
 

@@ -1,6 +1,7 @@
 """Chooses the configurations (start, goal, obstacles) of a study with partners."""
 
 import math
+from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
@@ -33,7 +34,27 @@ def study_configurations(maps: str | ScenarioSet, count: int | None = None) -> t
     chosen = get_task().scenario_set(maps) if isinstance(maps, str) else maps
     turns = get_task(chosen.task).orientations
     turned = all_starts(chosen)
-    bases = turned[::turns]
+    indices = _study_indices(turned[::turns], count, turns)
+    return tuple(turned[turns * index + k] for index in indices for k in range(turns))
+
+
+def front_configurations(chosen: ScenarioSet, count: int | None, fronts: Sequence[str]) -> tuple[Any, ...]:
+    """Returns scenarios of a set, each in every set-up (`Studies.fronts`) in turn, chosen as by `study_configurations`.
+
+    Args:
+        count: number of starts; if None `DEFAULT_STARTS`, or all of a smaller set.
+
+    Raises:
+        InvalidValueError: `count` is no multiple of the set-ups, or more than the set has.
+    """
+    task = get_task(chosen.task)
+    bases = all_starts(chosen)[:: task.orientations]
+    indices = _study_indices(bases, count, len(fronts))
+    return tuple(task.studies.with_front(bases[index], front) for index in indices for front in fronts)
+
+
+def _study_indices(bases: Sequence[Any], count: int | None, turns: int) -> list[int]:
+    """Sorted indices of the scenarios of a study with `count` starts, each in `turns` orientations."""
     stride = next(s for s in range(_STRIDE, _STRIDE + len(bases) + 1) if math.gcd(s, len(bases)) == 1)
     strided = (bases[k * stride % len(bases)] for k in range(len(bases)))
     distinct = list({scenario.digest: scenario for scenario in strided}.values())
@@ -43,8 +64,7 @@ def study_configurations(maps: str | ScenarioSet, count: int | None = None) -> t
         expected = f"a multiple of {turns} from {turns} to {most}" if turns > 1 else f"1 to {most}"
         raise InvalidValueError("--configurations", expected, count)
     index_of = {scenario.digest: k for k, scenario in enumerate(bases)}
-    indices = sorted(index_of[scenario.digest] for scenario in islice(distinct, count // turns))
-    return tuple(turned[turns * index + k] for index in indices for k in range(turns))
+    return sorted(index_of[scenario.digest] for scenario in islice(distinct, count // turns))
 
 
 def all_starts(chosen: ScenarioSet) -> tuple[Any, ...]:

@@ -1,0 +1,116 @@
+"""`copolicy-eval human summarise`."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.command_line.commands import Commands, add_command
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files.file_kinds import describe_path
+from copolicy.dataset.files.listing import visible_files
+from copolicy.dataset.files.staging import replace_json, require_new
+
+from ..study_flags import task_entry
+
+
+def add_summarise(steps: Commands) -> None:
+    """Adds `human summarise`."""
+    command = add_command(
+        steps,
+        "summarise",
+        _summarise,
+        "success, time, interaction force and ratings of each robot, with the paper's tests of their differences",
+        "copolicy-eval human summarise study/recordings --plan study/plan.json --ratings study/ratings.csv "
+        "--out study/result.json",
+    )
+    command.add_argument("recordings", type=Path, help="folder of sessions; answers in their folders are read too")
+    command.add_argument("--plan", type=Path, help="study plan (default: robots are named as in the recordings)")
+    command.add_argument(
+        "--ratings",
+        type=Path,
+        metavar="FILE",
+        help="CSV or JSON with participant, block and one column per question, beside the answers given in the window",
+    )
+    command.add_argument("--out", type=Path, help="write the summary and all episodes as JSON")
+    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
+
+
+def require_recordings(folder: Path) -> None:
+    """
+    Raises:
+        FileFormatError: the folder has no recordings.
+    """
+    if not folder.is_dir() or not visible_files(folder, "*.mcap"):
+        raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
+
+
+def _summarise(arguments: argparse.Namespace) -> dict[str, Any]:
+    from .plan import StudyPlan
+    from .ratings import read_ratings, study_ratings
+    from .recordings import study_rows
+    from .summary import summarise_study
+
+    if arguments.out:
+        require_new(arguments.out, overwrite=arguments.overwrite)
+    if arguments.ratings and not arguments.plan:
+        raise InvalidValueError("--ratings", "--plan too, which names the robot of each block", "none")
+    require_recordings(arguments.recordings)
+    plan = StudyPlan.read(arguments.plan) if arguments.plan else None
+    if plan and arguments.ratings:
+        read_ratings(arguments.ratings, plan)  # a wrong file is reported before the recordings are read
+    rows, left_out = study_rows([arguments.recordings], plan)
+    ratings = study_ratings([arguments.recordings], plan, arguments.ratings, rows[0]["source"])
+    summary = summarise_study(rows, ratings)
+    planned = sum(len(trials) for trials in plan.trials.values()) if plan else None
+    counts = {"episodes": len(rows), "planned": planned, "left_out": left_out}
+    if arguments.out:
+        settings = (
+            {}
+            if plan is None
+            else {
+                **task_entry(plan.task),
+                "plan_id": plan.plan_id,
+                "maps": plan.maps,
+                **plan.map_set,
+                "step_limit": plan.world_settings.step_limit,
+            }
+        )
+        result = {"study": "human", "settings": settings, **summary, **counts, "rows": rows, "answers": ratings}
+        replace_json(arguments.out, result, indent=1)
+        counts["result"] = str(arguments.out)
+    if arguments.json:
+        return {**summary, **counts}
+    return {"label": summary["label"], **counts, **_report(summary)}
+
+
+def _report(summary: dict) -> dict[str, Any]:
+    robots = {}
+    for name, robot in summary["robots"].items():
+        robots[name] = {"success": _value(robot["success"], 100, 1, " %"), "time": _value(robot["time_s"], 1, 2, " s")}
+        if "interaction_mean" in summary["tests"]:
+            robots[name]["interaction_force"] = _value(robot["interaction_mean"], 1, 4, "")
+    tests = {}
+    for measure, test in summary["tests"].items():
+        effects = test["anova"]
+        if not effects:
+            tests[measure] = "no test: it needs at least two people with a value for every robot, and some spread"
+            continue
+        f, n = effects[0], len(test["units"])
+        tests[measure] = (
+            f"F({f['df'][0]}, {f['df'][1]}) = {f['F']:.2f}, p = {f['p']:.3g}, Greenhouse-Geisser "
+            f"{f['p_greenhouse_geisser']:.3g}, of {n} people; recommended: {test['recommended']}"
+        )
+    ratings = {
+        question: {robot: _value(rating, 1, 2, "") for robot, rating in answers["robots"].items()}
+        for question, answers in summary.get("ratings", {}).items()
+    }
+    missing = {name: summary[name] for name in ("not_measured",) if name in summary}
+    return {"robots": robots, "anova": tests, **({"ratings": ratings} if ratings else {}), **missing}
+
+
+def _value(measure: dict, scale: float, digits: int, unit: str) -> str:
+    if measure["mean"] is None:
+        return "none"
+    error = measure["standard_error"]
+    spread = "" if error is None else f" ± {scale * error:.{digits}f}"
+    return f"{scale * measure['mean']:.{digits}f}{spread}{unit} (of {measure['participants']} people)"
