@@ -146,6 +146,19 @@ class SceneView(Protocol):
         ...
 
 
+class PublishedFront(NamedTuple):
+    """Published success of a method in one set-up of a study with people (see `Studies.fronts`).
+
+    `sd` is the standard deviation between people of their success, `printed_sd` what the publication prints as such.
+    """
+
+    successes: int
+    trials: int
+    people: int
+    sd: float
+    printed_sd: float
+
+
 @dataclass(frozen=True)
 class PublishedPeople:
     """Published results of a method in the studies with people of a task.
@@ -153,13 +166,12 @@ class PublishedPeople:
     Attributes:
         success: mean over people of the study in simulation, in [0, 1].
         wall_time_s: mean wall time of its successes, s.
-        fronts: successes, trials, and the standard deviation between people of their success, by set-up (see
-            `Studies.fronts`), of the study with a real robot.
+        fronts: success by set-up, of the study with a real robot.
     """
 
     success: float
     wall_time_s: float
-    fronts: Mapping[str, tuple[int, int, float]] = field(default_factory=dict)
+    fronts: Mapping[str, PublishedFront] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

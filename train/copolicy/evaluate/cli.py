@@ -5,15 +5,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.command_line.commands import add_command, command_parser, progress_bar, run
+from copolicy.dataset.command_line.commands import add_command, add_group, command_parser, progress_bar, run
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import require_new
 
 from .comparison import add_compare_command
-from .coplanning_table import add_table_command
+from .coplanning_table import add_coplanning_table_command
 from .cross_play import add_cross_play_command
 from .human_study import add_human_command
+from .human_table import add_human_table_command
 from .partner_study import add_partner_command
 from .partners.command import add_partners_command
 from .plans.command import add_plans_command
@@ -30,6 +31,10 @@ from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_fil
 from .within_subject.command import add_power_command
 
 _DEFAULT_MAPS = "holdout"
+_TABLES = (
+    "copolicy-eval table coplanning --runs CoDP-H=outputs/codp-h BC=outputs/bc --out outputs/table",
+    "copolicy-eval table human --recordings study/recordings --plan study/plan.json --out study/table",
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -58,7 +63,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_compare_command(commands)
     add_plans_command(commands)
     add_power_command(commands)
-    add_table_command(commands)
+    help = "tables of the paper, from training runs and from recordings with people"
+    tables = add_group(commands, "table", help, help, _TABLES)
+    add_coplanning_table_command(tables)
+    add_human_table_command(tables)
     return run(parser, argv)
 
 

@@ -1,6 +1,6 @@
 """The paper's results: co-planning as counts of episodes, and its two studies with people."""
 
-from copolicy.dataset.task import PublishedMethod, PublishedPeople
+from copolicy.dataset.task import PublishedFront, PublishedMethod, PublishedPeople
 
 SOURCE = (
     "Ng, Liu and Kennedy, Diffusion Co-Policy for Synergistic Human-Robot Collaborative Tasks, RA-L 2023 (arXiv "
@@ -51,7 +51,12 @@ def _people(
 ) -> PublishedPeople:
     """Results beside people; by front the successes of 12 trials and the standard deviation between six people."""
     fronts = {"human_front": human_front, "robot_front": robot_front}
-    return PublishedPeople(success, wall_time_s, {name: (k, 12, deviation) for name, (k, deviation) in fronts.items()})
+    people = 6
+    return PublishedPeople(
+        success,
+        wall_time_s,
+        {name: PublishedFront(k, 12, people, sd, sd / people) for name, (k, sd) in fronts.items()},
+    )
 
 
 _DIFFUSION = {"type": ("copolicy",), "network": ("transformer", "mlp")}

@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from copolicy.dataset.command_line.commands import Commands, add_command, add_group
+from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.command_line.extras import FIGURES, POLICIES
 from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.exceptions import OutputExistsError
@@ -32,10 +32,8 @@ _EXAMPLE = (
 )
 
 
-def add_table_command(commands: Commands) -> None:
+def add_coplanning_table_command(steps: Commands) -> None:
     """Adds `table coplanning` to the commands of `copolicy-eval`."""
-    help = "tables of the paper, from training runs"
-    steps = add_group(commands, "table", help, help, [_EXAMPLE.splitlines()[0]])
     command = add_command(
         steps,
         "coplanning",
