@@ -12,11 +12,13 @@ import torch
 from untrained_policy import save_untrained_policy
 
 from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.questionnaire import read_questionnaire
 from copolicy.collect.session import iter_recordings
 from copolicy.collect.simulate.command import simulate
-from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.recording.reader import read_episode
+from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.design import make_plan, williams_square
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan
@@ -24,7 +26,7 @@ from copolicy.evaluate.human_study.ratings import read_ratings
 from copolicy.evaluate.human_study.schedule import BlindPolicy
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
-from copolicy.evaluate.partner_study.configurations import study_configurations
+from copolicy.evaluate.partner_study.configurations import front_configurations, study_configurations
 from copolicy.tasks.table.map_config import MapConfig
 
 SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
@@ -68,6 +70,51 @@ def test_a_plan_pairs_starts_within_a_person_and_counterbalances_robots():
     other = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 1)
     assert plan == same
     assert plan.plan_id != other.plan_id
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_set_ups_are_counterbalanced_with_the_robots_and_share_their_starts(robots):
+    names = tuple(Robot(f"R{k}", "a", str(k)) for k in range(robots))
+    task = get_task("table")
+    fronts = task.studies.fronts
+    starts = front_configurations(task.scenario_set("unseen"), 60, fronts)
+    assert Counter(task.studies.front(start) for start in starts) == {"human_front": 30, "robot_front": 30}
+    orders = 2 * len(williams_square(robots))
+    plan = make_plan(names, "unseen", starts, orders, 4, 0, fronts)
+    assert plan.fronts == fronts
+    first, places = Counter(), Counter()
+    for trials in plan.trials.values():
+        own = {}
+        for block, robot in {trial.block: trial.robot for trial in trials}.items():
+            parts = [trial for trial in trials if trial.block == block]
+            assert [trial.front for trial in parts] in ([a] * 2 + [b] * 2 for a, b in (fronts, fronts[::-1]))
+            assert all(task.studies.front(starts[trial.configuration]) == trial.front for trial in parts)
+            bases = [
+                {(s := starts[t.configuration]).start[:2] + s.goal + s.obstacles for t in parts[k : k + 2]}
+                for k in (0, 2)
+            ]
+            assert bases[0] == bases[1]
+            own[robot] = {trial.configuration for trial in parts}
+            first[robot, parts[0].front] += 1
+            places[block, parts[0].front] += 1
+        assert len({frozenset(indices) for indices in own.values()}) == 1
+    assert set(first.values()) == {orders // 2}
+    assert set(places.values()) == {orders // 2}
+    with pytest.raises(InvalidValueError, match="--episodes-per-robot: expected 1 to 60, a multiple of 2, found 3"):
+        make_plan(names, "unseen", starts, 1, 3, 0, fronts)
+
+
+def test_a_plan_of_before_the_set_ups_and_questionnaires_keeps_its_id(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
+    content = plan.to_json()
+    assert plan.plan_id == "dc2998f5"
+    assert "questionnaires" not in content
+    assert set(content["robots"][0]) == {"name", "checkpoint", "weights_sha256"}
+    assert set(content["trials"]["P01"][0]) == {"code", "block", "robot", "configuration"}
+    asked = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, questionnaires=(read_questionnaire("nasa-tlx"),))
+    replace_json(tmp_path / "plan.json", asked.to_json())
+    assert StudyPlan.read(tmp_path / "plan.json") == asked
+    assert asked.plan_id != plan.plan_id
 
 
 def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):

@@ -53,6 +53,7 @@ class Questions(Phase):
         self.row = self._pages[self.page].index(self._open(self._pages[self.page])[0])
         self._selected_ns = game.clock()
         self._ticks = self._still_ticks = self._held_ticks = 0
+        self._released = False  # a stick that is held from the episode on does not move a mark
         self._quit_menu: Menu | None = None
         self._done = False
 
@@ -176,7 +177,8 @@ class Questions(Phase):
 
     def _repeat_held(self) -> None:
         direction = self._held_direction()
-        self._held_ticks = self._held_ticks + 1 if direction else 0
+        self._released = self._released or not direction
+        self._held_ticks = self._held_ticks + 1 if direction and self._released else 0
         if self._held_ticks > _HELD_TICKS and self._held_ticks % _REPEAT_TICKS == 0:
             self._move(direction)
 

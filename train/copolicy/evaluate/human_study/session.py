@@ -6,10 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from copolicy.collect.agents import Policy, PolicyAgent, PolicyProcess
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
 from copolicy.collect.play.settings import PlayerSpec
+from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.task import get_task
 
 from .plan import Robot, StudyPlan, weights_digest
 from .schedule import BlindPolicy, StudySchedule, StudySettings
@@ -64,7 +68,7 @@ def run_session(
 
         def load() -> None:
             require_planned_weights(plan)
-            loader = partial(load_robots, plan.robots, plan.settings, device)
+            loader = partial(load_robots, plan.robots, plan.settings, device, plan.task_name, plan.configurations[0])
             if planner == "thread":
                 robots.update(loader())
                 return
@@ -99,11 +103,14 @@ def require_planned_weights(plan: StudyPlan) -> None:
             )
 
 
-def load_robots(robots: Sequence[Robot], settings: Mapping[str, Any], device: str = "cpu") -> Mapping[str, Policy]:
-    """Loads checkpoints by the names of the robots.
+def load_robots(
+    robots: Sequence[Robot], settings: Mapping[str, Any], device: str, task_name: str, start: Any
+) -> Mapping[str, Policy]:
+    """Loads checkpoints by the names of the robots, and predicts one chunk with each: the first takes longer.
 
     Args:
         settings: of the policies, see `StudyPlan`.
+        start: scenario of that chunk.
 
     Raises:
         FileFormatError: a checkpoint cannot be loaded.
@@ -111,4 +118,12 @@ def load_robots(robots: Sequence[Robot], settings: Mapping[str, Any], device: st
     # Imported here, since only the process that plans needs torch.
     from copolicy.train.checkpoint import Checkpoint
 
-    return {robot.name: Checkpoint(robot.checkpoint, device, settings) for robot in robots}
+    task = get_task(task_name)
+    state = task.make_world(start, task.settings_type()).observation
+    loaded: dict[str, Policy] = {}
+    for robot in robots:
+        loaded[robot.name] = policy = Checkpoint(robot.checkpoint, device, settings)
+        agent = PolicyAgent(policy, task)
+        agent.begin(0, [EpisodeStart(start, 0, state)])
+        agent.act(state[None], np.arange(1))
+    return loaded

@@ -59,8 +59,8 @@ def _human(arguments: argparse.Namespace) -> dict[str, Any]:
         read_ratings(arguments.ratings, plan)  # a wrong file is reported before the recordings are read
     rows, left_out = study_rows(arguments.recordings, plan)
     ratings = study_ratings(arguments.recordings, plan, arguments.ratings, rows[0]["source"])
-    table = human_table(rows, ratings, plan)
-    table |= {"left_out": left_out, "rows": rows, "answers": ratings}
+    table = human_table(rows, ratings, plan, left_out)
+    table |= {"rows": rows, "answers": ratings}
     arguments.out.mkdir(parents=True, exist_ok=True)
     replace_json(arguments.out / f"{_NAME}.json", table, indent=1)  # first: it marks the other files as a table's
     replace_text(arguments.out / f"{_NAME}.csv", csv_text(table))

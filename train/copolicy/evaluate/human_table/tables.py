@@ -15,19 +15,23 @@ MEASURES = ("success", "time_s", "wall_time_s", "interaction_mean", "planning_ms
 """Columns of the tables."""
 
 _UNIT = (
-    "unit of analysis: the participant; a participant's episodes with a robot (and set-up) give one mean, and every "
+    "the participant; a participant's episodes with a robot (and set-up) give one mean, and every "
     "spread is between these means: sd, and standard error = sd / square root of the number of participants"
 )
 
 
 def human_table(
-    rows: Sequence[Mapping[str, Any]], ratings: Sequence[Mapping[str, Any]], plan: StudyPlan
+    rows: Sequence[Mapping[str, Any]],
+    ratings: Sequence[Mapping[str, Any]],
+    plan: StudyPlan,
+    left_out: Mapping[str, int],
 ) -> dict[str, Any]:
     """The tables of a study as data that can be written as JSON.
 
     Args:
         rows: of the counted episodes, see `study_rows`.
         ratings: of the blocks, see `study_ratings`.
+        left_out: number of further recordings by the reason for which they are left out.
 
     Raises:
         RunError: the rows have several sources (such as people and simulated players).
@@ -58,6 +62,7 @@ def human_table(
         "planned": sum(len(trials) for trials in plan.trials.values()),
         "robots": [_row(name, summary["robots"][name], _simulation(methods[name])) for name in robots],
         "robots_without_episodes": missing,
+        "left_out": dict(left_out),
         "fronts": [
             {"front": front, **_row(name, cell, _real_robot(methods[name], front))}
             for name in (robots if "fronts" in summary else ())

@@ -8,6 +8,7 @@ from typing import Any
 from ..markdown_table import markdown_table
 
 _P_SMALLEST = 1e-4
+_NAMES = {"time_s": "simulated time", "interaction_mean": "interaction force"}
 
 
 def markdown(table: Mapping[str, Any]) -> str:
@@ -17,7 +18,7 @@ def markdown(table: Mapping[str, Any]) -> str:
     text = [
         "# Robots beside people",
         f"**{_sentence(table['label'])}**",
-        f"{_sentence(table['unit_of_analysis'])} Participants: {people}; episodes: "
+        f"Unit of analysis: {table['unit_of_analysis']}. Participants: {people}; episodes: "
         f"{sum(row['episodes'] for row in table['robots'])} of {table['planned']} planned, on {settings['starts']} "
         f"starts; at most {settings['step_limit']} steps. Plan {settings['plan_id']}.",
         "## Success, times, force, planning",
@@ -27,7 +28,8 @@ def markdown(table: Mapping[str, Any]) -> str:
     if table["fronts"]:
         text += ["## Success by set-up", _fronts(table["fronts"], missing), _tests(table["tests"]["fronts"])]
     if table["questionnaires"]:
-        text += ["## Questionnaires", _questionnaires(table["questionnaires"])]
+        drawn = "The answers of the simulated sessions were drawn at random." if table["source"] != "human" else ""
+        text += ["## Questionnaires", drawn, _questionnaires(table["questionnaires"])]
         sources = dict.fromkeys(row["source"] for row in table["questionnaires"] if row["source"])
         text += ["\n".join(f"- {source}" for source in sources)] if sources else []
     if table["published_source"]:
@@ -49,7 +51,6 @@ def _robots(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
     heads += ["published: success, %", "published: wall time, s", "published: planning, ms"] if published else []
     lines = []
     for row in rows:
-        paper = row["published"]
         lines.append(
             [
                 row["robot"],
@@ -60,10 +61,9 @@ def _robots(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
                 _mean(row["wall_time_s"], 1, 1),
                 _mean(row["interaction_mean"], 1, 3),
                 _mean(row["planning_ms"], 1, 2),
-                *([_paper(paper, "success", 100, ".0f"), _paper(paper, "wall_time_s", 1, ".1f"),
-                   _paper(paper, "planning_ms", 1, "g")] if published else []),
+                *(_published_results(row) if published else []),
             ]
-        )  # fmt: skip
+        )
     return _without(heads, lines, "interaction force ± SE" if "interaction_force" in missing else "")
 
 
@@ -90,6 +90,12 @@ def _fronts(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
             ]
         )
     return _without(heads, lines, "interaction force ± SE" if "interaction_force" in missing else "")
+
+
+def _published_results(row: Mapping[str, Any]) -> list[str]:
+    paper = row["published"]
+    success = " ".join(filter(None, (_paper(paper, "success", 100, ".0f"), _method(row))))
+    return [success, _paper(paper, "wall_time_s", 1, ".1f"), _paper(paper, "planning_ms", 1, "g")]
 
 
 def _published_spread(paper: Mapping[str, Any]) -> list[str]:
@@ -123,7 +129,7 @@ def _tests(tests: Mapping[str, Any]) -> str:
     """The analysis of variance and the contrasts of each measure, one line each."""
     lines = []
     for measure, test in tests.items():
-        name = measure.replace("_", " ")
+        name = _NAMES.get(measure, measure)
         if not test["anova"]:
             lines.append(
                 f"- {name}: no test; it needs at least two people with a value in every cell, and some spread."
@@ -200,6 +206,12 @@ def _mean(cell: Mapping[str, Any], scale: float, digits: int) -> str:
 
 def _number(value: float | None, scale: float, digits: int) -> str:
     return "" if value is None else f"{scale * value:.{digits}f}"
+
+
+def _method(row: Mapping[str, Any]) -> str:
+    """The published method in brackets, where the robot has another name."""
+    method = row["published"].get("method")
+    return f"({method})" if method and method != row["robot"] else ""
 
 
 def _paper(paper: Mapping[str, Any], name: str, scale: float, form: str) -> str:

@@ -115,6 +115,8 @@ def _has_no_error(values: Array) -> bool:
     """Whether an error term is zero, which leaves its F undefined."""
     tables = [values] if values.ndim == 2 else [values.mean(axis=2), values.mean(axis=1)]
     spread = float(((values - values.mean()) ** 2).sum())
+    if spread <= 1e-24 * float((values**2).sum()):
+        return True  # equal but for rounding
     if any(float((_residuals(table) ** 2).sum()) <= 1e-12 * max(spread, 1e-300) for table in tables):
         return True
     if values.ndim == 2:

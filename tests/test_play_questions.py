@@ -1,0 +1,195 @@
+"""Questionnaires and breaks in the window, answered with a gamepad and with keys."""
+
+import json
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+
+import pytest
+from gamepad_lobby import Hands
+from own_questionnaire import OWN
+from play_session import settings
+from virtual_joystick import VirtualJoystick
+
+from copolicy.collect.play.interludes import Interlude
+from copolicy.collect.play.phase import NextPhase, before_next_episode
+from copolicy.collect.play.questions import Questions
+from copolicy.collect.play.session_run import prepared
+from copolicy.collect.play.settings import PlayerSpec, PlaySettings
+from copolicy.collect.questionnaire import AnswerFile, Questionnaire, read_questionnaire
+from copolicy.collect.sdl import pygame
+
+pytestmark = pytest.mark.usefixtures("own_joysticks")
+
+FORM = Questionnaire.from_json(json.dumps(OWN), "own")
+A, B, START = 0, 1, 7
+
+
+@dataclass(frozen=True)
+class Asked(PlaySettings):
+    """Two blocks of one episode, a questionnaire after each and a break between them."""
+
+    forms: tuple[Questionnaire, ...] = (FORM,)
+
+    def interludes(self) -> tuple[Interlude, ...]:
+        return (Interlude(1, 1, self.forms, 30.0), Interlude(2, 2, self.forms, 30.0))
+
+    def session_settings(self) -> dict[str, str]:
+        return {"study_plan": "abcd"}
+
+
+@contextmanager
+def session(tmp_path, human="joystick", **changes):
+    """The window of a session whose robot is scripted; at its start the first block is over."""
+    players = (PlayerSpec("scripted", "S01"), PlayerSpec(human, "S02" if human == "scripted" else ""))
+    usual = settings(tmp_path, players=players, episodes=2, may_exchange_seats=False)
+    made = Asked(**({field.name: getattr(usual, field.name) for field in fields(usual)} | changes))
+    with prepared(made) as application:
+        application.phase.enter()
+        yield Hands(application)
+
+
+def enter_questions(hands, gamepad):
+    hands.press(A, gamepad)  # joins
+    hands.game.folder.counts.kept_in_session["map", 0] = 1
+    hands.game.interludes.kept(1)
+    hands.press(A, gamepad)  # agrees
+    hands.ticks(32)
+    assert hands.phase == "Questions"
+
+
+def push(hands, gamepad, x, ticks=3):
+    gamepad.move(x, 0.0)
+    hands.ticks(ticks)
+    gamepad.move(0.0, 0.0)
+    hands.ticks(3)
+
+
+def saved(tmp_path):
+    return AnswerFile(next((tmp_path / "recordings").glob("P01-*"))).values(1, "own")
+
+
+def test_a_gamepad_answers_and_each_answer_is_on_the_disk_at_once(tmp_path):
+    gamepad = VirtualJoystick("Pad", product=3)
+    with session(tmp_path) as hands:
+        enter_questions(hands, gamepad)
+        hands.press(A, gamepad)  # no mark yet: stays, and says what to do
+        assert hands.game.toast == "move the mark to the left or right"
+        push(hands, gamepad, 1.0)  # in the middle
+        push(hands, gamepad, 1.0)
+        assert saved(tmp_path) == {}
+        hands.press(A, gamepad)
+        assert saved(tmp_path) == {"one": 6.0}
+        hands.press(A, gamepad)  # the second item has no mark yet
+        push(hands, gamepad, -1.0, ticks=60)  # held: to the end
+        hands.ticks(20)  # a mark that rests is saved without a button
+        assert saved(tmp_path) == {"one": 6.0, "two": 0.0}
+        hands.press(B, gamepad)  # back to the first
+        push(hands, gamepad, -1.0)
+        hands.press(A, gamepad)
+        assert saved(tmp_path) == {"one": 4.0, "two": 0.0}
+        hands.press(A, gamepad)
+        assert hands.application.phase.item is None  # the button
+        hands.press(A, gamepad)
+        assert hands.phase == "Break"
+        lines = [json.loads(line) for line in hands.game.interludes.answers.path.read_text("utf-8").splitlines()]
+        assert {(line["study"], line["participant"], line["block"], line["source"]) for line in lines} == {
+            ("abcd", "P01", 1, "human")
+        }
+        assert lines[0]["seconds"] >= 0
+
+
+def test_the_break_lasts_and_then_waits_for_the_person(tmp_path, monkeypatch):
+    gamepad = VirtualJoystick("Pad", product=3)
+    with session(tmp_path, forms=()) as hands:
+        hands.press(A, gamepad)
+        hands.game.folder.counts.kept_in_session["map", 0] = 1
+        hands.game.interludes.kept(1)
+        hands.press(A, gamepad)
+        hands.ticks(20)
+        assert hands.phase == "Break"
+        hands.press(A, gamepad)
+        assert (hands.phase, hands.game.toast) == ("Break", "please rest a little longer")
+        assert hands.application.phase.remaining_s > 20
+        later = hands.game.clock() + 31 * 10**9
+        monkeypatch.setattr(type(hands.game.clock), "__call__", lambda clock: later)
+        hands.ticks(2)
+        hands.press(A, gamepad)
+        assert hands.phase == "Ready"
+        assert "swap" not in [value for _, value in hands.application.phase.top.items]
+        assert before_next_episode(hands.game) is NextPhase.READY  # the break is over
+
+
+def key(code):
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=code, unicode="", mod=0))
+
+
+def test_keys_answer_by_digit_and_the_session_goes_on_with_the_open_question(tmp_path):
+    form = replace(read_questionnaire("fluency"), name="own")
+    with session(tmp_path, "keyboard", forms=(form,)) as hands:
+        key(pygame.K_RETURN)  # joins with the arrows
+        hands.ticks(3)
+        hands.game.folder.counts.kept_in_session["map", 0] = 1
+        key(pygame.K_RETURN)
+        hands.ticks(32)
+        assert hands.phase == "Questions"
+        for number in (7, 1, 9):  # nine is no mark
+            key(getattr(pygame, f"K_{number}"))
+            hands.ticks(1)
+            key(pygame.K_RETURN)
+            hands.ticks(1)
+        names = [item.name for item in form.items]
+        assert saved(tmp_path) == {names[0]: 7.0, names[1]: 1.0}
+        key(pygame.K_5)
+        hands.ticks(1)
+        key(pygame.K_ESCAPE)
+        hands.ticks(1)
+        key(pygame.K_DOWN)
+        key(pygame.K_RETURN)  # quit for now
+        hands.application._tick(hands.game.ticker.tick())
+        assert hands.game.stop == "quit"
+        hands.application.phase.leave()
+    assert saved(tmp_path) == {names[0]: 7.0, names[1]: 1.0, names[2]: 5.0}
+    with session(tmp_path, "keyboard", forms=(form,)) as hands:
+        assert hands.game.folder.continued
+        key(pygame.K_RETURN)
+        hands.ticks(3)
+        hands.game.folder.counts.kept_in_session["map", 0] = 1
+        key(pygame.K_RETURN)
+        hands.ticks(32)
+        assert hands.phase == "Questions"
+        assert (hands.application.phase.page, hands.application.phase.row) == (0, 3)
+        assert hands.screen().get_size() == (1200, 760)
+
+
+def test_answers_are_asked_for_when_all_episodes_are_kept_and_nobody_is_asked_without_a_window(tmp_path):
+    with session(tmp_path) as hands:
+        game = hands.game
+        game.folder.counts.kept_in_session["map", 0] = 2
+        assert not game.finished
+        assert before_next_episode(game) is NextPhase.QUESTIONS
+        for block in (1, 2):
+            for item in FORM.items:
+                game.interludes.answers._values[block, "own", item.name] = 2.0
+        assert game.finished
+        assert before_next_episode(game) is NextPhase.FINISHED
+    gamepad = VirtualJoystick("Pad", product=3)
+    assert gamepad
+    with session(tmp_path, headless=True, window=None) as hands:
+        assert hands.game.settings.answered_by() == ""
+        assert hands.game.open_questionnaire() is None
+
+
+def test_a_session_without_people_answers_at_random_and_says_so(tmp_path):
+    values = []
+    for seed in (0, 0, 1):
+        with session(tmp_path / str(len(values)), "scripted", headless=True, window=None, seed=seed) as hands:
+            hands.game.folder.counts.kept_in_session["map", 0] = 1
+            assert before_next_episode(hands.game) is NextPhase.QUESTIONS
+            hands.application.phase = Questions(hands.game)
+            hands.ticks(1)
+            assert hands.phase == "Ready"
+            text = hands.game.interludes.answers.path.read_text("utf-8")
+            assert {json.loads(line)["source"] for line in text.splitlines()} == {"simulated"}
+            values.append(hands.game.interludes.answers.values(1, "own"))
+    assert values[0] == values[1]
+    assert values[0] != values[2]
