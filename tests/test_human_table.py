@@ -99,6 +99,7 @@ def test_the_second_table_has_both_times_beside_the_published_wall_time(papers):
 
 def test_questionnaires_are_scored_and_their_consistency_stated():
     rows, plan = _robot_study()
+    rows = [row for row in rows if row["participant"] in ("S1", "S2")]
     form = Questionnaire.from_json(
         json.dumps(OWN | {"scores": [{"name": "sum", "title": "both", "items": ["one", "two"]}]}), "own"
     )

@@ -113,7 +113,8 @@ class Lobby(Phase):
             f"{' (continued session)' if game.folder.continued else ''}"
         )
         panels = [self._panel(seat, player) for seat, player in enumerate(game.seats())]
-        draw_lobby(canvas, f"Pair {settings.pair}", (summary, words.instruction or game.task.spec.sentence), panels)
+        lines = (summary, words.instruction or game.task.spec.sentence)
+        draw_lobby(canvas, f"Pair {settings.pair}", lines, panels, settings.may_exchange_seats)
         if self.entry:
             draw_entry(canvas, self.entry.title, self.entry.text)
 

@@ -43,14 +43,17 @@ class LobbyPanel:
     notice: str = ""
 
 
-def draw_lobby(canvas: Canvas, title: str, summary: Sequence[str], panels: Sequence[LobbyPanel]) -> None:
+def draw_lobby(
+    canvas: Canvas, title: str, summary: Sequence[str], panels: Sequence[LobbyPanel], may_exchange_seats: bool = True
+) -> None:
     """Draws the lobby: a title, lines that summarise the session, and the players' panels."""
     canvas.text(title, (600, 44), 54, TEXT, "center", 1140)
     for row, line in enumerate(summary):
         canvas.text(line, (600, 90 + 32 * row), 27, MUTED, "center", 1140)
     for panel in panels:
         _draw_panel(canvas, panel, 20 + 590 * panel.seat)
-    canvas.text("F1 or H: help      Tab: swap seats      Esc: quit", (600, 738), 22, MUTED, "center")
+    swap = "Tab: swap seats      " if may_exchange_seats else ""
+    canvas.text(f"F1 or H: help      {swap}Esc: quit", (600, 738), 22, MUTED, "center")
 
 
 def _draw_panel(canvas: Canvas, panel: LobbyPanel, x: float) -> None:

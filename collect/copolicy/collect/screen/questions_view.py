@@ -56,7 +56,6 @@ class QuestionsView:
 def draw_questions(canvas: Canvas, view: QuestionsView) -> None:
     """Draws a page with at most six items."""
     canvas.text(view.title, (_TEXT_X, 40), 48, TEXT, "midleft", 600)
-    canvas.text(view.position, (SIZE[0] - _TEXT_X, 40), 24, MUTED, "midright", 540)
     for number, line in enumerate(wrapped(view.instruction, 28 * canvas.scale, 1112 * canvas.scale)[:2]):
         canvas.text(line, (_TEXT_X, 76 + 27 * number), 28, SKY)
     for number, row in enumerate(view.rows):
@@ -65,6 +64,7 @@ def draw_questions(canvas: Canvas, view: QuestionsView) -> None:
     complete = all(row.mark is not None for row in view.rows)
     edge = SKY if view.button_selected else PANEL_EDGE
     canvas.box(480, y, 240, 42, mix(PANEL, SKY if view.button_selected else GREEN, 0.3 * complete), edge)
+    canvas.text(view.position, (SIZE[0] - _TEXT_X, y + 22), 24, MUTED, "midright", 400)
     canvas.text(view.button, (600, y + 22), 30, TEXT if complete else MUTED, "center", 220)
     canvas.text(
         f"up, down: choose a line      left, right: move the mark      {view.hint}",

@@ -18,9 +18,6 @@ from copolicy.dataset.task import get_task
 from .plan import Robot, StudyPlan, weights_digest
 from .schedule import BlindPolicy, StudySchedule, StudySettings
 
-PLANNERS = ("process", "thread")
-"""Where the robots plan: in a process of their own, or in a thread beside the control loop."""
-
 
 def run_session(
     plan: StudyPlan,
@@ -37,7 +34,7 @@ def run_session(
         human: agent at the human's seat: a joystick, the keyboard, or a scripted agent.
         out: folder of all sessions.
         device: device of the policies.
-        planner: one of `PLANNERS`.
+        planner: where the robots plan: `process`, of their own, or `thread`, beside the control loop.
         play: further `StudySettings`.
 
     Returns:
