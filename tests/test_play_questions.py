@@ -3,6 +3,7 @@
 import json
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import pytest
 from gamepad_lobby import Hands
@@ -48,6 +49,10 @@ def session(tmp_path, human="joystick", **changes):
         yield Hands(application)
 
 
+def open_phase(hands) -> Any:
+    return hands.application.phase
+
+
 def enter_questions(hands, gamepad):
     hands.press(A, gamepad)  # joins
     hands.game.folder.counts.kept_in_session["map", 0] = 1
@@ -88,7 +93,7 @@ def test_a_gamepad_answers_and_each_answer_is_on_the_disk_at_once(tmp_path):
         hands.press(A, gamepad)
         assert saved(tmp_path) == {"one": 4.0, "two": 0.0}
         hands.press(A, gamepad)
-        assert hands.application.phase.item is None  # the button
+        assert open_phase(hands).item is None  # the button
         hands.press(A, gamepad)
         assert hands.phase == "Break"
         lines = [json.loads(line) for line in hands.game.interludes.answers.path.read_text("utf-8").splitlines()]
@@ -109,13 +114,13 @@ def test_the_break_lasts_and_then_waits_for_the_person(tmp_path, monkeypatch):
         assert hands.phase == "Break"
         hands.press(A, gamepad)
         assert (hands.phase, hands.game.toast) == ("Break", "please rest a little longer")
-        assert hands.application.phase.remaining_s > 20
+        assert open_phase(hands).remaining_s > 20
         later = hands.game.clock() + 31 * 10**9
         monkeypatch.setattr(type(hands.game.clock), "__call__", lambda clock: later)
         hands.ticks(2)
         hands.press(A, gamepad)
         assert hands.phase == "Ready"
-        assert "swap" not in [value for _, value in hands.application.phase.top.items]
+        assert "swap" not in [value for _, value in open_phase(hands).top.items]
         assert before_next_episode(hands.game) is NextPhase.READY  # the break is over
 
 
@@ -157,7 +162,7 @@ def test_keys_answer_by_digit_and_the_session_goes_on_with_the_open_question(tmp
         key(pygame.K_RETURN)
         hands.ticks(32)
         assert hands.phase == "Questions"
-        assert (hands.application.phase.page, hands.application.phase.row) == (0, 3)
+        assert (open_phase(hands).page, open_phase(hands).row) == (0, 3)
         assert hands.screen().get_size() == (1200, 760)
 
 

@@ -173,8 +173,8 @@ def csv_text(table: Mapping[str, Any]) -> str:
                 writer.writerow(values)
     for row in table["questionnaires"]:
         for robot, cell in row["robots"].items():
-            more = {"table": "questionnaires", "label": label, "robot": robot, "measure": row["question"]}
-            writer.writerow({**more, **(cell or {})})
+            values = {"table": "questionnaires", "label": label, "robot": robot, "measure": row["question"]}
+            writer.writerow({name: (values | (cell or {})).get(name) for name in _COLUMNS})
     return file.getvalue()
 
 
