@@ -201,6 +201,9 @@ def test_targets_of_linked_recordings_are_deleted(folder):
     assert len(list(elsewhere.glob("*.mcap"))) == 6
 
 
+ANSWERS = (("effort", ""), ("performance", "C-3"))
+
+
 def test_a_session_is_deleted_with_its_last_recording(folder):
     out = folder / "sessions"
     for pair, numbers in (("P01", (0, 1)), ("P02", (2, 6))):
@@ -216,11 +219,16 @@ def test_a_session_is_deleted_with_its_last_recording(folder):
         ]
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (session / "journal.jsonl").write_text(text, encoding="utf-8")
+        lines = [{"participant": "other", "item": item, "consent": consent} for item, consent in ANSWERS]
+        text = "".join(json.dumps(line) + "\n" for line in lines)
+        (session / "answers.jsonl").write_text(text, encoding="utf-8")
     withdraw("C-1", [folder / "set", out], delete=True)
     assert [path.name for path in out.iterdir()] == ["P02-01"]
     withdraw("C-3", [folder / "set", out], delete=True)
     journal = (out / "P02-01" / "journal.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
+    answers = (out / "P02-01" / "answers.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["item"] for line in answers] == ["effort"]
 
 
 def test_a_set_without_remaining_episodes_is_deleted(folder):

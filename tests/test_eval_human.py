@@ -13,7 +13,7 @@ from untrained_policy import save_untrained_policy
 
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.questionnaire import read_questionnaire
-from copolicy.collect.session import iter_recordings
+from copolicy.collect.session import EpisodeCounts, iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.staging import replace_json
@@ -23,7 +23,7 @@ from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.design import make_plan, williams_square
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan
 from copolicy.evaluate.human_study.ratings import read_ratings
-from copolicy.evaluate.human_study.schedule import BlindPolicy
+from copolicy.evaluate.human_study.schedule import BlindPolicy, StudySchedule
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
 from copolicy.evaluate.partner_study.configurations import front_configurations, study_configurations
@@ -192,6 +192,43 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
     with pytest.raises(FileFormatError) as error:
         read_ratings(path, plan)
     assert str(error.value) == f"{path}: expected blocks of plan {plan.plan_id}, found P01 block 3 in row 1"
+
+
+class _Robot:
+    """What a schedule tells the agent and the policies of a study."""
+
+    name = ""
+
+    def __init__(self):
+        self.latencies, self.chosen = [1.0], []
+
+    def choose(self, robot):
+        self.chosen.append(robot)
+
+
+def test_practice_is_on_other_starts_in_both_set_ups_with_the_robots_in_turn():
+    task = get_task("table")
+    starts = front_configurations(task.scenario_set("unseen"), 24, task.studies.fronts)
+    plan = make_plan(ROBOTS, "unseen", starts, 2, 4, 0, task.studies.fronts)
+    robot: Any = _Robot()
+    schedule = StudySchedule(plan, "P02", robot, robot)
+    practised = [schedule.practice(number) for number in range(4)]
+    own = {trial.configuration for trial in plan.trials_of("P02")}
+    assert not {starts.index(scenario) for scenario in practised} & own
+    assert [task.studies.front(scenario) for scenario in practised] == [*task.studies.fronts] * 2
+    assert robot.chosen == list(plan.blocks_of("P02").values()) * 2
+    assert (robot.name, robot.latencies) == (f"study:{plan.plan_id}:P02:practice", [])
+    assert json.loads(schedule.planned)["front"] == "robot_front"
+    counts = EpisodeCounts()
+    scenario, seats = schedule.next(counts)
+    first = plan.trials_of("P02")[0]
+    assert (scenario, seats) == (starts[first.configuration], 0)
+    assert json.loads(schedule.planned) == {
+        "plan": plan.plan_id, "participant": "P02", "trial": first.code, "block": 1, "front": first.front
+    }  # fmt: skip
+    # Where every start is the person's own, practice is on these.
+    alone = make_plan(ROBOTS, "unseen", starts, 1, 24, 0, task.studies.fronts)
+    assert StudySchedule(alone, "P01", robot, robot).practice(0) in starts
 
 
 def test_only_the_chosen_robot_plans():

@@ -179,6 +179,15 @@ def test_the_whole_walk_with_a_planner_that_dies_on_the_way(study, tmp_path, cap
     assert [(answer.block, answer.item) for answer in answers] == [(1, "one"), (1, "two"), (2, "one"), (2, "two")]
     assert {answer.source for answer in answers} == {"simulated"}
 
+    # Without the answers to the last block the session is not over: they are asked for again, in the same session.
+    (path,) = out.rglob("answers.jsonl")
+    path.write_text("".join(path.read_text(encoding="utf-8").splitlines(keepends=True)[:3]), encoding="utf-8")
+    assert main([*run, "--planner", "thread"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["complete"], told["kept"], told["kept_in_session"]) == (True, 0, 4)
+    assert [(one.block, one.item) for _, one in answers_in(out)] == [(a.block, a.item) for a in answers]
+    assert [folder.name for folder in out.iterdir() if folder.is_dir()] == ["P01-01"]
+
     tables = tmp_path / "tables"
     call = ["table", "human", "--recordings", str(out), "--plan", str(study / "plan.json"), "--out", str(tables)]
     assert main([*call, "--json"]) == 0

@@ -218,12 +218,13 @@ class Questions(Phase):
         """
         settings = self.game.settings
         study = str(settings.session_settings().get("study_plan", ""))
+        consent = ",".join(player.consent for player in self.game.players if player.consent)
         seconds = round((self.game.clock() - self._selected_ns) / 1e9, 3)
         for name, mark in self._marks.items():
             if mark is not None and mark != self._saved[name]:
                 value = self.form.scale.value(mark)
                 block, form = self.interlude.block, self.form.name
-                answer = Answer(study, settings.pair, block, form, name, value, seconds, self._source)
+                answer = Answer(study, settings.pair, block, form, name, value, seconds, self._source, consent)
                 self.game.interludes.answers.add(answer)
                 self._saved[name] = mark
 

@@ -29,6 +29,7 @@ class Answer:
         value: on the item's scale.
         seconds: that the item was selected before the answer.
         source: `human`, or `simulated` if no person took part.
+        consent: id of the person's consent record, for a withdrawal; empty if there is none.
         time: of the answer, ISO 8601 in UTC; that of its creation if empty.
     """
 
@@ -40,6 +41,7 @@ class Answer:
     value: float
     seconds: float
     source: str
+    consent: str = ""
     time: str = ""
 
     def __post_init__(self) -> None:

@@ -14,7 +14,8 @@ from .traces import Traces
 _PEOPLE = ("pair_id", "player_0_id", "player_1_id")
 _SESSION = "session.json"
 _JOURNAL = "journal.jsonl"
-_SESSION_FILES = (_SESSION, _JOURNAL, ".copolicy.lock")
+_LINES = (_JOURNAL, "answers.jsonl")  # one JSON object per line
+_SESSION_FILES = (_SESSION, *_LINES, ".copolicy.lock")
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def read_recording(path: Path) -> ScannedRecording:
 
 
 def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
-    """Deletes recordings, their macOS side files, and their lines in the journals of their sessions.
+    """Deletes recordings, their macOS side files, and their lines in the journals and answers of their sessions.
 
     The target of a link is deleted too. A session without recordings is deleted with its folder, whose name is that
     of the pair.
@@ -83,11 +84,10 @@ def delete_recordings(paths: Iterable[Path], traces: Traces) -> list[Path]:
                     sync_folder(folder.parent)
                     continue
             other_files += sorted(folder.iterdir())
-        journal = folder / _JOURNAL
-        if journal.is_file():
-            text = journal.read_text(encoding="utf-8")
+        for path in (folder / name for name in _LINES if (folder / name).is_file()):
+            text = path.read_text(encoding="utf-8")
             if (remaining := traces.drop_lines(text)) != text:
-                replace_text(journal, remaining)
+                replace_text(path, remaining)
         sync_folder(folder)
     return other_files
 
