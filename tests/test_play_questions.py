@@ -96,7 +96,9 @@ def test_a_gamepad_answers_and_each_answer_is_on_the_disk_at_once(tmp_path):
         assert open_phase(hands).item is None  # the button
         hands.press(A, gamepad)
         assert hands.phase == "Break"
-        lines = [json.loads(line) for line in hands.game.interludes.answers.path.read_text("utf-8").splitlines()]
+        lines = [
+            json.loads(line) for line in hands.game.interludes.answers.path.read_text(encoding="utf-8").splitlines()
+        ]
         assert {(line["study"], line["participant"], line["block"], line["source"]) for line in lines} == {
             ("abcd", "P01", 1, "human")
         }
@@ -193,7 +195,7 @@ def test_a_session_without_people_answers_at_random_and_says_so(tmp_path):
             hands.application.phase = Questions(hands.game)
             hands.ticks(1)
             assert hands.phase == "Ready"
-            text = hands.game.interludes.answers.path.read_text("utf-8")
+            text = hands.game.interludes.answers.path.read_text(encoding="utf-8")
             assert {json.loads(line)["source"] for line in text.splitlines()} == {"simulated"}
             values.append(hands.game.interludes.answers.values(1, "own"))
     assert values[0] == values[1]
