@@ -203,6 +203,11 @@ def test_the_whole_walk_with_a_planner_that_dies_on_the_way(study, tmp_path, cap
     assert "no person took part" in (tables / "table.md").read_text(encoding="utf-8")
     assert "no person took part" in (tables / "table.csv").read_text(encoding="utf-8")
 
+    assert main(["human", "summarise", str(out), "--plan", str(study / "plan.json")]) == 0
+    told = capsys.readouterr().out
+    assert "success_by_front" in told
+    assert "human_front" in told
+
     # A CSV completes the answers, and must not contradict them.
     block = answers[0].block
     ratings = tmp_path / "ratings.csv"

@@ -100,12 +100,17 @@ def _report(summary: dict) -> dict[str, Any]:
             f"F({f['df'][0]}, {f['df'][1]}) = {f['F']:.2f}, p = {f['p']:.3g}, Greenhouse-Geisser "
             f"{f['p_greenhouse_geisser']:.3g}, of {n} people; recommended: {test['recommended']}"
         )
+    by_front = {
+        name: {front: _value(cell["success"], 100, 1, " %") for front, cell in cells.items()}
+        for name, cells in summary.get("fronts", {}).items()
+    }
     ratings = {
         question: {robot: _value(rating, 1, 2, "") for robot, rating in answers["robots"].items()}
         for question, answers in summary.get("ratings", {}).items()
     }
     missing = {name: summary[name] for name in ("not_measured",) if name in summary}
-    return {"robots": robots, "anova": tests, **({"ratings": ratings} if ratings else {}), **missing}
+    fronts = {"success_by_front": by_front} if by_front else {}
+    return {"robots": robots, **fronts, "anova": tests, **({"ratings": ratings} if ratings else {}), **missing}
 
 
 def _value(measure: dict, scale: float, digits: int, unit: str) -> str:
