@@ -178,12 +178,14 @@ class Studies:
         definitions: definitions of measures for this task, by their names in results.
         published: published results of the co-planning study, for comparison, in the order of the publication.
         published_source: source of `published` and how it was measured.
+        dissent: levels of the interaction measure above which the players dissent, lowest first; empty if not defined.
         near_miss: distance to an obstacle below which a pass counts as a near miss, in the unit of the outline; None if
             not defined.
     """
 
     step_limit: int | None = None
     near_miss: float | None = None
+    dissent: tuple[float, ...] = ()
     definitions: Mapping[str, str] = MappingProxyType({})
     published: tuple[PublishedMethod, ...] = ()
     published_source: str = ""
@@ -194,6 +196,18 @@ class Studies:
 
     def at_rest(self, recorded: Array) -> Array | None:
         """`(T,)` whether the body is at rest in recorded states `(T, k)`; None if not measured."""
+        return None
+
+    def strategy_actions(self, scenario: Any, states: Array) -> tuple[tuple[str, ...], Array] | None:
+        """The actions with which each player would pursue each strategy, to recognise which one a player prefers.
+
+        Args:
+            states: `(T, n)`.
+
+        Returns:
+            The R strategy labels, see `PairTask.strategy`; `(T, 2, R, m)` actions, robot first, NaN where a strategy is
+            out of reach. None if the task does not define them.
+        """
         return None
 
 

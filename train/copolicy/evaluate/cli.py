@@ -10,6 +10,7 @@ from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import require_new
 
+from .behaviours import add_behaviours_command
 from .comparison import add_compare_command
 from .coplanning_table import add_table_command
 from .cross_play import add_cross_play_command
@@ -55,6 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_cross_play_command(commands)
     add_partners_command(commands)
     add_human_command(commands)
+    add_behaviours_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)
     add_power_command(commands)

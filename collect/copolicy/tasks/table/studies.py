@@ -17,6 +17,7 @@ class TableStudies(Studies):
     """See `Studies`; the step limit is the paper's."""
 
     step_limit = 2000
+    dissent = (0.25, 0.75)  # the paper's thresholds: |(u_robot - u_human) . e| of 0.5 and 1.5 full forces
     near_miss = 10.0  # px; an obstacle is 50 px wide, and 5 % of the simulated pairs' episodes come below 33 px
     definitions = {  # noqa: RUF012 (read only, as the base says)
         "success": "touch the goal",
@@ -40,3 +41,9 @@ class TableStudies(Studies):
         """`(T,)` whether speed and spin of the table are below the limits."""
         vx, vy, omega = recorded[:, 3:].T
         return (vx * vx + vy * vy < _STILL_SPEED**2) & (np.abs(omega) < _STILL_SPIN)
+
+    def strategy_actions(self, scenario: MapConfig, states: Array) -> tuple[tuple[str, ...], Array]:
+        """See `route_forces`."""
+        from .agents.route_forces import route_forces  # scipy
+
+        return route_forces(scenario, states)
