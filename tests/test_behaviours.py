@@ -18,6 +18,7 @@ from copolicy.evaluate.behaviours.motion import Motion
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.trajectories import Trajectory
 from copolicy.evaluate.trajectory_sources import common_rate, read_methods
+from copolicy.tasks.table.agents.route_forces import route_forces
 from copolicy.tasks.table.map_config import MapConfig
 
 FPS = 10
@@ -38,7 +39,7 @@ def _motion(*episodes, scenario=MAP):
 
 def _along(sides, states):
     """Actions that follow the route `sides[0]` at the robot's and `sides[1]` at the human's end."""
-    labels, wanted = TASK.studies.strategy_actions(MAP, states)
+    labels, wanted = route_forces(MAP, states)
     chosen = np.array([wanted[:, seat, labels.index(side)] for seat, side in enumerate(sides)])
     return np.nan_to_num(chosen / np.linalg.norm(chosen, axis=-1, keepdims=True)).transpose(1, 0, 2).reshape(-1, 4)
 
