@@ -122,7 +122,7 @@ def _add_summarise(steps: Commands) -> None:
 
 
 def _plan(arguments: argparse.Namespace) -> dict[str, Any]:
-    from ..partner_study.command import split_name
+    from ..partner_study.robots import split_name
     from .plan import Robot, make_plan, williams_square
 
     require_new(arguments.out, overwrite=arguments.overwrite)
