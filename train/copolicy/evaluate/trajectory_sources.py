@@ -6,7 +6,7 @@ from pathlib import Path
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.meta_files import INFO_FILE
 
-from .trajectories import SUFFIX, Trajectories, demonstrations, read_trajectories
+from .trajectories import SUFFIX, Trajectories, Trajectory, demonstrations, read_trajectories
 
 CELLS = "cells"
 """Folder of a cross-play with a file for each robot and partner."""
@@ -58,12 +58,14 @@ def _read(path: Path, name: str) -> dict[str, Trajectories]:
 
 
 def _by_robot(read: Sequence[Trajectories], name: str) -> dict[str, Trajectories]:
-    methods: dict[str, Trajectories] = {}
-    for task, label, episodes in read:
-        for episode in episodes:
+    episodes: dict[str, list[Trajectory]] = {}
+    labels: dict[str, dict[str, None]] = {}
+    for part in read:
+        for episode in part.episodes:
             robot = str(episode.columns["robot"])
-            first = methods.setdefault(robot, Trajectories(task, label, []))
-            methods[robot] = first._replace(episodes=[*first.episodes, episode])
+            episodes.setdefault(robot, []).append(episode)
+            labels.setdefault(robot, {})[part.label] = None
+    methods = {robot: Trajectories(read[0].task, "; ".join(labels[robot]), found) for robot, found in episodes.items()}
     if len(methods) == 1 and name:
         return {name: next(iter(methods.values()))}
     return {f"{name}-{robot}" if name else robot: method for robot, method in methods.items()}

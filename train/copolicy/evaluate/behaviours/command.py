@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command, progress
 from copolicy.dataset.command_line.flag_numbers import seed
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, replace_text, require_new
 
 from ..file_names import file_name
@@ -47,6 +48,8 @@ SOURCE_HELP = (
 
 
 def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
+    if arguments.out.exists() and not arguments.out.is_dir():
+        raise InvalidValueError("--out", "a folder", str(arguments.out))
     files = [arguments.out / name for name in _FILES]
     require_new(*files, overwrite=arguments.overwrite)
     from ..trajectory_sources import common_rate, read_methods
@@ -67,6 +70,7 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
         "not_counted": {each.name: task.missing(each.missing) for each in chosen if each.missing},
         "methods": {},
     }
+    arguments.out.mkdir(parents=True, exist_ok=True)
     videos: dict[str, str] = {}
     for name, method in progress(methods.items(), len(methods), "methods"):
         motion = Motion(task, method.episodes, fps)

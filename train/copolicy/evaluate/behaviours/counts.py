@@ -1,6 +1,8 @@
 """Counts of behaviours, with intervals over maps and null distributions."""
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -26,21 +28,19 @@ def count(behaviour: Behaviour, motion: Motion, seed: int) -> tuple[dict[str, An
         `per_minute` with its null distribution, `episodes` (proportion with at least one), and the counts of each entry
         of the details of its instances.
     """
-    rng = np.random.default_rng((seed, len(motion.frames.rows)))
+    rng = np.random.default_rng(seed)
     events = behaviour.find(motion, None)
     maps = np.unique([base_name(row.map_id) for row in motion.frames.rows], return_inverse=True)[1]
     bootstrap = Bootstrap(maps, REPLICATES, rng)
     bootstrap.resampled = "maps" if bootstrap.resampled == "pairs" else bootstrap.resampled
     number, minutes = _per_episode(events, motion), motion.minutes
     episodes = len(number)
-    rate = bootstrap.estimate(number, minutes, "1/min", behaviour.definition, episodes)
+    rate = _bounded(bootstrap.estimate(number, minutes, "1/min", behaviour.definition, episodes), math.inf)
     draws = [
         len(behaviour.find(motion, order)) / minutes.sum()
         for order in _orders(behaviour, motion, rng)
         if rate.value is not None
     ]
-    if rate.interval is not None:
-        rate = replace(rate, interval=(max(0.0, rate.interval[0]), rate.interval[1]))
     if draws:
         null = Null.from_draws(NULLS[behaviour.null], rate.value or 0.0, np.array(draws), two_sided=True)
         rate = replace(rate, null=null)
@@ -54,10 +54,18 @@ def count(behaviour: Behaviour, motion: Motion, seed: int) -> tuple[dict[str, An
     described: dict[str, Any] = {
         "number": len(events),
         "per_minute": rate.as_dict(),
-        "episodes": proportion.as_dict(),
+        "episodes": _bounded(proportion, 1.0).as_dict(),
         **({"details": found} if found else {}),
     }
     return described, sorted(events, key=lambda event: -event.score)
+
+
+def _bounded(estimate: Estimate, high: float) -> Estimate:
+    """An estimate whose interval ends at 0 and `high`, which the shift of the bootstrap can pass."""
+    if estimate.interval is None:
+        return estimate
+    low, upper = estimate.interval
+    return replace(estimate, interval=(max(0.0, low), min(high, upper)))
 
 
 def _per_episode(events: list[Event], motion: Motion) -> Array:
@@ -79,9 +87,8 @@ def _orders(behaviour: Behaviour, motion: Motion, rng: np.random.Generator) -> l
     return [np.array([rng.choice(others[layout]) for layout in layouts]) for _ in range(DRAWS)]
 
 
-def rate_text(estimate: Estimate | dict[str, Any]) -> str:
-    """A rate with its interval and null mean, for tables."""
-    entry = estimate.as_dict() if isinstance(estimate, Estimate) else estimate
+def rate_text(entry: Mapping[str, Any]) -> str:
+    """A rate, as `count` returns it, with its interval and null mean, for tables."""
     if entry["value"] is None:
         return "none"
     low, high = entry["interval"]

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.statistics.forces import MIN_EFFORT
-from copolicy.dataset.task import PairTask
+from copolicy.dataset.task import PairTask, Studies
 
 from . import adaptation, forces, leadership, pivot
 from .motion import Event, Motion
@@ -46,8 +46,8 @@ def behaviours_of(task: PairTask) -> list[Behaviour]:
     robot, human = task.spec.players
     levels = task.studies.dissent or (math.nan,)
     measured = "" if task.offers("interaction") and task.studies.dissent else "levels of dissent (`studies.dissent`)"
-    strategies = type(task.studies).strategy_actions is not _undefined()
-    no_strategy = "" if strategies else "actions of each strategy (`studies.strategy_actions`)"
+    undefined = type(task.studies).strategy_actions is Studies.strategy_actions
+    no_strategy = "actions of each strategy (`studies.strategy_actions`)" if undefined else ""
     prefer = (
         f"A player prefers the strategy that its action (mean over {adaptation.SMOOTHING_S:g} s) follows by "
         f"{adaptation.MARGIN:g} of a full action more than any other within reach."
@@ -105,9 +105,3 @@ def behaviours_of(task: PairTask) -> list[Behaviour]:
             for level in levels
         ),
     ]
-
-
-def _undefined() -> Callable:
-    from copolicy.dataset.task import Studies
-
-    return Studies.strategy_actions
