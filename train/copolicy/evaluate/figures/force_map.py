@@ -81,12 +81,11 @@ def interaction_map(
     proportions = [each.proportion(min_episodes) for each in maps]
     most = max(float(np.nanmax(each, initial=0.0)) for each in proportions)
     norm = Normalize(0, max(10.0, 10 * np.ceil(most / 10)))
-    unit, name = task.statistics.interaction_unit, task.words.interaction
-    words = task.words.interaction_unit
+    name, unit = task.words.interaction, task.words.interaction_unit
     title = f"{name.capitalize()}: % of the time in a cell of {grid.cell:g} {outline.unit} above a threshold"
     note = (
         f"Colour: {DEFINITION}. Grey: fewer than {min_episodes} episodes in the cell; white: none. "
-        f"Thresholds in {words}: {conventions.thresholds_source}. {legend_note(outline, sources)}"
+        f"Thresholds in {unit}: {conventions.thresholds_source}. {legend_note(outline, sources)}"
     )
     count = len(sources) * len(thresholds)
     figure, axes = new_sheet(outline, count, len(thresholds), title, note, heading_lines(sources) + 1)
@@ -104,7 +103,7 @@ def interaction_map(
     return figure, {
         "definition": DEFINITION,
         "unit": "numbers of samples; percent are 100 above / samples",
-        "interaction_unit": unit if unit != "1" else words,
+        "interaction_unit": unit,
         "thresholds": list(thresholds),
         "thresholds_source": conventions.thresholds_source,
         "min_episodes": min_episodes,
