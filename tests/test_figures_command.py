@@ -1,7 +1,6 @@
 """`copolicy-eval figures` on files: data sets, results, cross-plays, and a second task."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -158,15 +157,6 @@ def test_a_disk_error_leaves_no_figure(study, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", full)
     assert main(["figures", f"S={study}", "--only", "visitation", "--out", str(tmp_path / "out")]) == 1
     assert list((tmp_path / "out").iterdir()) == []
-
-
-@pytest.fixture
-def peg() -> Iterator[PairTask]:
-    """The second task, while it is installed."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parent / "peg_task"))
-        yield get_task("peg")
-    get_task.cache_clear()
 
 
 def test_the_peg_has_the_figures_that_need_no_interaction(peg, tmp_path, capsys):

@@ -1,9 +1,37 @@
-"""Cell sizes and thresholds of the figures that `copolicy-eval figures` draws, as a task sets them."""
+"""Figures of trajectories: cell sizes and thresholds, as a task sets them, and the document beside the files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypedDict
 
 from .arrays import Array
+
+FIGURES_FILE = "figures.json"
+"""The document beside the figures of `copolicy-eval figures`, with their numbers."""
+
+
+class FigureDocument(TypedDict):
+    """One figure in the document: its title, names of its files, and the definition of what it shows."""
+
+    title: str
+    files: list[str]
+    definition: str
+
+
+class FigureSourceDocument(TypedDict):
+    """A source of the figures; the label says how its episodes were made."""
+
+    name: str
+    label: str
+    episodes: int
+
+
+class FiguresDocument(TypedDict):
+    """What readers need of the document; it has further keys (`train/docs/figures.md`)."""
+
+    task: str
+    figures: dict[str, FigureDocument]
+    sources: list[FigureSourceDocument]
 
 
 @dataclass(frozen=True)

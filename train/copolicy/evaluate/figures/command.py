@@ -13,7 +13,7 @@ from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import PairTask
-from copolicy.dataset.trajectory_figures import TrajectoryFigures
+from copolicy.dataset.trajectory_figures import FIGURES_FILE, TrajectoryFigures
 
 from .faults import CONCERNS, SENTENCES, Faults
 from .sources import SOURCE_HELP, Source, read_sources, require_map
@@ -71,14 +71,14 @@ def add_figures_command(commands: Commands) -> None:
 
 def _figures(arguments: argparse.Namespace) -> dict[str, Any]:
     faults = None if arguments.as_published is None else Faults.named(arguments.as_published)
-    from .sheet import DOCUMENT, FORMATS, save_files
+    from .sheet import FORMATS, save_files
 
     names = [name for name in NAMES if arguments.only is None or name in arguments.only]
     every = [*names, *(f"{name}{AS_PUBLISHED}" for name in names if faults and name in CONCERNS)]
     files = [arguments.out / f"{name}.{ending}" for name in every for ending in FORMATS]
     if arguments.out.exists() and not arguments.out.is_dir():
         raise InvalidValueError("--out", "a folder", str(arguments.out))
-    require_new(*files, arguments.out / DOCUMENT, overwrite=arguments.overwrite)
+    require_new(*files, arguments.out / FIGURES_FILE, overwrite=arguments.overwrite)
     task, sources = read_sources(arguments.sources)
     if arguments.map is not None:
         sources = require_map(task, sources, arguments.map)
@@ -91,7 +91,14 @@ def _figures(arguments: argparse.Namespace) -> dict[str, Any]:
     if not figures:
         raise InvalidValueError("--only", "a figure for which the task has the parts", left_out)
     document = {
-        "figures": {name: {"files": [f"{name}.{ending}" for ending in FORMATS], **described[name]} for name in figures},
+        "figures": {
+            name: {
+                "title": figure.get_suptitle().replace("\n", " "),
+                "files": [f"{name}.{ending}" for ending in FORMATS],
+                **described[name],
+            }
+            for name, figure in figures.items()
+        },
         "left_out": left_out,
         **_described_sources(task, sources),
     }
@@ -99,7 +106,7 @@ def _figures(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "sources": {source.name: f"{len(source.episodes)} episodes, {source.label}" for source in sources},
         "figures": [str(arguments.out / file) for files in saved.values() for file in files],
-        "numbers": str(arguments.out / DOCUMENT),
+        "numbers": str(arguments.out / FIGURES_FILE),
         **({"left_out": left_out} if left_out else {}),
     }
 

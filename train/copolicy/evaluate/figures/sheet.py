@@ -19,6 +19,7 @@ from copolicy.dataset.arrays import Array
 from copolicy.dataset.files.staging import replacements
 from copolicy.dataset.outline import Outline
 from copolicy.dataset.outline_figure import OBSTACLE, draw_fixed
+from copolicy.dataset.trajectory_figures import FIGURES_FILE
 
 from ..trajectories import Trajectory
 from .grid import Grid
@@ -134,7 +135,7 @@ def save_files(folder: Path, figures: Mapping[str, Figure], document: str) -> di
     """
     names = {name: [f"{name}.{ending}" for ending in FORMATS] for name in figures}
     paths = [folder / file for files in names.values() for file in files]
-    with replacements([*paths, folder / DOCUMENT]) as partials, matplotlib.rc_context({"svg.hashsalt": "copolicy"}):
+    with replacements([*paths, folder / FIGURES_FILE]) as partials, matplotlib.rc_context({"svg.hashsalt": "copolicy"}):
         targets = iter(partials)
         for figure in figures.values():
             for ending in FORMATS:
@@ -142,10 +143,6 @@ def save_files(folder: Path, figures: Mapping[str, Figure], document: str) -> di
                 figure.savefig(next(targets), format=ending, **options)
         next(targets).write_text(document, encoding="utf-8")
     return names
-
-
-DOCUMENT = "figures.json"
-"""The numbers of the figures, beside them."""
 
 
 def _scene_axes(axes: Axes, outline: Outline, first_column: bool, last_row: bool) -> None:
