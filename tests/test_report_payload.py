@@ -93,11 +93,13 @@ def figures_folder(folder: Path, task: str = "table", **changes) -> Path:
     """A folder as `copolicy-eval figures` writes it, of one figure."""
     folder.mkdir()
     (folder / "visitation.png").write_bytes(PNG)
-    (folder / "visitation.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>')
+    (folder / "visitation.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>', encoding="utf-8"
+    )
     figure = {"title": "Visits <b>", "files": ["visitation.png", "visitation.svg"], "definition": "percent & more"}
     sources = [{"name": "A", "label": "simulated, no person took part", "episodes": 3}]
     document = {"task": task, "figures": {"visitation": {**figure, **changes}}, "sources": sources}
-    (folder / "figures.json").write_text(json.dumps(document))
+    (folder / "figures.json").write_text(json.dumps(document), encoding="utf-8")
     return folder
 
 

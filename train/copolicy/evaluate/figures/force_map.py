@@ -83,8 +83,13 @@ def interaction_map(
     norm = Normalize(0, max(10.0, 10 * np.ceil(most / 10)))
     name, unit = task.words.interaction, task.words.interaction_unit
     title = f"{name.capitalize()}: % of the time in a cell of {grid.cell:g} {outline.unit} above a threshold"
+    few = (
+        f"Grey: fewer than {min_episodes} episodes in the cell; white: none. "
+        if min_episodes > 1
+        else "White: no visit. "
+    )
     note = (
-        f"Colour: {DEFINITION}. Grey: fewer than {min_episodes} episodes in the cell; white: none. "
+        f"Colour: {DEFINITION}. {few}"
         f"Thresholds in {unit}: {conventions.thresholds_source}. {legend_note(outline, sources)}"
     )
     count = len(sources) * len(thresholds)

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -62,7 +63,7 @@ def save_chunk_figure(branch_points: Sequence[BranchPoint], paths: Sequence[Path
     with replacements(paths) as partials, matplotlib.rc_context({"svg.hashsalt": "copolicy"}):
         for path, partial in zip(paths, partials, strict=True):
             svg = path.suffix.lower() == ".svg"
-            options = {"metadata": {"Date": None}} if svg else {"pil_kwargs": {"optimize": True}}
+            options: dict[str, Any] = {"metadata": {"Date": None}} if svg else {"pil_kwargs": {"optimize": True}}
             figure.savefig(partial, format="svg" if svg else "png", **options)
 
 
