@@ -98,6 +98,16 @@ def test_a_data_set_without_final_state_is_measured_alike():
     assert rate.sum() == pytest.approx(100.0)
 
 
+def test_a_low_rate_skips_no_cell_and_its_forces_stay_in_place():
+    fast = carry(fps=10, seconds=2.0, speed=240.0)  # two cells a frame
+    rate, _ = visit_rates(TABLE, [fast], VISITS)
+    assert (rate[25, 20:60] > 0).all()
+    actions = fast.actions.copy()
+    actions[fast.states[:, 0] >= 480, 0] = 1.0
+    forces = force_map(TABLE, [replace(fast, actions=actions)], Grid.over(TABLE.required_outline, 60.0), (0.25,))
+    np.testing.assert_array_equal(forces.proportion(1)[0, 5, 4:12], [0] * 4 + [100] * 4)
+
+
 def test_the_first_row_is_at_the_upper_edge():
     grid = Grid.over(TABLE.required_outline, 50.0)
     assert (grid.rows, grid.columns) == (12, 24)

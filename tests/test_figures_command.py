@@ -195,6 +195,20 @@ def test_the_peg_has_the_figures_that_need_no_interaction(peg, tmp_path, capsys)
     assert not (tmp_path / "none").exists()
 
 
+def test_a_task_without_an_outline_has_success_by_map_alone(peg, tmp_path, monkeypatch):
+    push = Trajectory(
+        np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(2), 20, peg.scenario_sets["right"][0], {"success": False}
+    )
+    file = store(tmp_path / "peg.trajectories.parquet", [("R", push)], peg)
+    monkeypatch.setattr(type(peg), "outline", None)
+    out = tmp_path / "out"
+    assert main(["figures", f"peg={file}", "--out", str(out)]) == 0
+    document = json.loads((out / "figures.json").read_text(encoding="utf-8"))
+    assert list(document["figures"]) == ["success-by-map"]
+    assert document["left_out"] == dict.fromkeys(NAMES[:3], "left out: the task 'peg' has no outline")
+    assert document["figures"]["success-by-map"]["maps"]["all"]["peg"]["mean"] == 0
+
+
 def test_tasks_are_not_mixed(peg, study, tmp_path, capsys):
     push = Trajectory(
         np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(2), 20, peg.scenario_sets["right"][0], {"success": True}

@@ -137,8 +137,11 @@ def _study(path: Path) -> Trajectories:
     for cell, one in zip(cells, read, strict=True):
         if one.task.spec.name != read[0].task.spec.name:
             raise FileFormatError(cell, f"episodes of the task {read[0].task.spec.name}", one.task.spec.name)
-    label = "cross-play in simulation, no person took part in the study"
-    return Trajectories(read[0].task, label, [episode for one in read for episode in one.episodes])
+    episodes = [episode for one in read for episode in one.episodes]
+    partners = sorted({str(episode.columns["partner"]) for episode in episodes if "partner" in episode.columns})
+    named = f" with {', '.join(partners)}" if partners else ""
+    label = f"cross-play in simulation{named}, no person took part in the study"
+    return Trajectories(read[0].task, label, episodes)
 
 
 def _by_robot(name: str, path: Path, robot: str, read: Trajectories) -> list[Source]:
