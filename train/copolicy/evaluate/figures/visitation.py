@@ -73,7 +73,7 @@ def visitation(task: PairTask, conventions: TrajectoryFigures, sources: Sequence
         show_cells(axis, grid, np.where(rate > 0, rate, np.nan), norm, COLOURS)
         draw_scene(axis, outline, source.episodes)
         set_heading(axis, heading(source))
-    colour_bar(figure, axes, norm, COLOURS, f"{UNIT} per cell (square-root scale)")
+    colour_bar(figure, axes, norm, COLOURS, f"{UNIT}\nper cell (square-root scale)")
     panels = {
         source.name: [
             {"row": int(row), "column": int(column), "rate": float(f"{rate[row, column]:.6g}"),
