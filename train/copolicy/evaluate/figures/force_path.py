@@ -40,7 +40,7 @@ def force_path(task: PairTask, chosen: Sequence[Chosen], rule: str) -> tuple[Fig
     label = f"{name}, {task.words.interaction_unit}\n(positive: {apart}, negative: {together})"
     colour_bar(figure, axes, norm, _COLOURS, label, extend="both")
     return figure, {
-        "definition": "interaction measure of each action, at the state before it",
+        "definition": "interaction measure of each action, with the orientation after it, at the position before it",
         "choice": rule,
         "unit": task.words.interaction_unit,
         "colour_scale": {"least": -limit, "greatest": limit, "exponent": 1},
