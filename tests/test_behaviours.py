@@ -17,7 +17,7 @@ from copolicy.evaluate.behaviours.definitions import behaviours_of
 from copolicy.evaluate.behaviours.motion import Motion
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.trajectories import Trajectory
-from copolicy.evaluate.trajectory_sources import common_rate, read_methods
+from copolicy.evaluate.trajectory_sources import common_rate, read_sources
 from copolicy.tasks.table.agents.route_forces import route_forces
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -194,14 +194,14 @@ def test_the_command_counts_each_robot(study, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["behaviours", f"p={study}", "--out", str(out), "--json"]) == 0
     result = json.loads((out / "behaviours.json").read_text(encoding="utf-8"))
-    assert list(result["methods"]) == ["p-never-yields", "p-passive"]
-    passive = result["methods"]["p-passive"]
+    assert list(result["methods"]) == ["p: never-yields", "p: passive"]
+    passive = result["methods"]["p: passive"]
     assert passive["passivity_robot"]["episodes"]["value"] == 1.0
     assert passive["label"] == "simulated"
-    assert result["methods"]["p-never-yields"]["passivity_robot"]["number"] == 0
+    assert result["methods"]["p: never-yields"]["passivity_robot"]["number"] == 0
     clearest = passive["passivity_robot"]["clearest"]
     assert clearest["partner"] == "stubborn"
-    video = out / "passivity_robot-p-passive.gif"
+    video = out / "passivity_robot-p_passive.gif"
     assert video.read_bytes()[:4] == b"GIF8"
     assert str(out / "behaviours.md") in capsys.readouterr().out
     assert "| passivity_robot |" in (out / "behaviours.md").read_text(encoding="utf-8")
@@ -209,9 +209,9 @@ def test_the_command_counts_each_robot(study, tmp_path, capsys):
 
 
 def test_sources_are_methods_of_one_name_each(study):
-    assert list(read_methods([str(study)])) == ["never-yields", "passive"]
-    assert common_rate(read_methods([str(study)]), 10) == 10
-    with pytest.raises(CopolicyError, match="methods of different names"):
-        read_methods([str(study), str(study)])
-    with pytest.raises(CopolicyError, match="expected a data set, or the folder of a cross-play, found neither"):
-        read_methods([f"a={study.parent}"])
+    _, sources = read_sources([f"p={study}"])
+    assert [source.name for source in sources] == ["p: never-yields", "p: passive"]
+    assert common_rate(sources, 10) == 10
+    assert common_rate(sources, 20) == 15
+    with pytest.raises(CopolicyError, match="expected different names"):
+        read_sources([str(study), str(study)])

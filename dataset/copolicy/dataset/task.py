@@ -46,6 +46,7 @@ from .task_parts import (
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
 from .task_words import TaskWords
+from .trajectory_figures import PublishedFigures, TrajectoryFigures
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -63,6 +64,7 @@ __all__ = [
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "PublishedFigures",
     "PublishedMethod",
     "Rule",
     "Scenario",
@@ -75,6 +77,7 @@ __all__ = [
     "TaskSpec",
     "TaskStatistics",
     "TaskWords",
+    "TrajectoryFigures",
     "Vector",
     "World",
     "get_task",

@@ -9,6 +9,7 @@ import numpy as np
 
 from .arrays import Array
 from .outline import Point, Pose
+from .trajectory_figures import TrajectoryFigures
 
 
 class Scenario(Protocol):
@@ -178,14 +179,15 @@ class Studies:
         definitions: definitions of measures for this task, by their names in results.
         published: published results of the co-planning study, for comparison, in the order of the publication.
         published_source: source of `published` and how it was measured.
-        dissent: levels of the interaction measure above which the players dissent, lowest first; empty if not defined.
         near_miss: distance to an obstacle below which a pass counts as a near miss, in the unit of the outline; None if
             not defined.
+        figures: cell sizes and thresholds of the figures of trajectories; None for cells of 1/100 and 1/24 of the
+            scene's width, without a map of the interaction measure.
     """
 
     step_limit: int | None = None
     near_miss: float | None = None
-    dissent: tuple[float, ...] = ()
+    figures: TrajectoryFigures | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
     published: tuple[PublishedMethod, ...] = ()
     published_source: str = ""

@@ -14,6 +14,7 @@ from .behaviours import add_behaviours_command
 from .comparison import add_compare_command
 from .coplanning_table import add_table_command
 from .cross_play import add_cross_play_command
+from .figures.command import add_figures_command
 from .human_study import add_human_command
 from .partner_study import add_partner_command
 from .partners.command import add_partners_command
@@ -59,6 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_behaviours_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)
+    add_figures_command(commands)
     add_power_command(commands)
     add_table_command(commands)
     return run(parser, argv)

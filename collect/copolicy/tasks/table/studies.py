@@ -5,19 +5,39 @@ from typing import Any
 import numpy as np
 
 from copolicy.dataset.arrays import Array
-from copolicy.dataset.task import Studies
+from copolicy.dataset.task import PublishedFigures, Studies, TrajectoryFigures
 
+from .features import theta_of
+from .interaction import interaction_force
 from .map_config import MapConfig
 from .published import PUBLISHED, SOURCE
 
 _STILL_SPEED, _STILL_SPIN = 6.0, 0.1  # px/s, rad/s
 
 
+def _mirrored_interaction(states: Array, actions: Array) -> Array:
+    return interaction_force(theta_of(states), actions, legacy_axis=True)
+
+
+# The program stores (F_robot - F_human) . e with forces of 50 at full force, which is 100 times our half difference of
+# unit forces; its figure code divides by 101. Demonstrations keep unit forces, which is 2 times our value.
+_PUBLISHED_FIGURES = PublishedFigures(
+    source="the figure code released with the paper (June 2023)",
+    mirrored_interaction=_mirrored_interaction,
+    study_scale=100.0,
+    demonstration_scale=2.0,
+    bins=(25.0, 50.0, 70.0),
+    colour_limit=101.0,
+    visit_limits=(0.01, 800.0),
+    visit_exponent=0.45,
+    obstacle_side=45.0,
+)
+
+
 class TableStudies(Studies):
     """See `Studies`; the step limit is the paper's."""
 
     step_limit = 2000
-    dissent = (0.25, 0.75)  # the paper's thresholds: |(u_robot - u_human) . e| of 0.5 and 1.5 full forces
     near_miss = 10.0  # px; an obstacle is 50 px wide, and 5 % of the simulated pairs' episodes come below 33 px
     definitions = {  # noqa: RUF012 (read only, as the base says)
         "success": "touch the goal",
@@ -30,6 +50,16 @@ class TableStudies(Studies):
         "know every route of the map, which favours any robot",
     }
 
+    # The paper's .25 and .75 are proportions of 101 of the program's unit: |f_unit| of 0.5 and 1.5, where f_unit is the
+    # difference of unit forces along the table. Our measure is half of f_unit.
+    figures = TrajectoryFigures(
+        visit_cell=12.0,
+        interaction_cell=50.0,
+        thresholds=(0.25, 0.75),
+        thresholds_source="the paper's .25 and .75 (differences of 0.5 and 1.5 between unit forces along the table, "
+        "of which our measure is half)",
+        published=_PUBLISHED_FIGURES,
+    )
     published = PUBLISHED
     published_source = SOURCE
 

@@ -14,6 +14,7 @@ from copolicy.dataset.files.staging import replace_json, replace_text, require_n
 
 from ..file_names import file_name
 from ..markdown_table import markdown_table
+from ..trajectory_sources import SOURCE_HELP, common_rate, read_sources
 
 if TYPE_CHECKING:
     from copolicy.dataset.task import PairTask
@@ -42,24 +43,17 @@ def add_behaviours_command(commands: Commands) -> None:
     command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 
 
-SOURCE_HELP = (
-    "a data set, a result or a cross-play folder with --trajectories; several robots of one source are separate methods"
-)
-
-
 def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.out.exists() and not arguments.out.is_dir():
         raise InvalidValueError("--out", "a folder", str(arguments.out))
     files = [arguments.out / name for name in _FILES]
     require_new(*files, overwrite=arguments.overwrite)
-    from ..trajectory_sources import common_rate, read_methods
     from .counts import count, rate_text
     from .definitions import behaviours_of
     from .motion import Motion
 
-    methods = read_methods(arguments.sources)
-    task = next(iter(methods.values())).task
-    fps = common_rate(methods, _LARGEST_RATE)
+    task, sources = read_sources(arguments.sources)
+    fps = common_rate(sources, _LARGEST_RATE)
     chosen = behaviours_of(task)
     counted = [behaviour for behaviour in chosen if not behaviour.missing]
     result: dict[str, Any] = {
@@ -72,9 +66,9 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     }
     arguments.out.mkdir(parents=True, exist_ok=True)
     videos: dict[str, str] = {}
-    for name, method in progress(methods.items(), len(methods), "methods"):
-        motion = Motion(task, method.episodes, fps)
-        entry: dict[str, Any] = {"label": method.label, "episodes": len(method.episodes)}
+    for source in progress(sources, len(sources), "methods"):
+        motion, name = Motion(task, source.episodes, fps), source.name
+        entry: dict[str, Any] = {"label": source.label, "episodes": len(source.episodes)}
         entry["minutes"] = round(float(motion.minutes.sum()), 3)
         for behaviour in counted:
             entry[behaviour.name], events = count(behaviour, motion, arguments.seed)

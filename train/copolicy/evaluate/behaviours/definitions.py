@@ -44,8 +44,8 @@ class Behaviour(NamedTuple):
 def behaviours_of(task: PairTask) -> list[Behaviour]:
     """All behaviours, in the order of tables; those that the task does not define have a `missing` part."""
     robot, human = task.spec.players
-    levels = task.studies.dissent or (math.nan,)
-    measured = "" if task.offers("interaction") and task.studies.dissent else "levels of dissent (`studies.dissent`)"
+    figures = task.studies.figures
+    levels = figures.thresholds if figures is not None and task.offers("interaction") else ()
     undefined = type(task.studies).strategy_actions is Studies.strategy_actions
     no_strategy = "actions of each strategy (`studies.strategy_actions`)" if undefined else ""
     prefer = (
@@ -96,12 +96,12 @@ def behaviours_of(task: PairTask) -> list[Behaviour]:
         ),
         *(
             Behaviour(
-                f"dissent_{level:g}" if level == level else "dissent",
+                f"dissent_{level:g}" if levels else "dissent",
                 f"The interaction measure is at least {level:g} for at least {forces.DISSENT_S:g} s.",
                 functools.partial(forces.dissent, level=level),
                 "shift",
-                measured,
+                "" if levels else "thresholds of its interaction measure (`studies.figures`)",
             )
-            for level in levels
+            for level in levels or (math.nan,)
         ),
     ]
