@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-_BLOCK = re.compile(r"^(?:<!-- ([a-z ]+)(?:: (.*))? -->\n)?```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^(?:<!-- ([a-z ]+)(?:: ([^\n]*))? -->\n)?```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _ELSEWHERE = ("copolicy-quickstart", "pytest")
 """Commands that the continuous integration and `tests/test_quickstart.py` run."""
 

@@ -47,6 +47,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
     "copolicy-eval compare": ("one.json other.json", WORKS),
     "copolicy-eval coplan": ("--policy pretrained --out eval/a.json", "torch"),
     "copolicy-eval cross-play": ("--robots pretrained --partners stubborn --out crossed", "torch"),
+    "copolicy-eval figures": ("one.json --out drawn", "matplotlib"),
     "copolicy-eval human plan": ("A=pretrained B=pretrained --out study/plan.json", WORKS),
     "copolicy-eval human run": ("study/plan.json --participant P01 --human scripted --headless --out seen", "torch"),
     "copolicy-eval human summarise": ("recordings", WORKS),

@@ -12,6 +12,7 @@ from copolicy.collect.agents.checkpoint_folder import pretrained_folder
 from copolicy.collect.cli import main as collect
 from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.cross_play import cells
@@ -203,6 +204,13 @@ def record_pairs(checkpoint, folder, pairs, **more):
     facts = {"repo_id": "lab/a", "content_hash": "x", "pairs": pairs, "sources": ["human"], "people": [], **more}
     (folder / TRAINING_DATA_FILE).write_text(json.dumps(facts), encoding="utf-8")
     return folder
+
+
+def test_two_runs_do_not_share_a_folder(checkpoint, tmp_path, capsys):
+    with FolderLock(tmp_path / ".lock", ""):
+        assert run(checkpoint, tmp_path) == 1
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert line.endswith(f"{tmp_path}: expected a folder in which no other cross-play runs, found one running")
 
 
 def test_common_pairs_are_refused_unless_allowed(checkpoint, tmp_path, capsys):

@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -173,8 +174,8 @@ def drawn(path: Path, colour: str) -> int:
 
 
 def test_the_picture_has_a_colour_for_each_route(left, right, tmp_path):
-    save_chunk_figure(decide(Replayed(left, right)), tmp_path / "both.png", "both")
-    save_chunk_figure(decide(Replayed(left)), tmp_path / "one.png", "one")
+    save_chunk_figure([decide(Replayed(left, right))], [tmp_path / "both.png"], "both")
+    save_chunk_figure([decide(Replayed(left))], [tmp_path / "one.png"], "one")
     both, one = ([drawn(tmp_path / name, colour) for colour in (BLUE, VERMILION)] for name in ("both.png", "one.png"))
     assert min(both) > 100
     assert one[0] > 100
@@ -221,12 +222,26 @@ def test_the_command_counts_routes_and_draws(checkpoint, tmp_path, capsys):
         "routes": {},
         "ended_by": {"timeout": 3},
         "figure": str(out),
+        "svg": str(out.with_suffix(".svg")),
     }
     assert out.read_bytes().startswith(b"\x89PNG")
+    assert ElementTree.parse(out.with_suffix(".svg")).getroot().tag.endswith("svg")
     assert command(checkpoint, out) == 2
     assert capsys.readouterr().err == (
         f"copolicy-eval: {out}: expected a path that does not exist yet, found one; nothing was overwritten\n"
     )
+
+
+def test_several_maps_are_rows_of_one_sheet(checkpoint, tmp_path, capsys):
+    out = tmp_path / "plans.png"
+    assert command(checkpoint, out, "--map", "7", "29", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["maps"] == {name: {"routes": {}, "ended_by": {"timeout": 3}} for name in ("unseen-07", "unseen-29")}
+    assert "map" not in told
+    one = tmp_path / "one.png"
+    assert command(checkpoint, one) == 0
+    heights = [image.imread(path).shape[0] for path in (out, one)]
+    assert heights[0] > 1.7 * heights[1]
 
 
 @pytest.mark.parametrize(

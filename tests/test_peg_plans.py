@@ -43,7 +43,7 @@ def test_plans_are_one_group(peg, tmp_path):
     assert counts["succeeded"] == {"plans": 3, "robot_first_force": [1.0], "human_first_force": [1.0]}
     assert counts["routes"] == "left out: the task 'peg' has no strategy labels"
     assert counts["ended_by"] == {"mark": 3}
-    save_chunk_figure(branch_point, tmp_path / "plans.png", "plans")
+    save_chunk_figure([branch_point], [tmp_path / "plans.png"], "plans")
     assert image.imread(tmp_path / "plans.png").shape[2] >= 3
 
 
@@ -51,7 +51,7 @@ def test_failures_are_drawn_too(peg, tmp_path):
     branch_point = decide(peg, peg.settings_type(step_limit=10))
     assert {sample.route for sample in branch_point.samples} == {None}
     assert _counts(branch_point)["succeeded"] == {"plans": 0}
-    save_chunk_figure(branch_point, tmp_path / "plans.png", "plans")
+    save_chunk_figure([branch_point], [tmp_path / "plans.png"], "plans")
     outcomes = coplan(Pusher(), peg.scenario_sets["right"], peg.settings_type())
     save_path_figure(outcomes, tmp_path / "paths.png", "paths")
     assert (tmp_path / "paths.png").stat().st_size > 1000

@@ -153,3 +153,16 @@ def test_a_human_study_is_planned_run_and_summarised(runs, tmp_path, capsys):
     assert list(result["tests"]) == ["success", "time_s"]
     assert {row["interaction_mean"] for row in result["rows"]} == {None}
     assert all(row["time_s"] == row["steps"] / 20 for row in result["rows"])
+
+
+def test_behaviours_that_the_task_does_not_define_are_left_out_with_their_reason(runs, tmp_path):
+    assert main(["behaviours", str(runs[0].parent / "set"), "--out", str(tmp_path), "--no-videos"]) == 0
+    result = json.loads((tmp_path / "behaviours.json").read_text(encoding="utf-8"))
+    assert set(result["not_counted"]) == {"disagreement", "adaptation", "dissent"}
+    assert result["not_counted"]["dissent"].startswith(
+        "left out: the task 'peg' has no thresholds of its interaction measure"
+    )
+    assert list(result["definitions"]) == ["leadership_switch", "passivity_robot", "passivity_human", "pivot"]
+    (method,) = result["methods"].values()
+    assert method["label"] == "demonstrations, source: simulated"
+    assert method["leadership_switch"]["per_minute"]["null"]["p"] > 0

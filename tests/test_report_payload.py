@@ -1,6 +1,7 @@
 """The data inside the page, and the command that writes it."""
 
 import base64
+import json
 import shutil
 from pathlib import Path
 
@@ -83,3 +84,67 @@ def test_frames_that_contradict_the_metadata_are_refused(report_set, tmp_path):
     path.unlink()
     with pytest.raises(FileFormatError, match=r"data: expected the frames of episode 0, found none"):
         list(read_frames(facts))
+
+
+PNG = base64.b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII=")
+
+
+def figures_folder(folder: Path, task: str = "table", **changes) -> Path:
+    """A folder as `copolicy-eval figures` writes it, of one figure."""
+    folder.mkdir()
+    (folder / "visitation.png").write_bytes(PNG)
+    (folder / "visitation.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>', encoding="utf-8"
+    )
+    figure = {"title": "Visits <b>", "files": ["visitation.png", "visitation.svg"], "definition": "percent & more"}
+    sources = [{"name": "A", "label": "simulated, no person took part", "episodes": 3}]
+    document = {"task": task, "figures": {"visitation": {**figure, **changes}}, "sources": sources}
+    (folder / "figures.json").write_text(json.dumps(document), encoding="utf-8")
+    return folder
+
+
+def test_figures_are_embedded_as_they_are(report_set, tmp_path, visit):
+    folder = figures_folder(tmp_path / "figures")
+    (folder / "plans.png").write_bytes(PNG)
+    out = tmp_path / "page.html"
+    assert main(["report", str(report_set), "--out", str(out), "--figures", str(folder)]) == 0
+    page = visit.open(out)
+    section = page.locator("#figures")
+    assert "A: 3 episodes; simulated, no person took part" in section.inner_text()
+    assert section.locator("figcaption").all_inner_texts() == [
+        "Visits <b>: percent & more",
+        "plans: not described in figures.json",
+    ]
+    images = section.locator("img")
+    sources = [images.nth(index).get_attribute("src") or "" for index in range(images.count())]
+    (first, vector), (second, bitmap) = ((source.partition(";")[0], source.partition(",")[2]) for source in sources)
+    assert (first, second) == ("data:image/svg+xml", "data:image/png")
+    assert base64.b64decode(vector) == (folder / "visitation.svg").read_bytes()
+    assert base64.b64decode(bitmap) == PNG
+    assert all(images.nth(index).evaluate("image => image.naturalWidth > 0") for index in range(2))
+    assert page.locator("#contents a[href='#figures']").inner_text() == "Figures"
+
+
+def test_a_page_without_figures_has_no_section_for_them(report):
+    assert 'id="figures"' not in report.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("task", "changes", "text"),
+    [
+        ("peg", {}, "figures.json: expected figures of the task table, found peg"),
+        ("table", {"files": ["other.png"]}, "expected the SVG or PNG that its figures.json names, found no other.png"),
+        ("table", {"files": ["../page.png"]}, "found no page.png"),
+        ("table", {"title": 3}, "with str at $.figures[...].title, found int"),
+    ],
+)
+def test_a_folder_of_other_figures_is_refused(report_set, tmp_path, capsys, task, changes, text):
+    (tmp_path / "page.png").write_bytes(PNG)
+    folder, out = figures_folder(tmp_path / "figures", task, **changes), tmp_path / "page.html"
+    assert main(["report", str(report_set), "--out", str(out), "--figures", str(folder)]) == 2
+    assert text in capsys.readouterr().err
+    assert not out.exists()
+    assert main(["report", str(report_set), "--out", str(out), "--figures", str(tmp_path / "none")]) == 2
+    assert "expected a folder with the figures.json of copolicy-eval figures, found no such file" in (
+        capsys.readouterr().err
+    )

@@ -28,6 +28,14 @@ def test_settings_of_one_method_for_a_checkpoint_of_another(tmp_path, capsys):
     assert line.endswith("expected a policy with the setting 'sampler', found bc_lstm_gmm without it")
 
 
+def test_plans_need_action_chunks(tmp_path, capsys):
+    run = save_run(tmp_path / "bc", "bc_lstm_gmm")
+    line = _refused(capsys, evaluate, "plans", "--policy", run, "--map", 0, "--out", tmp_path / "plans.png")
+    assert "--policy: expected a policy of action chunks, found" in line
+    assert "which acts frame by frame" in line
+    assert not (tmp_path / "plans.png").exists()
+
+
 def test_a_contradiction_between_settings_of_lerobots_diffusion_has_its_reason(tmp_path, capsys):
     data = (f"--dataset.root={tmp_path}", f"--output_dir={tmp_path / 'out'}")
     line = _refused(capsys, train, "--policy.type=diffusion", "--policy.horizon=12", *data)

@@ -121,6 +121,21 @@ def test_rank_tests_are_recommended_where_residuals_are_not_normal():
     assert analyse(measured(skewed))["recommended"] == "rank tests"
 
 
+def test_the_bootstrap_draws_units_with_all_their_conditions():
+    """The difference within units varies little although units differ much; the order of conditions does not matter."""
+    rng = np.random.default_rng(2)
+    units = rng.normal(scale=10, size=30)
+    values = np.column_stack((units + 1, units + rng.normal(scale=0.5, size=30)))
+    (pair,) = analyse(measured(values))["contrasts"]["robot"]
+    low, high = pair["bootstrap_95"]
+    assert low < pair["difference"] < high
+    assert high - low < 0.6
+    error = np.std(values[:, 0] - values[:, 1], ddof=1) / np.sqrt(30)
+    assert high - low == pytest.approx(2 * 1.96 * error, rel=0.15)
+    (mirrored,) = analyse(measured(values[:, ::-1]))["contrasts"]["robot"]
+    np.testing.assert_allclose(mirrored["bootstrap_95"], [-high, -low], atol=0.02)
+
+
 def test_holm_covers_the_contrasts_of_one_question():
     tests: list[dict | None] = [{"p": 0.01}, None, {"p": 0.04}, {"p": 0.03}]
     holm(tests)

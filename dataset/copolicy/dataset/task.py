@@ -48,6 +48,7 @@ from .task_parts import (
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
 from .task_words import TaskWords
+from .trajectory_figures import PublishedFigures, TrajectoryFigures
 
 if TYPE_CHECKING:
     from .recording.task_messages import TaskMessages
@@ -65,6 +66,7 @@ __all__ = [
     "PairTask",
     "Player",
     "PolicyFeatures",
+    "PublishedFigures",
     "PublishedFront",
     "PublishedMethod",
     "PublishedPeople",
@@ -79,6 +81,7 @@ __all__ = [
     "TaskSpec",
     "TaskStatistics",
     "TaskWords",
+    "TrajectoryFigures",
     "Vector",
     "World",
     "get_task",

@@ -9,6 +9,7 @@ import numpy as np
 
 from .arrays import Array
 from .outline import Point, Pose
+from .trajectory_figures import TrajectoryFigures
 
 
 class Scenario(Protocol):
@@ -213,10 +214,13 @@ class Studies:
             without ends.
         near_miss: distance to an obstacle below which a pass counts as a near miss, in the unit of the outline; None if
             not defined.
+        figures: cell sizes and thresholds of the figures of trajectories; None for cells of 1/100 and 1/24 of the
+            scene's width, without a map of the interaction measure.
     """
 
     step_limit: int | None = None
     near_miss: float | None = None
+    figures: TrajectoryFigures | None = None
     definitions: Mapping[str, str] = MappingProxyType({})
     published: tuple[PublishedMethod, ...] = ()
     published_source: str = ""
@@ -237,6 +241,18 @@ class Studies:
 
     def at_rest(self, recorded: Array) -> Array | None:
         """`(T,)` whether the body is at rest in recorded states `(T, k)`; None if not measured."""
+        return None
+
+    def strategy_actions(self, scenario: Any, states: Array) -> tuple[tuple[str, ...], Array] | None:
+        """The actions with which each player would pursue each strategy, to recognise which one a player prefers.
+
+        Args:
+            states: `(T, n)`.
+
+        Returns:
+            The R strategy labels, see `PairTask.strategy`; `(T, 2, R, m)` actions, robot first, NaN where a strategy is
+            out of reach. None if the task does not define them.
+        """
         return None
 
 

@@ -10,9 +10,11 @@ from copolicy.dataset.command_line.flag_numbers import add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.files.staging import require_new
 
+from .behaviours import add_behaviours_command
 from .comparison import add_compare_command
 from .coplanning_table import add_coplanning_table_command
 from .cross_play import add_cross_play_command
+from .figures.command import add_figures_command
 from .human_study import add_human_command
 from .human_table import add_human_table_command
 from .partner_study import add_partner_command
@@ -60,8 +62,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_cross_play_command(commands)
     add_partners_command(commands)
     add_human_command(commands)
+    add_behaviours_command(commands)
     add_compare_command(commands)
     add_plans_command(commands)
+    add_figures_command(commands)
     add_power_command(commands)
     help = "tables of the paper, from training runs and from recordings with people"
     tables = add_group(commands, "table", help, help, _TABLES)

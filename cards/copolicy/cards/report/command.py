@@ -48,11 +48,18 @@ def add_report_command(commands: Commands) -> None:
         type=Path,
         help=f"output of `copolicy-dataset check --json` (default: {CHECK_FILE} in the data set)",
     )
+    report.add_argument(
+        "--figures",
+        type=Path,
+        metavar="FOLDER",
+        help="also show the figures in a folder of `copolicy-eval figures`, as they are",
+    )
     report.add_argument("--overwrite", action="store_true", help="replace an existing page")
 
 
 def _report(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..facts import DatasetFacts
+    from .figures_section import figures_section
     from .payload import build_payload
 
     path = arguments.out or arguments.root / REPORT_NAME
@@ -63,7 +70,8 @@ def _report(arguments: argparse.Namespace) -> dict[str, Any]:
         raise FileFormatError(arguments.findings, "a file with the output of `copolicy-dataset check --json`", "none")
     statistics = stored_statistics(arguments.root)
     payload = build_payload(facts, arguments.title or arguments.root.resolve().name, findings, statistics)
-    text = render_page(payload)
+    figures = "" if arguments.figures is None else figures_section(arguments.figures, facts.task.spec.name)
+    text = render_page(payload, figures)
     replace_text(path, text)
     return {
         "report": str(path),
@@ -83,8 +91,12 @@ def _findings_status(findings: StoredFindings | None) -> str:
     return f"shown as {findings.validity.state}: {findings.validity.reason}"
 
 
-def render_page(payload: dict[str, Any]) -> str:
-    """Renders the HTML of the page."""
+def render_page(payload: dict[str, Any], figures: str = "") -> str:
+    """Renders the HTML of the page.
+
+    Args:
+        figures: HTML of the section with figures.
+    """
     folder = files(__package__)
     script = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
     # "</" or "<!--" would end the script element: "<" is written as a JSON escape.
@@ -93,6 +105,7 @@ def render_page(payload: dict[str, Any]) -> str:
         "style": f":root {{ {_PALETTE} }}\n{folder.joinpath('report.css').read_text(encoding='utf-8')}",
         "script": f'(() => {{\n"use strict";\n{script}\n}})();',
         "data": data,
+        "figures": figures,
     }
     template = folder.joinpath("template.html").read_text(encoding="utf-8")
     # One pass: inserted text is not substituted again.

@@ -1,6 +1,7 @@
 """Leadership: the player whose action precedes the partner's in cross-correlation, and how often the leader changes."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,14 +24,27 @@ _LEAD = (
 _NULL = f"player 1's actions circularly shifted in time within each episode by at least {MIN_SHIFT_S:g} s"
 
 
-def leaders(data: Trajectories, order: Array | None = None) -> tuple[Array, Array]:
-    """Leader and episode of each window.
+class LeadWindows(NamedTuple):
+    """The windows of all episodes, in order.
+
+    Attributes:
+        start: `(W,)` first frame of each window.
+        episode: `(W,)` episode index.
+        leader: `(W,)` +1 if player 0 leads, -1 if player 1 leads, 0 for none.
+        correlation: `(W,)` largest correlation; 0 if none is positive.
+    """
+
+    start: Array
+    episode: Array
+    leader: Array
+    correlation: Array
+
+
+def lead_windows(data: Trajectories, order: Array | None = None) -> LeadWindows:
+    """Leader of each window.
 
     Args:
         order: `(N,)` frame indices by which player 1's actions are reordered, for the null distribution.
-
-    Returns:
-        `(W,)` +1 if player 0 leads, -1 if player 1 leads, 0 for none; `(W,)` episodes.
     """
     # One contiguous row per axis is faster than sums over an axis of length two.
     first, second = (_centred(data, data.player_force(player)).T.copy() for player in (0, 1))
@@ -41,7 +55,7 @@ def leaders(data: Trajectories, order: Array | None = None) -> tuple[Array, Arra
     inside = (offset >= max_lag) & (offset + window + max_lag <= data.lengths[data.episode])
     starts = np.flatnonzero(inside & ((offset - max_lag) % max(1, round(HOP_S * data.fps)) == 0))
     if not len(starts):
-        return np.zeros(0, dtype=int), data.episode[starts]
+        return LeadWindows(starts, data.episode[starts], np.zeros(0, dtype=int), np.zeros(0))
     first_energy = _window_sums(_sum_rows(first**2), starts, window)
     second_energy_sum = np.concatenate(([0.0], np.cumsum(_sum_rows(second**2), dtype=float)))
     best, lag_of_best = np.zeros(len(starts)), np.zeros(len(starts), dtype=int)
@@ -56,12 +70,13 @@ def leaders(data: Trajectories, order: Array | None = None) -> tuple[Array, Arra
         correlation = np.divide(covariance, scale, out=np.zeros(len(starts)), where=scale > 1e-9)
         improved = correlation > best + 1e-9
         best[improved], lag_of_best[improved] = correlation[improved], lag
-    return np.sign(lag_of_best), data.episode[starts]
+    return LeadWindows(starts, data.episode[starts], np.sign(lag_of_best), best)
 
 
 def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.random.Generator) -> dict[str, Estimate]:
     """Proportion of windows in which player 0 leads, and changes of leader per minute."""
-    leader, episode = leaders(data)
+    windows = lead_windows(data)
+    leader, episode = windows.leader, windows.episode
     axes = data.axes and f"{data.axes} together"
     lead_definition = _LEAD.format(axes=axes)
     leading, decided, switches, minutes = _per_episode(data, leader, episode)
@@ -76,7 +91,8 @@ def leadership_statistics(data: Trajectories, bootstrap: Bootstrap, rng: np.rand
     share_draws, rate_draws = [], []
     for _ in range(SHIFTS):
         order = circular_shift(data.starts, data.lengths, round(MIN_SHIFT_S * data.fps), rng)
-        shifted = _per_episode(data, *leaders(data, order))
+        shifted_windows = lead_windows(data, order)
+        shifted = _per_episode(data, shifted_windows.leader, shifted_windows.episode)
         share_draws.append(shifted[0].sum() / max(shifted[1].sum(), 1))
         rate_draws.append(shifted[2].sum() / shifted[3].sum())
     episodes, counted = int((decided > 0).sum()), {"windows": len(leader), "windows_with_leader": int(decided.sum())}

@@ -1,7 +1,6 @@
 """Runs the cells of a cross-play and stores each in a file, so that a stopped run continues."""
 
 import json
-import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.task import PairTask
 
+from ..file_names import file_name
 from ..partner_study.robots import StudyRobot
 from ..partner_study.study import run_with_partners
 from ..partners.partner import StudyPartner
@@ -72,7 +72,7 @@ def own_kind_robot(partner: StudyPartner, repeats: int) -> StudyRobot:
 
 def cell_file(out: Path, robot: str, partner: str) -> Path:
     """The file of a cell: readable names, and a check sum of the exact ones."""
-    readable = "--".join(re.sub(r"[^A-Za-z0-9._=-]+", "_", name)[:60] for name in (robot, partner))
+    readable = "--".join(file_name(name) for name in (robot, partner))
     return out / _FOLDER / f"{readable}--{zlib.crc32(repr((robot, partner)).encode()):08x}.json"
 
 

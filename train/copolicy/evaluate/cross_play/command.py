@@ -11,12 +11,14 @@ from copolicy.dataset.command_line.commands import Commands, add_command, progre
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import replace_json, replace_text
 from copolicy.dataset.task import PairTask, get_task
 
-from ..partner_study.command import add_overlap_flag, make_robot, partners_label, split_name
+from ..partner_study.command import add_overlap_flag
 from ..partner_study.configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
-from ..partners.names import PARTNERS_HELP, PROXY, PartnerName, parse_partners
+from ..partner_study.robots import make_robot, scripted_robots, split_name
+from ..partners.names import PARTNERS_HELP, PROXY, PartnerName, parse_partners, partners_label
 from ..study_flags import POLICY_HELP, add_study_flags, checkpoint_task, study_needs, study_protocol, study_settings
 from ..trajectories import add_trajectories_flag
 
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from ..study_flags import Protocol
     from .cells import Play
 
+_LOCK = ".lock"
 _NAMES = ("nothing", "passive", "never-yields", "scripted", "random")
 
 
@@ -79,7 +82,6 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     chosen = task.scenario_set(map_set_name(task, arguments.maps, DEFAULT_MAPS))
     scenarios = study_configurations(chosen, arguments.configurations)
     # Imported here so that `--help` and argument errors do not wait for torch.
-    from ..partner_study.robots import scripted_robots
     from ..partners.overlap import check_overlap
     from ..partners.partner import make_partner
     from .cells import Play
@@ -119,7 +121,9 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
         arguments.partner_seed,
         {**shared, "starts_sha256": digest},
     )
-    cells = _run(arguments, play, robots, partners)
+    refusal = f"{arguments.out}: expected a folder in which no other cross-play runs, found one running"
+    with FolderLock(arguments.out / _LOCK, refusal):
+        cells = _run(arguments, play, robots, partners)
     floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
     result = matrix_result(task, settings, robots, partners, cells, floor_names)
     result = {"study": "cross-play", "label": partners_label(named, task), **result}

@@ -68,7 +68,7 @@ def add_plan(steps: Commands) -> None:
 
 
 def _plan(arguments: argparse.Namespace) -> dict[str, Any]:
-    from ..partner_study.command import split_name
+    from ..partner_study.robots import split_name
     from .design import make_plan, williams_square
     from .plan import Robot
 

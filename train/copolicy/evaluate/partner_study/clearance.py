@@ -1,5 +1,6 @@
 """Distance between the moving body and the obstacles, from the outline of a task."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,11 @@ def smallest_distance(task: PairTask, scenario: Any, states: Array) -> float | N
     Returns:
         None if the task has no outline or the scenario no obstacle.
     """
-    if task.outline is None:
-        return None
-    obstacles = [np.array(shape.corners) for shape in task.outline.fixed(scenario) if shape.role == "obstacle"]
+    obstacles = _obstacles(task, scenario)
     if not obstacles:
         return None
-    poses = task.outline.poses(states)
-    bodies = [np.array(shape.corners) for shape in task.outline.body]
+    poses = task.required_outline.poses(states)
+    bodies = [np.array(shape.corners) for shape in task.required_outline.body]
     reach = max(float(np.hypot(*body.T).max()) for body in bodies)
     nearest = np.inf
     for obstacle in obstacles:
@@ -33,14 +32,36 @@ def smallest_distance(task: PairTask, scenario: Any, states: Array) -> float | N
         apart = np.hypot(*(poses[:, :2] - centre).T)
         # A pose farther away than this cannot be the nearest one.
         close = poses[apart - reach - radius <= min(nearest, float(apart.min()))]
-        for first in range(0, len(close), _CHUNK):
-            part = close[first : first + _CHUNK]
-            for body in bodies:
-                corners = _placed(body, part)
-                fixed = np.broadcast_to(obstacle, (len(part), *obstacle.shape))
-                distance = np.minimum(_to_polygon(corners, fixed), _to_polygon(fixed, corners))
-                nearest = min(nearest, float(distance.min()))
+        nearest = min(nearest, float(_distances(bodies, obstacle, close).min(initial=np.inf)))
     return nearest
+
+
+def distances(task: PairTask, scenario: Any, states: Array) -> Array | None:
+    """`(T,)` distance of the body to the nearest obstacle in states `(T, n)`, as in `smallest_distance`."""
+    obstacles = _obstacles(task, scenario)
+    if not obstacles:
+        return None
+    poses = task.required_outline.poses(states)
+    bodies = [np.array(shape.corners) for shape in task.required_outline.body]
+    return np.min([_distances(bodies, obstacle, poses) for obstacle in obstacles], axis=0)
+
+
+def _obstacles(task: PairTask, scenario: Any) -> list[Array]:
+    shapes = () if task.outline is None else task.outline.fixed(scenario)
+    return [np.array(shape.corners) for shape in shapes if shape.role == "obstacle"]
+
+
+def _distances(bodies: Sequence[Array], obstacle: Array, poses: Array) -> Array:
+    """`(T,)` distance of the nearest of the bodies at poses `(T, 3)` to an obstacle."""
+    found = np.full(len(poses), np.inf)
+    for first in range(0, len(poses), _CHUNK):
+        part = poses[first : first + _CHUNK]
+        for body in bodies:
+            corners = _placed(body, part)
+            fixed = np.broadcast_to(obstacle, (len(part), *obstacle.shape))
+            distance = np.minimum(_to_polygon(corners, fixed), _to_polygon(fixed, corners))
+            np.minimum(found[first : first + _CHUNK], distance, out=found[first : first + _CHUNK])
+    return found
 
 
 def _placed(body: Array, poses: Array) -> Array:

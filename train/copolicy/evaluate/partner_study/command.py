@@ -1,8 +1,8 @@
 """`copolicy-eval partner`."""
 
 import argparse
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,29 +12,25 @@ from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_n
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, require_new
-from copolicy.dataset.task import PairTask, get_task
+from copolicy.dataset.task import get_task
 
-from ..partners.names import HUMAN_LIKE, PARTNERS_HELP, PROXY, REPLAY, SCRIPTED, PartnerName, parse_partners
+from ..partners.names import PARTNERS_HELP, PROXY, SCRIPTED, parse_partners, partners_label
 from ..study_flags import (
     POLICY_HELP,
     add_study_flags,
     checkpoint_task,
     figure_beside,
     study_needs,
-    study_policy,
     study_protocol,
     study_settings,
 )
 from ..summary import not_measured, percent
 from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
+from .robots import make_robot, scripted_robots, split_name
 
 if TYPE_CHECKING:
     from ..partners.partner import StudyPartner
-    from .robots import StudyRobot
-
-_LABEL = "human-in-the-loop protocol with SIMULATED partners: "
-_PARTNERS = "scripted players sit at the human seat, no person took part"
 
 
 def add_partner_command(commands: Commands) -> None:
@@ -98,7 +94,6 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partners.overlap import check_overlap
     from ..partners.partner import make_partner
     from .figure import save_partner_figure
-    from .robots import scripted_robots
     from .study import run_with_partners
     from .summary import definitions, differences, summarise_with_partners
 
@@ -196,48 +191,10 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def partners_label(partners: Sequence[PartnerName], task: PairTask) -> str:
-    """Says who sat at the human's seat."""
-    if all(partner.kind == SCRIPTED and not partner.options for partner in partners):
-        return _LABEL + task.studies.definitions.get("partners", _PARTNERS)
-    texts = {
-        PROXY: "policies",
-        SCRIPTED: "scripted players",
-        HUMAN_LIKE: "scripted players with people's delay",
-        REPLAY: "recorded human actions without feedback",
-    }
-    kinds = [text for kind, text in texts.items() if any(partner.kind == kind for partner in partners)]
-    return f"{_LABEL}{', '.join(kinds)} sit at the human seat, no person took part in the study"
-
-
 def _described(partner: "StudyPartner", profiles: Mapping[str, Any]) -> Mapping[str, Any]:
     described = dict(partner.describe())
     plain = described.get("kind") == SCRIPTED and partner.name in profiles
     return asdict(profiles[partner.name]) if plain else described
-
-
-def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "StudyRobot"]) -> "StudyRobot":
-    """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
-
-    Raises:
-        FileFormatError: the checkpoint does not exist.
-        InvalidValueError: its chunks have fewer actions than are to be executed.
-    """
-    from .robots import NOTHING, PASSIVE, policy_robot
-
-    if text in scripted:
-        return scripted[text]
-    if text == NOTHING:
-        return replace(scripted[PASSIVE], name=NOTHING)
-    name, path = split_name(text)
-    policy = study_policy(path, arguments)
-    return policy_robot(name or policy.name, policy)
-
-
-def split_name(text: str) -> tuple[str, str]:
-    """Splits `NAME=PATH`; the name is empty if there is none (a path may contain `=` after a slash)."""
-    name, sign, path = text.partition("=")
-    return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)
 
 
 def _report(summary: dict) -> dict[str, Any]:

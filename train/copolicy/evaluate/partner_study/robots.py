@@ -1,7 +1,9 @@
 """Agents at the robot's seat in a study: a policy, or one of the scripted baselines."""
 
+import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +12,8 @@ from copolicy.collect.agents import ConstantAgent, PolicyAgent, RandomAgent, Scr
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.rollout import Agent, EpisodeStart
 from copolicy.dataset.task import PairTask, Player, get_task
+
+from ..study_flags import study_policy
 
 if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
@@ -77,3 +81,25 @@ def _scripted(task: PairTask, name: str) -> StudyRobot:
         return ScriptedAgent(name, make)
 
     return StudyRobot(name, agent, lambda: {"type": "scripted", "description": description, "habits": asdict(profile)})
+
+
+def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, StudyRobot]) -> StudyRobot:
+    """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
+
+    Raises:
+        FileFormatError: the checkpoint does not exist.
+        InvalidValueError: its chunks have fewer actions than are to be executed.
+    """
+    if text in scripted:
+        return scripted[text]
+    if text == NOTHING:
+        return replace(scripted[PASSIVE], name=NOTHING)
+    name, path = split_name(text)
+    policy = study_policy(path, arguments)
+    return policy_robot(name or policy.name, policy)
+
+
+def split_name(text: str) -> tuple[str, str]:
+    """Splits `NAME=PATH`; the name is empty if there is none (a path may contain `=` after a slash)."""
+    name, sign, path = text.partition("=")
+    return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)

@@ -13,7 +13,7 @@ again.
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,9 @@ from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.task import PairTask
 
 from .population import CHOOSING, DOCUMENT, REPORTING, PopulationDocument
+
+_LABEL = "human-in-the-loop protocol with SIMULATED partners: "
+_PARTNERS = "scripted players sit at the human seat, no person took part"
 
 PROXY, SCRIPTED, HUMAN_LIKE, REPLAY = "proxy", "scripted", "human-like", "replay"
 POPULATION = "population"
@@ -144,3 +147,17 @@ def _options(text: str) -> tuple[str, dict[str, float]]:
 def _default_name(kind: str, detail: str, options: dict[str, float]) -> str:
     base = detail if kind == SCRIPTED else HUMAN_LIKE if kind == HUMAN_LIKE else f"{kind}:{Path(detail).name}"
     return base + "".join(f",{name}={value:g}" for name, value in options.items())
+
+
+def partners_label(partners: Sequence[PartnerName], task: PairTask) -> str:
+    """Says who sat at the human's seat."""
+    if all(partner.kind == SCRIPTED and not partner.options for partner in partners):
+        return _LABEL + task.studies.definitions.get("partners", _PARTNERS)
+    texts = {
+        PROXY: "policies",
+        SCRIPTED: "scripted players",
+        HUMAN_LIKE: "scripted players with people's delay",
+        REPLAY: "recorded human actions without feedback",
+    }
+    kinds = [text for kind, text in texts.items() if any(partner.kind == kind for partner in partners)]
+    return f"{_LABEL}{', '.join(kinds)} sit at the human seat, no person took part in the study"

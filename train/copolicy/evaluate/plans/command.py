@@ -36,9 +36,10 @@ def add_plans_command(commands: Commands) -> None:
     command.add_argument(
         "--map",
         required=True,
+        nargs="+",
         type=whole_number("--map", None),
         metavar="INDEX",
-        help="index of the map in the set, from 0",
+        help="index of the map in the set, from 0; several maps become the rows of one sheet",
     )
     samples = whole_number("--samples", 1, 10_000)
     command.add_argument("--samples", type=samples, default=64, help="number of action chunks (default: 64)")
@@ -48,19 +49,21 @@ def add_plans_command(commands: Commands) -> None:
         default=0.0,
         help="time of the state in an episode of the policy, s (default: 0)",
     )
-    command.add_argument("--out", required=True, type=Path, help="figure to write, a PNG")
+    command.add_argument("--out", required=True, type=Path, help="figure to write, a PNG; an SVG is written beside it")
     add_study_flags(command, n_action_steps=8)
 
 
 def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.out.suffix.lower() != ".png":
         raise InvalidValueError(str(arguments.out), "a name that ends with .png", arguments.out.suffix)
-    require_new(arguments.out, overwrite=arguments.overwrite)
+    svg = arguments.out.with_suffix(".svg")
+    require_new(arguments.out, svg, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     scenarios = chosen.scenarios
-    if not 0 <= arguments.map < len(scenarios):
-        raise InvalidValueError("--map", f"0 to {len(scenarios) - 1}", arguments.map)
+    for index in arguments.map:
+        if not 0 <= index < len(scenarios):
+            raise InvalidValueError("--map", f"0 to {len(scenarios) - 1}", index)
     if not (math.isfinite(arguments.seconds) and arguments.seconds >= 0):
         raise InvalidValueError("--seconds", "a number of at least 0", arguments.seconds)
     # Imported here so that `--help` and argument errors do not wait for torch.
@@ -69,34 +72,41 @@ def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
 
     policy = study_policy(arguments.policy, arguments)
     protocol = study_protocol(arguments, [(str(arguments.policy), policy.conditions)])
-    branch_point = sample_chunks(
-        policy,
-        scenarios[arguments.map],
-        protocol.settings,
-        samples=arguments.samples,
-        seconds=arguments.seconds,
-        fps=protocol.fps,
-        seed=arguments.seed,
-    )
-    map_id = task.identify(branch_point.scenario)[0]
-    seconds = (len(branch_point.approach) - 1) / task.spec.record_hz
+    branch_points = [
+        sample_chunks(
+            policy,
+            scenarios[index],
+            protocol.settings,
+            samples=arguments.samples,
+            seconds=arguments.seconds,
+            fps=protocol.fps,
+            seed=arguments.seed,
+        )
+        for index in arguments.map
+    ]
+    names = [task.identify(branch_point.scenario)[0] for branch_point in branch_points]
+    seconds = (len(branch_points[0].approach) - 1) / task.spec.record_hz
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    many = f" of each of {len(names)} {task.words.scenarios}"
+    of_maps = f": {task.words.scenario} {names[0]}" if len(names) == 1 else many
     save_chunk_figure(
-        branch_point,
-        arguments.out,
-        f"{len(branch_point.samples)} action chunks of one policy for both players, sampled in one state: "
-        f"{task.words.scenario} {map_id}, {seconds:g} s after the start, in simulation",
+        branch_points,
+        [arguments.out, svg],
+        f"{arguments.samples} action chunks of one policy for both players, sampled in one state"
+        f"{of_maps}, {seconds:g} s after the start, in simulation",
     )
+    counts = {name: _counts(branch_point) for name, branch_point in zip(names, branch_points, strict=True)}
     return {
-        "map": map_id,
+        **({"map": names[0]} if len(names) == 1 else {}),
         **({"map_set": chosen.describe()} if chosen.from_file else {}),
         "seconds": seconds,
-        "samples": len(branch_point.samples),
+        "samples": arguments.samples,
         "fps": protocol.fps,
         **({LIMIT_SETTING: limit} if (limit := angular_limit_of(protocol.settings)) is not None else {}),
         **({"told_otherwise": list(protocol.contradictions)} if protocol.contradictions else {}),
-        **_counts(branch_point),
+        **(counts[names[0]] if len(names) == 1 else {"maps": counts}),
         "figure": str(arguments.out),
+        "svg": str(svg),
     }
 
 

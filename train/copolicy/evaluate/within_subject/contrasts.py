@@ -11,6 +11,9 @@ from copolicy.dataset.arrays import Array
 
 from .measurements import Measurements
 
+REPLICATES = 9_999
+"""Bootstrap replicates of a difference."""
+
 
 def contrasts(measurements: Measurements) -> dict[str, list[dict[str, Any]]]:
     """All contrasts of each question; Holm's correction covers the contrasts of one question.
@@ -78,12 +81,12 @@ def _pairs(values: Array, names: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _paired(first: Array, second: Array) -> dict[str, Any]:
-    """Difference of two conditions with paired t test, Wilcoxon's test and Hedges' g (pooled standard deviation)."""
+    """Difference of two conditions with paired t test, Wilcoxon's test, bootstrap and Hedges' g (pooled deviation)."""
     difference = first - second
     n = len(difference)
-    result: dict[str, Any] = {"difference": float(difference.mean()), "paired_t": None, "wilcoxon": None}
+    result: dict[str, Any] = {"difference": float(difference.mean())}
     if n < 2 or np.ptp(difference) < 1e-12:
-        return {**result, "hedges_g": None}
+        return {**result, "paired_t": None, "wilcoxon": None, "bootstrap_95": None, "hedges_g": None}
     test = stats.ttest_rel(first, second)
     low, high = test.confidence_interval(0.95)  # pyright: ignore[reportAttributeAccessIssue]
     result["paired_t"] = {
@@ -94,6 +97,8 @@ def _paired(first: Array, second: Array) -> dict[str, Any]:
     }
     rank = stats.wilcoxon(difference, zero_method="zsplit")
     result["wilcoxon"] = {"statistic": float(rank.statistic), "p": float(rank.pvalue)}  # pyright: ignore
+    draws = stats.bootstrap((difference,), np.mean, n_resamples=REPLICATES, method="BCa", rng=np.random.default_rng(0))
+    result["bootstrap_95"] = [float(bound) for bound in draws.confidence_interval]
     pooled = float(np.sqrt((first.var(ddof=1) + second.var(ddof=1)) / 2))
     correction = 1 - 3 / (4 * (2 * n - 2) - 1)
     return {**result, "hedges_g": float(difference.mean() / pooled * correction) if pooled > 0 else None}

@@ -13,11 +13,25 @@ from .cost_to_go import Route, routes
 from .profiles import PlayerProfile
 
 _DISAGREE = 0.25  # of a full force: how much better another route must explain the partner's force
-_DETOUR = 250.0  # px: a route that is longer than the shortest one by more is given up at once
 _PATIENCE_GROWTH = 1.5  # factor on the patience after each change of route
 _EXCLUDED = 1000.0  # px: a route that is longer than the best one by more is never chosen at the start
 _SMOOTHING_S = 0.4  # s, time constant of the estimated force
 _STILL = 6.0  # px/s: below this speed the table counts as still
+
+DETOUR = 250.0
+"""A route that is longer than the shortest one by more is given up at once, px."""
+
+
+def heading(route: Route, pose: tuple[float, float, float], goal: tuple[float, float]) -> tuple[float, float, float]:
+    """Displacement from a pose to the next target pose of a route: x, y (px) and turn (rad)."""
+    x, y, theta = pose
+    cell = grid.cell(x, y, theta)
+    ahead = int(route.ahead[cell])
+    if ahead == cell:
+        return goal[0] - x, goal[1] - y, 0.0
+    ahead_x, ahead_y, ahead_theta = grid.pose(ahead)
+    turn = (ahead_theta - theta + math.pi / 2) % math.pi - math.pi / 2  # either end may lead
+    return ahead_x - x, ahead_y - y, turn
 
 
 class PartnerForce:
@@ -75,21 +89,14 @@ class RouteChoice:
         self._patience = self._draw_patience()
 
     def heading(self, route: Route, pose: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Displacement from a pose to the next target pose of a route: x, y (px) and turn (rad)."""
-        x, y, theta = pose
-        cell = grid.cell(x, y, theta)
-        ahead = int(route.ahead[cell])
-        if ahead == cell:
-            return self._goal[0] - x, self._goal[1] - y, 0.0
-        ahead_x, ahead_y, ahead_theta = grid.pose(ahead)
-        turn = (ahead_theta - theta + math.pi / 2) % math.pi - math.pi / 2  # either end may lead
-        return ahead_x - x, ahead_y - y, turn
+        """See `heading`."""
+        return heading(route, pose, self._goal)
 
     def update(self, pose: tuple[float, float, float], speed: float, force: PartnerForce) -> None:
         """Keeps or changes the route, by pose (px, px, rad), speed (px/s) and the partner's force; once a step."""
         cell = grid.cell(*pose)
         shortest = min(self._routes, key=lambda route: route.cost[cell])
-        limit = shortest.cost[cell] + _DETOUR
+        limit = shortest.cost[cell] + DETOUR
         if self.route.cost[cell] > limit:
             self._change(shortest)
             return

@@ -16,10 +16,15 @@ from .profiles import PlayerProfile
 from .route_choice import PartnerForce, RouteChoice
 
 _GAIN = 2.0  # 1/s, gain on the error of the table's velocity
-_TURN_GAIN = 1.5  # 1/s, gain on the error of the table's orientation
-_MAX_SPIN = 0.6  # rad/s, bound on the target spin
+TURN_GAIN = 1.5  # 1/s, gain on the error of the table's orientation
+MAX_SPIN = 0.6  # rad/s, bound on the target spin
 _SMOOTH_S = 0.2  # s, time constant of the target velocity
 _SLOW = 40.0  # px to the target pose below which the target speed falls
+
+
+def spin_per_force(physics: Physics) -> float:
+    """Steady spin under a unit difference of the two forces across the table, rad/s."""
+    return physics.lever / 2 * physics.force_scale / physics.angular_damping
 
 
 class ScriptedPlayer:
@@ -53,8 +58,7 @@ class ScriptedPlayer:
         self._smoothing = 1 - math.exp(-1 / (RECORD_HZ * _SMOOTH_S))
         self._damping = physics.linear_damping / physics.mass
         self._push = physics.force_scale / physics.mass
-        # Steady spin under a unit difference of the two forces across the table, rad/s.
-        self._spin = physics.lever / 2 * physics.force_scale / physics.angular_damping
+        self._spin = spin_per_force(physics)
 
     @property
     def changes(self) -> int:
@@ -83,7 +87,7 @@ class ScriptedPlayer:
         dx, dy, turn = self.route_choice.heading(self.route_choice.route, pose)
         distance = math.hypot(dx, dy)
         speed = self.profile.speed * min(1.0, distance / _SLOW)
-        spin = min(_MAX_SPIN, max(-_MAX_SPIN, _TURN_GAIN * turn))
+        spin = min(MAX_SPIN, max(-MAX_SPIN, TURN_GAIN * turn))
         target = (dx / (distance + 1e-9) * speed, dy / (distance + 1e-9) * speed, spin)
         target_vx, target_vy, target_spin = self._target = tuple(
             old + self._smoothing * (new - old) for old, new in zip(self._target, target, strict=True)

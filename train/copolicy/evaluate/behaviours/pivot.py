@@ -1,0 +1,63 @@
+"""Pivoting around an obstacle: the body turns about one of its ends beside an obstacle."""
+
+import math
+
+import numpy as np
+
+from copolicy.dataset.arrays import Array
+
+from ..partner_study.clearance import distances
+from .motion import Event, Motion
+
+SPIN = 0.3
+"""Slowest turn, rad/s."""
+
+HAND_SPEEDS = 0.4
+"""Largest ratio of the speeds of the two ends."""
+
+TURN = math.radians(30)
+"""Smallest angle of a pivot, rad."""
+
+
+def pivots(motion: Motion, obstacles: Array | None) -> list[Event]:
+    """Turns about one end within half the distance of both ends from an obstacle; the score is the angle, rad.
+
+    Args:
+        obstacles: `(E,)` indices of the episodes whose obstacles replace those of each episode, for the null
+            distribution.
+    """
+    data, outline = motion.frames, motion.task.required_outline
+    near = math.dist(*outline.hands) / 2
+    events = []
+    for index, (start, end) in enumerate(zip(data.starts, data.ends, strict=True)):
+        if end - start < 3:
+            continue
+        states = data.states[start:end]
+        poses = outline.poses(states)
+        theta = np.unwrap(poses[:, 2])
+        spin = np.gradient(theta) * data.fps
+        ends = np.array([_placed(hand, poses) for hand in outline.hands])  # (2, T, 2)
+        slow, fast = np.sort(np.linalg.norm(np.gradient(ends, axis=1), axis=-1), axis=0)
+        turning = (np.abs(spin) >= SPIN) & (slow <= HAND_SPEEDS * fast)
+        if not turning.any():
+            continue
+        scenario = data.rows[index if obstacles is None else int(obstacles[index])].scenario
+        distance = np.full(len(states), np.inf)
+        found = distances(motion.task, scenario, states[turning])
+        if found is not None:
+            distance[turning] = found
+        flags = np.zeros(len(data.states), bool)
+        flags[start:end] = turning & (distance <= near)
+        for _, first, last in motion.runs(flags, 2 / data.fps):
+            angle = abs(float(theta[last - 1] - theta[first]))
+            if angle >= TURN:
+                events.append(Event(index, first, last, angle, {"turn": f"{math.degrees(angle):.0f} deg"}))
+    return events
+
+
+def _placed(point: tuple[float, float], poses: Array) -> Array:
+    """Scene coordinates `(T, 2)` of a point of the body at poses `(T, 3)`, see `outline.to_scene`."""
+    x, y, theta = poses.T
+    u, v = point
+    cos, sin = np.cos(theta), np.sin(theta)
+    return np.column_stack((x + u * cos + v * sin, y - u * sin + v * cos))
