@@ -83,6 +83,11 @@ def test_a_command_is_taken_from_its_block_as_people_type_it():
     assert play.split() == "copolicy-collect play --players scripted scripted --headless --episodes 1".split()
 
 
+def test_the_comment_of_a_block_ends_with_its_line():
+    text = "<!-- not run: people -->\n```bash\na\n```\n<!-- file: b.json -->\n```json\n{}\n```\n"
+    assert [(block.kind, block.detail) for block in blocks(text)] == [("not run", "people"), ("file", "b.json")]
+
+
 def test_the_guide_to_the_format_names_everything_that_is_stored():
     messages = messages_of(get_task())
     names = {topic.name for topic in messages.topics} - {"/scene/solid/obstacle_1", "/scene/solid/obstacle_2"}

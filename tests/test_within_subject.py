@@ -106,6 +106,8 @@ def test_two_conditions_are_a_paired_t_test():
 def test_what_cannot_be_tested_is_not():
     assert analysis_of_variance(measured(VALUES[:1])) is None
     assert analysis_of_variance(measured(np.ones((4, 3)))) is None
+    rounded = np.where(np.random.default_rng(0).random((4, 3)) < 0.5, np.nextafter(0.1, 1), 0.1)
+    assert analysis_of_variance(measured(rounded)) is None  # equal but for rounding
     assert analysis_of_variance(measured(np.arange(4.0)[:, None] + [[0.0, 1, 2]])) is None  # the same for everybody
     assert tukey(np.ones((4, 2)), "ab")[0] == {"first": "a", "second": "b", "difference": 0.0, "tukey": None}
     assert rank_test(np.ones((4, 3))) is None
