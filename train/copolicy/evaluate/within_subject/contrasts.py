@@ -66,9 +66,9 @@ def holm(tests: Sequence[dict[str, Any] | None]) -> None:
     found = [test for test in tests if test is not None]
     if not found:
         return
-    from statsmodels.stats.multitest import multipletests  # takes a second to import
+    from pingouin import multicomp  # takes seconds to import
 
-    adjusted: Any = multipletests([test["p"] for test in found], method="holm")[1]
+    adjusted: Any = multicomp([test["p"] for test in found], method="holm")[1]
     for test, p in zip(found, adjusted, strict=True):
         test["p_holm"] = float(p)
 
