@@ -4,12 +4,15 @@ Fixtures import their builders when they are asked for: torch, LeRobot and Playw
 """
 
 import functools
+import inspect
 import logging
 import os
 import shutil
 import signal
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -66,14 +69,33 @@ def _private_home(tmp_path_factory):
 
 @pytest.fixture(autouse=True, scope="session")
 def _settings_described_once():
-    """LeRobot's parser reads the sources of all settings for their help, a second of work at every call."""
+    """LeRobot's parser reads the sources and signatures of all settings for their help, a second of work a call."""
     if "draccus" not in sys.modules:  # collecting has imported it where a test is about training
         yield
         return
-    from draccus.wrappers import docstring
+    from draccus.wrappers import docstring, field_wrapper
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(docstring, "get_attribute_docstring", functools.cache(docstring.get_attribute_docstring))
+        signatures = SimpleNamespace(getfullargspec=functools.cache(inspect.getfullargspec))
+        patch.setattr(field_wrapper, "inspect", signatures)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _columns_decoded_once():
+    """`datasets` looks at all columns whenever one is set, half a second for the 300 of a table of episodes."""
+    if "datasets" not in sys.modules:
+        yield
+        return
+    from datasets.features import features
+
+    def set_column(self: Any, column: str, feature: Any) -> None:
+        dict.__setitem__(self, column, feature)
+        self._column_requires_decoding[column] = features.require_decoding(feature)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(features.Features, "__setitem__", set_column)
         yield
 
 

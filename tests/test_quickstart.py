@@ -1,21 +1,14 @@
 """The whole chain, small: from simulated pairs as a user types it, from the original program's files in one process."""
 
-import contextlib
 import json
 import os
 import subprocess
 import sysconfig
-from importlib.metadata import entry_points
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO
-from unittest.mock import patch
 
-import pytest
-from training_table import new_accelerate
+from commands_here import commands_here
 
 from copolicy.cards.facts import DatasetFacts
-from copolicy.train import quickstart_chain
 from copolicy.train.quickstart import main
 
 SMALL = ("--steps", "20", "--limit", "3", "--workers", "2")
@@ -30,34 +23,6 @@ def _quickstart(out: Path, *flags: str) -> tuple[dict, str]:
     )
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout), done.stderr
-
-
-class CommandHere:
-    """Stands for the process of a command: its entry point is called in this one, which has imported LeRobot."""
-
-    def __init__(self, command: list[str], env: dict[str, str], stdin: int, stdout: IO[str], stderr: IO[str]):
-        (entry,) = entry_points(group="console_scripts", name=Path(command[0]).name)
-        with patch.dict(os.environ, env), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
-            self.status = entry.load()(command[1:])
-        stdout.flush()
-
-    def __enter__(self) -> "CommandHere":
-        return self
-
-    def __exit__(self, *_) -> None:
-        pass
-
-    def wait(self, timeout: float | None = None) -> int:
-        return self.status
-
-
-@pytest.fixture
-def commands_here(monkeypatch):
-    """The chain without a process a command: the test of the other chain starts them."""
-    here = SimpleNamespace(Popen=CommandHere, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
-    monkeypatch.setattr(quickstart_chain, "subprocess", here)
-    with new_accelerate():
-        yield
 
 
 def _check(out: Path, summary: dict, maps: int) -> None:
@@ -97,11 +62,12 @@ def test_the_chain_from_simulated_pairs(tmp_path):
         assert command.removeprefix("uv run ").split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
 
 
-def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream, commands_here, capsys):
+def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream, capsys):
     out = tmp_path / "out"
     # The store, because its converter took the map of episode 11 for episode 1.
     store = upstream / "examples_scripted" / "table_10Hz.zarr"
-    assert main(["--json", "--out", str(out), *SMALLEST, "--upstream", str(store)]) == 0
+    with commands_here():
+        assert main(["--json", "--out", str(out), *SMALLEST, "--upstream", str(store)]) == 0
     printed = capsys.readouterr()
     summary, said = json.loads(printed.out), printed.err
     _check(out, summary, 1)
