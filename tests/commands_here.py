@@ -1,12 +1,13 @@
-"""The chain of `run_chain` without a process a command; tests/test_quickstart.py has one chain that starts them."""
+"""The chain of `run_chain` in less time: its commands in this process, or in processes that have imported LeRobot."""
 
 import contextlib
 import os
 import subprocess
+from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import SimpleNamespace
-from typing import IO
+from typing import IO, Any
 from unittest.mock import patch
 
 import pytest
@@ -35,9 +36,26 @@ class CommandHere:
 
 
 @contextlib.contextmanager
-def commands_here():
+def commands_here() -> Iterator[None]:
     """Chains run their commands in this process until the end of the block."""
-    here = SimpleNamespace(Popen=CommandHere, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
-    with pytest.MonkeyPatch.context() as patch_chain, new_accelerate():
-        patch_chain.setattr(quickstart_chain, "subprocess", here)
+    with _starting(CommandHere), new_accelerate():
+        yield
+
+
+@contextlib.contextmanager
+def commands_in(python: list[str]) -> Iterator[None]:
+    """Chains run each command in a process of its own, by this Python instead of that of its first line."""
+
+    def start(command: list[str], **settings: Any) -> subprocess.Popen:
+        return subprocess.Popen([*python, *command], **settings)
+
+    with _starting(start):
+        yield
+
+
+@contextlib.contextmanager
+def _starting(start: Callable[..., Any]) -> Iterator[None]:
+    replaced = SimpleNamespace(Popen=start, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
+    with pytest.MonkeyPatch.context() as patch_chain:
+        patch_chain.setattr(quickstart_chain, "subprocess", replaced)
         yield

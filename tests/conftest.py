@@ -99,6 +99,21 @@ def _columns_decoded_once():
         yield
 
 
+@pytest.fixture(scope="session")
+def warm_python(tmp_path_factory) -> list[str]:
+    """The start of a command line of a new Python process that has imported LeRobot already, see `warm_python.py`."""
+    if not sys.platform.startswith("linux"):
+        return [sys.executable]
+    from filelock import FileLock
+    from warm_python import warm_python
+
+    in_worker = "PYTEST_XDIST_WORKER" in os.environ
+    folder = tmp_path_factory.getbasetemp()
+    folder, run = (folder.parent, os.getppid()) if in_worker else (folder, os.getpid())
+    with FileLock(folder / "importer.lock"):
+        return warm_python(folder, run)
+
+
 @pytest.fixture(autouse=True)
 def _logging_as_found():
     """LeRobot's training opens the root logger for the whole process, here or in a fixture of a wider scope."""

@@ -53,7 +53,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
     "copolicy-eval partner": ("pretrained --out eval/b.json", "torch"),
     "copolicy-eval partners make": ("--out partners", "lerobot"),
     "copolicy-eval plans": ("--policy pretrained --map 0 --out eval/plans.png", "torch"),
-    "copolicy-eval power": ("--robots 5 --effect 0.14", "pingouin"),
+    "copolicy-eval power": ("--robots 5 --effect 0.14", WORKS),
     "copolicy-eval table coplanning": ("--runs pretrained --out table", "torch"),
     "copolicy-quickstart": ("--out quick", "lerobot"),
     "copolicy-train export": ("pretrained --out exported", "torch"),
@@ -62,6 +62,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
 MORE: list[tuple[str, str | None]] = [
     ("copolicy-train --dataset.root=set --steps=1 --output_dir=trained", "lerobot"),
     ("copolicy-dataset check recordings", WORKS),
+    ("copolicy-eval compare --measurements trials.csv --factors robot", WORKS),
     ("copolicy-dataset check --rules", WORKS),
     ("copolicy-convert mcap recordings --out new --repo-id lab/table --video", "lerobot"),
     ("copolicy-quickstart --out quick --upstream recordings", "lerobot"),

@@ -6,7 +6,7 @@ from ..exceptions import MissingExtraError
 
 _TRAIN = (
     "accelerate", "av", "datasets", "diffusers", "gymnasium", "h5py", "lerobot", "matplotlib", "numcodecs", "pandas",
-    "PIL", "pingouin", "safetensors", "statsmodels", "torch", "zarr",
+    "PIL", "safetensors", "torch", "zarr",
 )  # fmt: skip
 EXTRAS = {
     **dict.fromkeys(_TRAIN, "train"),
@@ -27,8 +27,6 @@ POLICIES = ("torch", "lerobot", "diffusers")
 """Packages to load a policy."""
 TRAINING = ("lerobot", "torch", "accelerate", "diffusers", "datasets")
 """Packages of LeRobot's trainer."""
-STATISTICS = ("pingouin", "statsmodels")
-"""Packages of the analyses of variance and of mixed models."""
 FIGURES = ("matplotlib",)
 """Packages to draw figures."""
 BACKEND_PACKAGES = {"onnx": ("onnxruntime", "onnx"), "numba": ("numba",)}

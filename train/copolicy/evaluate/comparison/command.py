@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
-from copolicy.dataset.command_line.extras import STATISTICS
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_text, require_new
 
@@ -21,7 +20,6 @@ def add_compare_command(commands: Commands) -> None:
         "  copolicy-eval compare --method CoDP-H h_seed0.json h_seed1.json --method CoDP c_seed0.json c_seed1.json\n"
         "  copolicy-eval compare --measurements trials.csv --unit participant --factors method configuration "
         "--measure success",
-        lambda arguments: () if arguments.measurements is None else STATISTICS,
     )
     command.add_argument("files", nargs="*", type=Path, metavar="FILE", help="results, one method per file")
     command.add_argument(

@@ -1,7 +1,7 @@
-"""Repeated-measures analysis of variance with one or two factors, by pingouin."""
+"""Repeated-measures analysis of variance with one or two factors, from orthonormal contrasts of the conditions."""
 
 import math
-import warnings
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,27 +24,15 @@ def analysis_of_variance(measurements: Measurements) -> list[dict[str, Any]] | N
         spread within units beyond the effects.
     """
     values = measurements.values
-    if len(values) < 2 or min(values.shape[1:]) < 2 or _has_no_error(values):
+    n, levels = len(values), values.shape[1:]
+    if n < 2 or min(levels) < 2 or _has_no_error(values):
         return None
-    import pingouin  # takes seconds to import
-
-    factors = list(measurements.factors)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of sphericity tests without spread; their results are then None
-        table = pingouin.rm_anova(
-            data=_long(measurements),
-            dv="value",
-            within=factors if len(factors) > 1 else factors[0],
-            subject="unit",
-            correction=True,  # pyright: ignore[reportArgumentType] (annotated as a text, documented as a bool)
-            detailed=True,
-            effsize="ng2",
-        )
-    rows: list[dict[str, Any]] = table.to_dict("records")  # pyright: ignore[reportAssignmentType] (keys are names)
-    degrees = [(int(row["ddof1"]), int(row["ddof2"])) for row in rows] if "ddof1" in rows[0] else [
-        (int(rows[0]["DF"]), int(rows[1]["DF"]))
-    ]  # fmt: skip
-    return [_effect(row, *df) for row, df in zip(rows, degrees, strict=False)]
+    conditions = values.reshape(n, -1)
+    scores = {name: _Scores(conditions @ contrasts) for name, contrasts in _contrasts(measurements.factors).items()}
+    between = conditions.shape[1] * float(((conditions.mean(axis=1) - conditions.mean()) ** 2).sum())
+    # Of Olejnik and Algina (2003): all sums of squares that come from differences between units.
+    measured = between + sum(score.error for score in scores.values())
+    return [_effect(name, score, measured, math.prod(levels)) for name, score in scores.items()]
 
 
 def residual_normality(measurements: Measurements) -> dict[str, float] | None:
@@ -79,32 +67,93 @@ def rank_test(values: Array) -> dict[str, Any] | None:
     }
 
 
-def _effect(row: dict[str, Any], first: int, second: int) -> dict[str, Any]:
-    f, epsilon = float(row["F"]), float(row["eps"])
-    sphericity = None
-    if first > 1 and math.isfinite(row["W_spher"]) and math.isfinite(row["p_spher"]):
-        sphericity = {"test": "Mauchly", "W": float(row["W_spher"]), "p": float(row["p_spher"])}
+@dataclass(frozen=True)
+class _Scores:
+    """Scores `(n, d)` of the units on the d orthonormal contrasts of an effect."""
+
+    values: Array
+
+    @property
+    def effect(self) -> float:
+        """Sum of squares of the effect."""
+        return len(self.values) * float((self.values.mean(axis=0) ** 2).sum())
+
+    @property
+    def error(self) -> float:
+        """Sum of squares of its error term, the interaction of effect and units."""
+        return float(((self.values - self.values.mean(axis=0)) ** 2).sum())
+
+    @property
+    def covariance(self) -> Array:
+        """Between units, `(d, d)`."""
+        return np.atleast_2d(np.cov(self.values, rowvar=False))
+
+
+def _contrasts(factors: Any) -> dict[str, Array]:
+    """Orthonormal contrasts `(conditions, d)` of each effect, the second factor's levels running fastest."""
+    sizes = [len(levels) for levels in factors.values()]
+    if len(sizes) == 1:
+        return {next(iter(factors)): _deviations(sizes[0])}
+    (first, second), (a, b) = factors, sizes
     return {
-        "source": str(row["Source"]).replace(" * ", " x "),
-        "F": f,
-        "df": [first, second],
-        "p": float(row["p_unc"]),
-        "epsilon": epsilon,
-        "p_greenhouse_geisser": float(stats.f.sf(f, epsilon * first, epsilon * second)),
-        "sphericity": sphericity,
-        "partial_eta_squared": f * first / (f * first + second),
-        "generalized_eta_squared": float(row["ng2"]),
+        first: np.kron(_deviations(a), _mean(b)),
+        second: np.kron(_mean(a), _deviations(b)),
+        f"{first} x {second}": np.kron(_deviations(a), _deviations(b)),
     }
 
 
-def _long(measurements: Measurements) -> Any:
-    import pandas
+def _deviations(levels: int) -> Array:
+    """An orthonormal basis `(levels, levels - 1)` of the deviations from the mean of the levels (Helmert's)."""
+    basis = np.tril(np.ones((levels, levels - 1)), -1)
+    basis[np.diag_indices(levels - 1)] = -np.arange(levels - 1, 0, -1)
+    return basis / np.linalg.norm(basis, axis=0)
 
-    records = []
-    for index in np.ndindex(measurements.values.shape):
-        levels = {name: found[k] for (name, found), k in zip(measurements.factors.items(), index[1:], strict=True)}
-        records.append({"unit": measurements.units[index[0]], **levels, "value": float(measurements.values[index])})
-    return pandas.DataFrame(records)
+
+def _mean(levels: int) -> Array:
+    return np.full((levels, 1), 1 / math.sqrt(levels))
+
+
+def _effect(name: str, scores: _Scores, measured: float, conditions: int) -> dict[str, Any]:
+    n, d = scores.values.shape
+    first, second = d, d * (n - 1)
+    f = scores.effect / first / (scores.error / second)
+    covariance = scores.covariance
+    epsilon = min(1.0, float(np.trace(covariance) ** 2 / (d * (covariance @ covariance).trace()))) if d > 1 else 1.0
+    return {
+        "source": name,
+        "F": f,
+        "df": [first, second],
+        "p": float(stats.f.sf(f, first, second)),
+        "epsilon": epsilon,
+        "p_greenhouse_geisser": float(stats.f.sf(f, epsilon * first, epsilon * second)),
+        "sphericity": _sphericity(covariance, n - 1, conditions) if d > 1 else None,
+        "partial_eta_squared": f * first / (f * first + second),
+        "generalized_eta_squared": scores.effect / (scores.effect + measured),
+    }
+
+
+def _sphericity(covariance: Array, degrees: int, conditions: int) -> dict[str, Any] | None:
+    """Mauchly's test (1940) with Box's approximation of second order, as `mauchly.test` of R computes it.
+
+    Args:
+        covariance: `(d, d)` of the contrasts' scores.
+        degrees: of freedom of the covariance.
+        conditions: number of all conditions, which R takes for the levels in the term of second order.
+    """
+    d = len(covariance)
+    sign, logarithm = np.linalg.slogdet(covariance)
+    if sign <= 0:
+        return None
+    log_w = logarithm - d * math.log(np.trace(covariance) / d)
+    factor = 1 - (2 * d**2 + d + 2) / (6 * d * degrees)
+    if factor == 0:
+        return None
+    second = (d + 2) * (d - 1) * (d - 2) * (2 * d**3 + 6 * d**2 + 3 * conditions + 2)
+    second /= 288 * (degrees * d * factor) ** 2
+    chi_squared, free = -degrees * factor * log_w, d * (d + 1) / 2 - 1
+    p = stats.chi2.sf(chi_squared, free)
+    p += second * (stats.chi2.sf(chi_squared, free + 4) - p)
+    return {"test": "Mauchly", "W": math.exp(log_w), "p": float(p)}
 
 
 def _residuals(values: Array) -> Array:

@@ -4,7 +4,6 @@ import argparse
 from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
-from copolicy.dataset.command_line.extras import STATISTICS
 from copolicy.dataset.command_line.flag_numbers import add_whole_number, number, whole_number
 
 
@@ -16,7 +15,6 @@ def add_power_command(commands: Commands) -> None:
         _power,
         "how many people a study of several robots needs, or the power with a number of people",
         "copolicy-eval power --robots 5 --effect 0.3\n  copolicy-eval power --robots 5 --effect 0.3 --people 6",
-        STATISTICS,
     )
     command.add_argument("--robots", type=whole_number("--robots", 2, 100), required=True, help="robots per person")
     for flag, default, help in (

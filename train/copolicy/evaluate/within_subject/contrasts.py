@@ -60,14 +60,11 @@ def tukey(values: Array, names: Sequence[str]) -> list[dict[str, Any]]:
 
 def holm(tests: Sequence[dict[str, Any] | None]) -> None:
     """Adds `p_holm` to the tests of one question (Holm, 1979); None stands for a test without spread."""
-    found = [test for test in tests if test is not None]
-    if not found:
-        return
-    from statsmodels.stats.multitest import multipletests  # takes a second to import
-
-    adjusted: Any = multipletests([test["p"] for test in found], method="holm")[1]
-    for test, p in zip(found, adjusted, strict=True):
-        test["p_holm"] = float(p)
+    found = sorted((test for test in tests if test is not None), key=lambda test: test["p"])
+    adjusted = 0.0
+    for place, test in enumerate(found):
+        adjusted = max(adjusted, test["p"] * (len(found) - place))
+        test["p_holm"] = min(1.0, adjusted)
 
 
 def _pairs(values: Array, names: Sequence[str]) -> list[dict[str, Any]]:

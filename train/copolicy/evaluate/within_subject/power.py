@@ -5,7 +5,7 @@ from typing import Any
 from copolicy.dataset.exceptions import InvalidValueError
 
 DEFINITION = (
-    "one-way repeated-measures ANOVA (pingouin.power_rm_anova): effect as partial eta squared, the correlation of a "
+    "one-way repeated-measures ANOVA (noncentral F): effect as partial eta squared, the correlation of a "
     "person's values in two conditions, and epsilon for unequal variances of the differences; one value (a mean over "
     "trials) for each person and condition"
 )
@@ -32,12 +32,15 @@ def people_needed(
     for name, (value, valid, expected) in ranges.items():
         if not valid:
             raise InvalidValueError(name, expected, value)
-    from pingouin import power_rm_anova  # takes seconds to import
+    from scipy import stats  # takes a second to import
+
+    effect = eta_squared / (1 - eta_squared) * conditions * epsilon / (1 - correlation)  # noncentrality for each person
 
     def power_of(n: int) -> float:
-        return float(power_rm_anova(n=n, **settings))  # pyright: ignore[reportArgumentType] (a number if n is given)
+        first = (conditions - 1) * epsilon
+        second = (n - 1) * first
+        return float(stats.ncf.sf(stats.f.ppf(1 - alpha, first, second), first, second, n * effect))
 
-    settings = {"eta_squared": eta_squared, "m": conditions, "alpha": alpha, "corr": correlation, "epsilon": epsilon}
     result = {"conditions": conditions, "partial_eta_squared": eta_squared, "correlation": correlation,
               "epsilon": epsilon, "alpha": alpha}  # fmt: skip
     if people is not None:
