@@ -3,16 +3,12 @@
 Fixtures import their builders when they are asked for: torch, LeRobot and Playwright take seconds.
 """
 
-import functools
-import inspect
 import logging
 import os
 import shutil
 import signal
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -68,50 +64,36 @@ def _private_home(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _settings_described_once():
-    """LeRobot's parser reads the sources and signatures of all settings for their help, a second of work a call."""
-    if "draccus" not in sys.modules:  # collecting has imported it where a test is about training
-        yield
-        return
-    from draccus.wrappers import docstring, field_wrapper
+def run_folder(tmp_path_factory) -> Path:
+    """A folder that all processes of a run share, see `made_once.py`."""
+    import made_once
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(docstring, "get_attribute_docstring", functools.cache(docstring.get_attribute_docstring))
-        signatures = SimpleNamespace(getfullargspec=functools.cache(inspect.getfullargspec))
-        patch.setattr(field_wrapper, "inspect", signatures)
-        yield
+    folder = tmp_path_factory.getbasetemp()
+    made_once.store = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    return made_once.store
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _columns_decoded_once():
-    """`datasets` looks at all columns whenever one is set, half a second for the 300 of a table of episodes."""
-    if "datasets" not in sys.modules:
-        yield
-        return
-    from datasets.features import features
-
-    def set_column(self: Any, column: str, feature: Any) -> None:
-        dict.__setitem__(self, column, feature)
-        self._column_requires_decoding[column] = features.require_decoding(feature)
+def _computed_once():
+    """What LeRobot's libraries would compute again in every test; collecting has imported them where one needs them."""
+    from computed_once import computed_once
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(features.Features, "__setitem__", set_column)
+        computed_once(patch)
         yield
 
 
 @pytest.fixture(scope="session")
-def warm_python(tmp_path_factory) -> list[str]:
+def warm_python(run_folder) -> list[str]:
     """The start of a command line of a new Python process that has imported LeRobot already, see `warm_python.py`."""
     if not sys.platform.startswith("linux"):
         return [sys.executable]
     from filelock import FileLock
     from warm_python import warm_python
 
-    in_worker = "PYTEST_XDIST_WORKER" in os.environ
-    folder = tmp_path_factory.getbasetemp()
-    folder, run = (folder.parent, os.getppid()) if in_worker else (folder, os.getpid())
-    with FileLock(folder / "importer.lock"):
-        return warm_python(folder, run)
+    run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
+    with FileLock(run_folder / "importer.lock"):
+        return warm_python(run_folder, run)
 
 
 @pytest.fixture(autouse=True)
