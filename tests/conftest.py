@@ -34,13 +34,18 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     return 0 if 0 < len(named) <= _FEW_FILES else None
 
 
-# Minutes in a few tests: first, so that no core waits for another at the end.
-_LONG_FILES = ("test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_train_distributed.py")
+# First, so that no core waits for another at the end; the first two do not wait for the same importer of LeRobot.
+_LONG_FILES = (
+    "test_quickstart.py", "test_scripted_players.py", "test_train_hub.py", "test_convert_scale_restart.py",
+    "test_train_distributed.py", "test_convert_scale_slurm.py", "test_damaged_sets.py", "test_simulate.py",
+    "test_policy_fast_planning.py", "test_recover.py",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the tests of the long files first."""
-    items.sort(key=lambda item: item.path.name not in _LONG_FILES)
+    places = {name: place for place, name in enumerate(_LONG_FILES)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
 
 
 @pytest.fixture(scope="session")

@@ -14,8 +14,11 @@ from copolicy.dataset.versions.release import release
 
 
 @pytest.fixture(scope="module")
-def user(tmp_path_factory):
-    """Of a Hub with a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded."""
+def first_call(tmp_path_factory):
+    """A user and the first command of the user's process, before which nothing imports LeRobot.
+
+    The Hub has a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded.
+    """
     root = write_table(tmp_path_factory.mktemp("data") / "table")
     repository = Repository(private=False)
     for tag, discarded in (("data-1.0.0", (2,)), ("v3.0", (1, 4))):
@@ -25,7 +28,19 @@ def user(tmp_path_factory):
     with LocalHub() as hub:
         hub.repositories["dataset", "lab/table"] = repository
         with HubUser(hub, tmp_path_factory.mktemp("home")) as user:
-            yield user
+            flags = ["--policy.type=act", "--policy.device=cpu", "--dataset.root=/nowhere/table"]
+            yield user, user.run(*flags, module="copolicy.train.cli")
+
+
+@pytest.fixture(scope="module")
+def user(first_call):
+    return first_call[0]
+
+
+def test_lerobots_own_policies_are_known_in_a_new_process(first_call):
+    _, done = first_call
+    assert done.status == 2
+    assert done.err.splitlines()[-1].endswith("expected the folder of a LeRobot v3 data set, found no such folder")
 
 
 def _train(user: HubUser, output: Path, *arguments: str) -> Done:
