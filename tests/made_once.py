@@ -23,6 +23,7 @@ def made_once(name: str, make: Callable[[Path], object]) -> Path:
     with FileLock(store / f"{name}.lock"):
         if not made.exists():
             partial = store / f"{name}.partial"
+            shutil.rmtree(partial, ignore_errors=True)  # of another process that failed
             make(partial)
             partial.rename(made)
     return made
