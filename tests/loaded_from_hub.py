@@ -3,6 +3,8 @@
 main(["lab/table", "data-1.0.0", ""])    an empty revision is that which LeRobot chooses
 """
 
+from typing import Any
+
 from copolicy.dataset.versions.content import read_content
 
 
@@ -11,6 +13,6 @@ def main(arguments: list[str]) -> int:
 
     repo_id, *revisions = arguments
     for revision in revisions:
-        dataset = LeRobotDataset(repo_id, revision=revision or None)
+        dataset: Any = LeRobotDataset(repo_id, revision=revision or None)
         print(read_content(dataset.root).hash, dataset.num_frames, dataset[0]["action"].shape)
     return 0
