@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from made_once import simulated
 
-from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 
 EPISODES = Path("meta/episodes/chunk-000/file-000.parquet")
@@ -19,8 +19,7 @@ FRAMES = Path("data/chunk-000/file-000.parquet")
 
 def make_recordings(folder: Path, episodes: int = 6, seed: int = 1) -> Path:
     """Recordings of scripted pairs."""
-    simulate(folder, episodes, seed, workers=1)
-    return folder
+    return simulated(folder, episodes, seed)
 
 
 def make_data_set(recordings: Path, root: Path, *flags: str) -> Path:

@@ -3,7 +3,6 @@
 Fixtures import their builders when they are asked for: torch, LeRobot and Playwright take seconds.
 """
 
-import functools
 import logging
 import os
 import shutil
@@ -35,13 +34,18 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     return 0 if 0 < len(named) <= _FEW_FILES else None
 
 
-# Minutes in a few tests: first, so that no core waits for another at the end.
-_LONG_FILES = ("test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_train_distributed.py")
+# First, so that no core waits for another at the end; the first two do not wait for the same importer of LeRobot.
+_LONG_FILES = (
+    "test_quickstart.py", "test_scripted_players.py", "test_train_hub.py", "test_convert_scale_restart.py",
+    "test_train_distributed.py", "test_convert_scale_slurm.py", "test_damaged_sets.py", "test_simulate.py",
+    "test_policy_fast_planning.py", "test_recover.py",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the tests of the long files first."""
-    items.sort(key=lambda item: item.path.name not in _LONG_FILES)
+    places = {name: place for place, name in enumerate(_LONG_FILES)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
 
 
 @pytest.fixture(scope="session")
@@ -65,16 +69,36 @@ def _private_home(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _settings_described_once():
-    """LeRobot's parser reads the sources of all settings for their help, a second of work at every call."""
-    if "draccus" not in sys.modules:  # collecting has imported it where a test is about training
-        yield
-        return
-    from draccus.wrappers import docstring
+def run_folder(tmp_path_factory) -> Path:
+    """A folder that all processes of a run share, see `made_once.py`."""
+    import made_once
+
+    folder = tmp_path_factory.getbasetemp()
+    made_once.store = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    return made_once.store
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _computed_once():
+    """What LeRobot's libraries would compute again in every test; collecting has imported them where one needs them."""
+    from computed_once import computed_once
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(docstring, "get_attribute_docstring", functools.cache(docstring.get_attribute_docstring))
+        computed_once(patch)
         yield
+
+
+@pytest.fixture(scope="session")
+def warm_python(run_folder) -> list[str]:
+    """The start of a command line of a new Python process that has imported LeRobot already, see `warm_python.py`."""
+    if not sys.platform.startswith("linux"):
+        return [sys.executable]
+    from filelock import FileLock
+    from warm_python import warm_python
+
+    run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
+    with FileLock(run_folder / "importer.lock"):
+        return warm_python(run_folder, run)
 
 
 @pytest.fixture(autouse=True)

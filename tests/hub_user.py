@@ -17,6 +17,7 @@ _WORKER = """
 import contextlib, importlib, io, json, os, sys, time
 time.sleep = lambda seconds: None  # the client waits up to 8 s before it tries again
 replies, sys.stdout = sys.stdout, sys.stderr
+sys.path.append(sys.argv[1])
 for line in sys.stdin:
     request = json.loads(line)
     os.environ.pop("HF_TOKEN", None)
@@ -59,7 +60,7 @@ class HubUser:
         environment = {name: value for name, value in os.environ.items() if not name.startswith("HF_")}
         self._stderr = (self.home / "stderr.txt").open("w+", encoding="utf-8")
         self._worker = subprocess.Popen(
-            [sys.executable, "-c", _WORKER],
+            [sys.executable, "-c", _WORKER, str(Path(__file__).parent)],
             env={**environment, **self.hub.environment(self.home, token=None)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

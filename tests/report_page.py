@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from constructed_pairs import TWO, carried_set
+from made_once import simulated
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from copolicy.cards.cli import main
-from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.files.meta_files import CHECK_FILE, STATISTICS_FILE
 from copolicy.dataset.statistics.resampling import Bootstrap
@@ -66,7 +66,7 @@ def route_document(labels: list[str], episodes: int) -> dict[str, Any]:
 
 def make_data_set(folder: Path, episodes: int) -> Path:
     """Episodes of simulated pairs at 10 Hz."""
-    simulate(folder / "raw", episodes, 7, workers=1)
+    simulated(folder / "raw", episodes, 7)
     root = folder / "table"
     with contextlib.redirect_stdout(io.StringIO()):
         assert (

@@ -27,13 +27,20 @@ TABLE = "copolicy.tasks.table"
 HEAVY = {"torch", "torchvision", "lerobot", "datasets", "matplotlib", "pandas", "diffusers", "gymnasium"}
 
 
+@functools.cache
+def _import_statements(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """Those at the top of a file and inside its functions."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return tuple(node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+
+
 def _imports(path: Path) -> set[str]:
     """Absolute names that a file imports, at its top or inside a function."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _import_statements(path):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+        elif node.level == 0:
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
     return names
 
@@ -87,11 +94,11 @@ def _edges() -> dict[str, set[str]]:
     for name, path in modules.items():
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
         edges[name] = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in _import_statements(path):
             targets: list[str] = []
             if isinstance(node, ast.Import):
                 targets = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
+            else:
                 above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
                 base = ".".join([*above, *([node.module] if node.module else [])])
                 targets = [f"{base}.{alias.name}" for alias in node.names]
@@ -176,13 +183,20 @@ def test_a_task_imports_what_it_offers_to_policies_only_when_it_is_asked():
         assert not [node.module for node in at_top if "policy" in (node.module or "").split(".")]
 
 
+def _called(function: ast.expr) -> str:
+    """Names of a call, with dots; what is no name, such as a further call, is left out."""
+    if isinstance(function, ast.Attribute):
+        return f"{_called(function.value)}.{function.attr}"
+    return function.id if isinstance(function, ast.Name) else ""
+
+
 def _text_calls_without_encoding(path: Path) -> list[int]:
     """Lines on which a file is read or written as text in whatever encoding the locale has."""
     lines = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.Call) or any(keyword.arg == "encoding" for keyword in node.keywords):
             continue
-        name = ast.unparse(node.func)
+        name = _called(node.func)
         method = name.rpartition(".")[2]
         modes = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
         modes += [keyword.value.value for keyword in node.keywords if isinstance(keyword.value, ast.Constant)]

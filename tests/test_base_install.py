@@ -63,6 +63,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
 MORE: list[tuple[str, str | None]] = [
     ("copolicy-train --dataset.root=set --steps=1 --output_dir=trained", "lerobot"),
     ("copolicy-dataset check recordings", WORKS),
+    ("copolicy-eval compare --measurements trials.csv --factors robot", "pingouin"),
     ("copolicy-dataset check --rules", WORKS),
     ("copolicy-convert mcap recordings --out new --repo-id lab/table --video", "lerobot"),
     ("copolicy-quickstart --out quick --upstream recordings", "lerobot"),

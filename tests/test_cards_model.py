@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import yaml
 from huggingface_hub import ModelCard
+from made_once import simulated
 
 from copolicy.cards.cli import main
-from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 
 WEIGHTS = b"the weights"
@@ -56,7 +56,7 @@ def run(tmp_path) -> Path:
 def dataset(tmp_path_factory) -> Path:
     """Four episodes of simulated pairs."""
     folder = tmp_path_factory.mktemp("model_card")
-    simulate(folder / "raw", 4, 3, workers=1)
+    simulated(folder / "raw", 4, 3)
     root = folder / "table"
     flags = ["--out", str(root), "--repo-id", "lab/table", "--license", "cc0-1.0"]
     assert convert(["mcap", str(folder / "raw"), *flags]) == 0

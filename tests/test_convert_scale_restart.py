@@ -157,14 +157,25 @@ def test_shards_of_another_call_are_refused(unsharded, tmp_path, capsys):
     assert list(folder.iterdir()) == [folder / "one.jpg"]
 
 
+@pytest.fixture(scope="module")
+def sharded(unsharded, tmp_path_factory) -> Path:
+    """The shards of a conversion that has finished."""
+    folder = tmp_path_factory.mktemp("sharded")
+    flags = ("--shards", str(folder / "shards"), "--shard-episodes", "4")
+    assert main(call(unsharded / "recordings", folder / "set", *flags)) == 0
+    return folder / "shards"
+
+
 @pytest.mark.parametrize("content", ["[]", "{}", "null", '{"digest": 1, "episodes": 3}', "{"])
-def test_a_shard_with_an_invalid_record_is_converted_again(unsharded, tmp_path, capsys, content):
-    flags = ("--shards", str(tmp_path / "shards"), "--shard-episodes", "4")
-    assert main(call(unsharded / "recordings", tmp_path / "set", *flags)) == 0
+def test_a_shard_with_an_invalid_record_is_converted_again(unsharded, sharded, tmp_path, capsys, content):
+    flags = ("--shards", str(shutil.copytree(sharded, tmp_path / "shards")), "--shard-episodes", "4")
     record = next((tmp_path / "shards").rglob("shard.json"))
+    times = times_of(tmp_path / "shards")
     record.write_text(content, encoding="utf-8")
     assert main(call(unsharded / "recordings", tmp_path / "again", *flags)) == 0
     assert json.loads(record.read_text(encoding="utf-8"))["episodes"]
+    again = times_of(tmp_path / "shards")
+    assert [name for name in times if times[name] != again[name]] == [record.parent.name]  # and no other
 
 
 @pytest.mark.parametrize("content", ["[]", "3", "{"])

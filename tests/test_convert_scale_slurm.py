@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import stat
 from pathlib import Path
@@ -13,7 +14,7 @@ from copolicy.convert.cli import main
 
 
 @pytest.fixture
-def cluster(tmp_path, monkeypatch) -> Path:
+def cluster(tmp_path, monkeypatch, warm_python) -> Path:
     """Programs that stand for a cluster's: `sbatch` keeps a script and runs it here, once for each array index."""
     folder = tmp_path / "cluster"
     folder.mkdir()
@@ -29,7 +30,10 @@ for index in $(seq 0 "$last"); do
 done
 echo "Submitted batch job $number"
 """,
-        "srun": '#!/bin/bash\nwhile [[ "$1" == -* ]]; do [ "$1" = -n ] && shift; shift; done\nexec "$@"\n',
+        "srun": f"""#!/bin/bash
+while [[ "$1" == -* ]]; do [ "$1" = -n ] && shift; shift; done
+exec {shlex.join(warm_python)} "$(command -v "$1")" "${{@:2}}"
+""",
         "scontrol": '#!/bin/bash\necho "${@: -1}"\n',
     }
     for name, text in programs.items():

@@ -4,15 +4,13 @@ Samples of tests/benchmarks/foreign_sweep.py.
 """
 
 import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from benchmarks import foreign_sweep
 from foreign_files import FOREIGN
-from reading_commands import COMMANDS
+from own_permissions import permissions_apply
+from reading_commands import COMMANDS, call
 
 from copolicy.collect.inputs.calibration_store import CalibrationStore
 from copolicy.dataset.exceptions import FileFormatError
@@ -71,39 +69,19 @@ def test_damaged_files_give_one_line_or_pass(tmp_path):
     assert verdicts.count("refused") > len(verdicts) / 3
 
 
-_FORBIDDEN = """
-import sys
-from pathlib import Path
-
-sys.path.insert(0, sys.argv[1])
-from reading_commands import COMMANDS, call
-
-folder = Path(sys.argv[2])
-for name in ("a.mcap", "a.zarr.zip"):
-    for command in ("collect replay", "convert mcap", "convert upstream"):
-        print(*call(*COMMANDS[command](folder / name, folder)))
-"""
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
 def test_unreadable_files_give_one_line(tmp_path):
-    # Root may read anything, unless it gives that right up.
-    rights = "-dac_override,-dac_read_search"
-    prefix = ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []
-    if prefix and shutil.which("setpriv") is None:
-        pytest.skip("root may read every file, and there is no setpriv (util-linux)")
     for name in ("a.mcap", "a.zarr.zip"):
         (tmp_path / name).write_bytes(b"PK")
         (tmp_path / name).chmod(0)
-    tests = str(Path(__file__).parent)
-    done = subprocess.run(
-        [*prefix, sys.executable, "-c", _FORBIDDEN, tests, str(tmp_path)], capture_output=True, text=True
-    )
-    lines = done.stdout.splitlines()
-    assert len(lines) == 6, done.stderr
-    for line in lines:
-        assert line.startswith("refused ")
-        assert "Permission denied" in line
+    with permissions_apply():
+        with pytest.raises(PermissionError):
+            (tmp_path / "a.mcap").read_bytes()
+        for name in ("a.mcap", "a.zarr.zip"):
+            for command in ("collect replay", "convert mcap", "convert upstream"):
+                verdict, words = call(*COMMANDS[command](tmp_path / name, tmp_path))
+                assert verdict == "refused", (command, name)
+                assert "Permission denied" in words, (command, name)
 
 
 def test_a_file_in_place_of_the_folder_of_calibrations(tmp_path):

@@ -12,8 +12,6 @@ import errno
 import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -111,29 +109,6 @@ def test_the_newest_version_is_pulled_by_default_and_an_older_one_by_name(user, 
     assert read_content(tmp_path / "new").hash == read_content(other).hash
     assert read_content(tmp_path / "old").hash == read_content(released).hash
     assert user.run("diff", "lab/table@data-1.0.0", "lab/table@data-1.0.1").status == 1
-
-
-def test_lerobot_loads_the_same_content_by_the_tag(user, hub, released, tmp_path):
-    program = """
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
-from copolicy.dataset.versions.content import read_content
-for revision in ("data-1.0.0", None):
-    dataset = LeRobotDataset("lab/table", revision=revision)
-    print(read_content(dataset.root).hash, dataset.num_frames, dataset[0]["action"].shape)
-"""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("HF_")}
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**environment, **hub.environment(tmp_path)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    lines = [line for line in done.stdout.splitlines() if line.startswith("copolicy-content-1")]
-    assert len(lines) == 2
-    assert all(line.startswith(read_content(released).hash + " ") for line in lines)
-    assert all(line.endswith("torch.Size([4])") for line in lines)
 
 
 def test_an_interrupted_file_is_downloaded_again(user, hub, released, tmp_path):

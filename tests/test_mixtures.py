@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, FRAMES, make_data_set, set_columns, set_frames
 from loaded_sets import load
+from made_once import simulated
 
 from copolicy.cards.cli import main as cards
 from copolicy.collect.play.player import make_players, warn_other_settings
@@ -41,7 +42,7 @@ HALF_WORDS, EIGHTH_WORDS = (f"angular acceleration up to {name} rad/s^2" for nam
 def folders(tmp_path_factory) -> Path:
     """Recordings and data sets under two physics: `half`, `eighth` and, converted together, `both`."""
     folder = tmp_path_factory.mktemp("mixtures")
-    simulate(folder / "raw" / "half", 3, seed=1, workers=1)
+    simulated(folder / "raw" / "half", 3, seed=1)
     simulate(folder / "raw" / "eighth", 2, seed=2, workers=1, settings=EIGHTH)
     for name in ("half", "eighth"):
         make_data_set(folder / "raw" / name, folder / name)

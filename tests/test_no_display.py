@@ -6,11 +6,11 @@ import subprocess
 import sys
 
 import pytest
+from made_once import simulated
 from play_session import settings
 
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.sdl import NoDisplayError, init_events, open_display, pygame
-from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import RunError
 
 NONE = "neither DISPLAY nor WAYLAND_DISPLAY is set"
@@ -19,7 +19,7 @@ NONE = "neither DISPLAY nor WAYLAND_DISPLAY is set"
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded")
-    simulate(folder, 1, seed=0, workers=1)
+    simulated(folder, 1, seed=0)
     return folder / "episode_000000.mcap"
 
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from commands_here import commands_here
 
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.simulate.recipes import RECIPES
@@ -43,8 +44,9 @@ def population(tmp_path_factory) -> Path:
     """One proxy, of few episodes and steps."""
     out = tmp_path_factory.mktemp("population") / "partners"
     call = ["partners", "make", "--out", str(out), "--only", "C1", "--limit-steps", "2", "--limit-episodes", "2"]
-    assert main([*call, "--workers", "1"]) == 0
-    assert main([*call, "--workers", "1"]) == 0  # already there
+    with commands_here():
+        assert main([*call, "--workers", "1"]) == 0
+        assert main([*call, "--workers", "1"]) == 0  # already there
     return out
 
 

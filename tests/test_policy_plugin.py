@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 
 import pytest
 
@@ -29,9 +28,9 @@ teleoperate()
 
 
 @pytest.fixture(scope="module")
-def discovered() -> subprocess.CompletedProcess:
+def discovered(warm_python) -> subprocess.CompletedProcess:
     """A new process that looks for plugins, then the help of LeRobot's own command for teleoperators in it."""
-    return subprocess.run([sys.executable, "-c", _SCRIPT], capture_output=True, text=True, check=False)
+    return subprocess.run([*warm_python, "-c", _SCRIPT], capture_output=True, text=True, check=False)
 
 
 def test_lerobots_own_command_accepts_the_teleoperator(discovered):

@@ -1,63 +1,17 @@
-"""The whole chain, small: from simulated pairs as a user types it, from the original program's files in one process."""
+"""The whole chain, small: a process a command from simulated pairs, one process from the original program's files."""
 
-import contextlib
 import json
-import os
 import subprocess
 import sysconfig
-from importlib.metadata import entry_points
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO
-from unittest.mock import patch
 
-import pytest
-from training_table import new_accelerate
+from commands_here import commands_here, commands_in
 
 from copolicy.cards.facts import DatasetFacts
-from copolicy.train import quickstart_chain
 from copolicy.train.quickstart import main
 
-SMALL = ("--steps", "20", "--limit", "3", "--workers", "2")
+SMALL = ("--steps", "10", "--limit", "2", "--workers", "2")
 SMALLEST = ("--steps", "2", "--limit", "1", "--workers", "1")
-
-
-def _quickstart(out: Path, *flags: str) -> tuple[dict, str]:
-    """Runs the command in a process of its own; its summary and what it said."""
-    program = Path(sysconfig.get_path("scripts")) / "copolicy-quickstart"
-    done = subprocess.run(
-        [program, "--json", "--out", out, *flags], capture_output=True, text=True, env=dict(os.environ)
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return json.loads(done.stdout), done.stderr
-
-
-class CommandHere:
-    """Stands for the process of a command: its entry point is called in this one, which has imported LeRobot."""
-
-    def __init__(self, command: list[str], env: dict[str, str], stdin: int, stdout: IO[str], stderr: IO[str]):
-        (entry,) = entry_points(group="console_scripts", name=Path(command[0]).name)
-        with patch.dict(os.environ, env), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
-            self.status = entry.load()(command[1:])
-        stdout.flush()
-
-    def __enter__(self) -> "CommandHere":
-        return self
-
-    def __exit__(self, *_) -> None:
-        pass
-
-    def wait(self, timeout: float | None = None) -> int:
-        return self.status
-
-
-@pytest.fixture
-def commands_here(monkeypatch):
-    """The chain without a process a command: the test of the other chain starts them."""
-    here = SimpleNamespace(Popen=CommandHere, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
-    monkeypatch.setattr(quickstart_chain, "subprocess", here)
-    with new_accelerate():
-        yield
 
 
 def _check(out: Path, summary: dict, maps: int) -> None:
@@ -81,10 +35,13 @@ def _check_lines(out: Path, said: str, steps: int) -> None:
     assert "'batch_size': 512" in (out / "quickstart.log").read_text(encoding="utf-8")
 
 
-def test_the_chain_from_simulated_pairs(tmp_path):
+def test_the_chain_from_simulated_pairs(tmp_path, warm_python, capsys):
     out = tmp_path / "out"
-    summary, said = _quickstart(out, *SMALL, "--episodes", "4")
-    _check(out, summary, 3)
+    with commands_in(warm_python):
+        assert main(["--json", "--out", str(out), *SMALL, "--episodes", "4"]) == 0
+    printed = capsys.readouterr()
+    summary, said = json.loads(printed.out), printed.err
+    _check(out, summary, 2)
     assert len(list((out / "recordings").rglob("*.mcap"))) == 4
     facts = DatasetFacts.read(out / "dataset")
     assert facts.counts("source") == {"simulated": 4}
@@ -97,11 +54,12 @@ def test_the_chain_from_simulated_pairs(tmp_path):
         assert command.removeprefix("uv run ").split()[0] in {"copolicy-train", "copolicy-eval", "lerobot-eval"}
 
 
-def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream, commands_here, capsys):
+def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream, capsys):
     out = tmp_path / "out"
     # The store, because its converter took the map of episode 11 for episode 1.
     store = upstream / "examples_scripted" / "table_10Hz.zarr"
-    assert main(["--json", "--out", str(out), *SMALLEST, "--upstream", str(store)]) == 0
+    with commands_here():
+        assert main(["--json", "--out", str(out), *SMALLEST, "--upstream", str(store)]) == 0
     printed = capsys.readouterr()
     summary, said = json.loads(printed.out), printed.err
     _check(out, summary, 1)
@@ -114,10 +72,12 @@ def test_the_chain_from_files_that_the_original_program_wrote(tmp_path, upstream
     assert "$ copolicy-convert upstream" in (out / "quickstart.log").read_text(encoding="utf-8")
 
 
-def test_an_output_folder_in_use_is_left_alone(tmp_path, capsys):
+def test_an_output_folder_in_use_is_left_alone(tmp_path):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    assert main(["--out", str(tmp_path)]) == 2
-    assert "nothing was overwritten" in capsys.readouterr().err
+    program = Path(sysconfig.get_path("scripts")) / "copolicy-quickstart"
+    done = subprocess.run([program, "--out", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "nothing was overwritten" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 

@@ -5,7 +5,6 @@ import io
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -45,13 +44,13 @@ def alone(recorded, tmp_path_factory) -> tuple[Path, list[float]]:
     return output, _train(flags(recorded, output, batch_size=128, **_LEARNING))
 
 
-def test_two_processes_learn_as_one_with_the_same_global_batch(recorded, alone, tmp_path):
+def test_two_processes_learn_as_one_with_the_same_global_batch(recorded, alone, tmp_path, warm_python):
     output, script = tmp_path / "run", tmp_path / "train.py"
     script.write_text(_SCRIPT, encoding="utf-8")
-    launcher = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc_per_node", "2", str(script)]
+    launcher = [*warm_python, "-m", "torch.distributed.run", "--standalone", "--nproc_per_node", "2", "--no-python"]
     kept = {name: value for name, value in os.environ.items() if not name.startswith("ACCELERATE_")}
     done = subprocess.run(
-        [*launcher, "--json", *flags(recorded, output, batch_size=64, **_LEARNING)],
+        [*launcher, *warm_python, str(script), "--json", *flags(recorded, output, batch_size=64, **_LEARNING)],
         env={**kept, "OMP_NUM_THREADS": "1", "HF_HUB_OFFLINE": "1"},
         capture_output=True,
         text=True,

@@ -1,4 +1,4 @@
-"""`copolicy-train` on a data set that it gets from the Hub by its id, with a choice of episodes and exclusions."""
+"""LeRobot on data sets of the Hub: training by an id, with a choice of episodes and exclusions; what was published."""
 
 import json
 from pathlib import Path
@@ -7,11 +7,18 @@ import pytest
 from hub_user import Done, HubUser
 from local_hub import LocalHub, Repository
 from training_table import flags, mark_discarded, write_table
+from versioned_data_set import simulated_data_set
+
+from copolicy.dataset.versions.content import read_content
+from copolicy.dataset.versions.release import release
 
 
 @pytest.fixture(scope="module")
-def user(tmp_path_factory):
-    """Of a Hub with a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded."""
+def first_call(tmp_path_factory):
+    """A user and the first command of the user's process, before which nothing imports LeRobot.
+
+    The Hub has a data set at a tag, whose `main` has gone on: there its episodes 1 and 4 are excluded.
+    """
     root = write_table(tmp_path_factory.mktemp("data") / "table")
     repository = Repository(private=False)
     for tag, discarded in (("data-1.0.0", (2,)), ("v3.0", (1, 4))):
@@ -21,7 +28,19 @@ def user(tmp_path_factory):
     with LocalHub() as hub:
         hub.repositories["dataset", "lab/table"] = repository
         with HubUser(hub, tmp_path_factory.mktemp("home")) as user:
-            yield user
+            flags = ["--policy.type=act", "--policy.device=cpu", "--dataset.root=/nowhere/table"]
+            yield user, user.run(*flags, module="copolicy.train.cli")
+
+
+@pytest.fixture(scope="module")
+def user(first_call):
+    return first_call[0]
+
+
+def test_lerobots_own_policies_are_known_in_a_new_process(first_call):
+    _, done = first_call
+    assert done.status == 2
+    assert done.err.splitlines()[-1].endswith("expected the folder of a LeRobot v3 data set, found no such folder")
 
 
 def _train(user: HubUser, output: Path, *arguments: str) -> Done:
@@ -56,3 +75,16 @@ def test_an_id_that_is_not_there_is_one_line(user, tmp_path):
     line = done.err.splitlines()[-1]
     assert line.startswith("copolicy-train: training stopped: RepositoryNotFoundError: ")
     assert "lab/nothing" in line
+
+
+def test_lerobot_loads_the_published_content_by_its_tag(user, tmp_path):
+    root = simulated_data_set(tmp_path / "table")
+    release(root, "major", "The first.")
+    done = user.run("publish", root, "--repo-id", "lab/released", "--raw", tmp_path / "recordings")
+    assert done.status == 0, done.err
+    loaded = user.run("lab/released", "data-1.0.0", "", module="loaded_from_hub")
+    assert loaded.status == 0, loaded.err
+    lines = [line for line in loaded.out.splitlines() if line.startswith("copolicy-content-1")]
+    assert len(lines) == 2
+    assert all(line.startswith(read_content(root).hash + " ") for line in lines)
+    assert all(line.endswith("torch.Size([4])") for line in lines)

@@ -88,6 +88,39 @@ def test_one_way_is_the_model_fitted_by_least_squares():
     assert effect["sphericity"]["test"] == "Mauchly"
 
 
+def test_two_factors_are_those_of_pingouin():
+    """Of pingouin 0.7.0: rm_anova(..., within=["robot", "place"], effsize="ng2"), whose sphericity is that of R."""
+    i, j, k = np.indices((8, 3, 2))
+    values = ((7 * i + 5 * j + 3 * k + i * j * k) % 11).astype(float)
+    rows = [
+        {"p": f"P{i}", "robot": "abc"[j], "place": "xy"[k], "v": values[i, j, k]} for i, j, k in np.ndindex(8, 3, 2)
+    ]
+    effects = analysis_of_variance(Measurements.of_rows(rows, "v", "p", ("robot", "place")))
+    assert effects is not None
+    for effect, (source, f, df, p, epsilon, sphericity, generalized) in zip(
+        effects,
+        (
+            ("robot", 0.02811244979919679, [2, 14], 0.9723337689385246, 0.7270115616425505,
+             (0.6245060563539298, 0.2435622421323593), 0.0010147133434804667),
+            ("place", 0.007092198581560383, [1, 7], 0.9352432068643838, 1.0, None, 0.00016926201760325224),
+            ("robot x place", 0.2837055417700579, [2, 14], 0.7572157144314443, 0.8337931034482756,
+             (0.8006617038875108, 0.5132715225986326), 0.016319733555370523),
+        ),
+        strict=True,
+    ):  # fmt: skip
+        assert (effect["source"], effect["df"]) == (source, df)
+        assert (effect["F"], effect["p"], effect["epsilon"]) == pytest.approx((f, p, epsilon))
+        assert effect["generalized_eta_squared"] == pytest.approx(generalized)
+        found = effect["sphericity"]
+        assert (found and (found["W"], found["p"])) == (sphericity and pytest.approx(sphericity))
+    (effect,) = analysis_of_variance(measured(VALUES)) or []
+    assert (effect["F"], effect["epsilon"]) == pytest.approx((8.405063291139244, 0.6539872157602429))
+    assert effect["generalized_eta_squared"] == pytest.approx(0.3132075471698114)
+    assert (effect["sphericity"]["W"], effect["sphericity"]["p"]) == pytest.approx(
+        (0.44357545751958766, 0.8296887750296836)
+    )
+
+
 def test_two_conditions_are_a_paired_t_test():
     two = VALUES[:, 1:3]
     expected = stats.ttest_rel(two[:, 0], two[:, 1])
@@ -142,6 +175,9 @@ def test_holm_covers_the_contrasts_of_one_question():
     tests: list[dict | None] = [{"p": 0.01}, None, {"p": 0.04}, {"p": 0.03}]
     holm(tests)
     assert [test["p_holm"] for test in tests if test] == pytest.approx([0.03, 0.06, 0.06])
+    more: list[dict | None] = [{"p": p} for p in (0.2, 0.01, 0.04, 0.03, 0.9)]
+    holm(more)  # expected: statsmodels 0.15's multipletests
+    assert [test["p_holm"] for test in more if test] == pytest.approx([0.4, 0.05, 0.12, 0.12, 0.9])
 
 
 def test_people_without_every_condition_are_left_out_and_named(tmp_path):
@@ -202,6 +238,9 @@ def test_power_grows_with_people_and_is_that_of_the_f_distribution():
     needed = people_needed(5, 0.14, epsilon=0.75)
     assert needed["power"] >= 0.8
     assert people_needed(5, 0.14, epsilon=0.75, people=needed["people"] - 1)["power"] < 0.8
+    # Of pingouin 0.7.0: power_rm_anova.
+    power = people_needed(5, 0.14, epsilon=0.75, correlation=0.3, people=12)["power"]
+    assert power == pytest.approx(0.7266950713419025)
     with pytest.raises(InvalidValueError, match=r"epsilon: expected 0.25 to 1, found 0.1"):
         people_needed(5, 0.14, epsilon=0.1)
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from made_once import simulated
 
-from copolicy.collect.simulate.command import simulate
 from copolicy.convert.cli import main as convert
 
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
@@ -20,7 +20,7 @@ COUNT = 6
 def simulated_data_set(root: Path) -> Path:
     """Six simulated episodes as a data set with a card; their recordings lie beside it in `recordings/`."""
     recordings = root.parent / "recordings"
-    simulate(recordings, COUNT, seed=1, workers=1)
+    simulated(recordings, COUNT, seed=1)
     assert convert(["mcap", str(recordings), "--out", str(root), "--repo-id", "lab/table", "--license", "mit"]) == 0
     (root / "README.md").write_text("---\nlicense: mit\n---\n\n# Table\n", encoding="utf-8")
     return root

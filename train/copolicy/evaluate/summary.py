@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.task import PairTask
@@ -26,6 +25,8 @@ _REQUIRED_PARTS = {
 
 def success_rate(successes: Sequence[bool]) -> dict[str, Any]:
     """Success rate with its binomial standard error and Wilson's 95 % interval."""
+    from scipy.stats import binomtest  # takes most of the time of `copolicy-eval --help`
+
     n = len(successes)
     p = sum(successes) / n
     interval = binomtest(sum(successes), n).proportion_ci(method="wilson")

@@ -17,7 +17,6 @@ import numpy as np
 import torch
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
-from lerobot.utils.import_utils import register_third_party_plugins
 
 from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.agents.training_conditions import TrainingConditions, training_conditions
@@ -25,6 +24,8 @@ from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
+
+from .plugins import register_plugins
 
 _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
@@ -72,7 +73,7 @@ class Checkpoint:
         self.folder: Path = (folder := checkpoint_folder(path))
         self.conditions: TrainingConditions = training_conditions(folder)
         self.fps: int = self.conditions.fps
-        register_third_party_plugins()
+        register_plugins()
         try:
             policy, self._preprocess, self._postprocess = _load(
                 folder, device, settings or {}, get_task(self.conditions.task)

@@ -27,6 +27,7 @@ from copolicy.dataset.policies.training_run import POLICY_FILES, find_policy_fol
 from copolicy.dataset.publication.repo_id import checked_repo_id, local_repo_id
 
 from .pair_split import SPLIT_HELP, PairSplit
+from .plugins import register_plugins
 from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers
 from .world_training import IN_WORLD, WORLD_HELP, require_right_trainer, trainer_of, with_world_defaults
@@ -229,9 +230,8 @@ def _lerobot(flags: Sequence[str]) -> Iterator[None]:
     before, sys.argv = sys.argv, [_PROG, *flags]
     try:
         import lerobot.policies  # noqa: F401 (registers LeRobot's own types of policies)
-        from lerobot.utils.import_utils import register_third_party_plugins
 
-        register_third_party_plugins()
+        register_plugins()
         yield
     finally:
         sys.argv = before

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy.stats import chi2_contingency, chisquare
 
 from ..arrays import Array
 from ..scenarios import base_name
@@ -31,6 +30,8 @@ def _maps(data: EpisodeData) -> Iterator[Finding]:
             message = f"episodes for each map of {name}: too few to test whether they are balanced"
             yield Finding("", "balance", float(expected.min()), data.limit("balance.expected"), "info", message)
             continue
+        from scipy.stats import chisquare  # takes longer to import than the other checks together
+
         p = float(chisquare(observed, expected).pvalue)
         if p < data.limit("balance.p"):
             message = f"the maps of {name} have {observed.min()} to {observed.max()} episodes; p of a chi-square test"
@@ -52,6 +53,8 @@ def _pairs(data: EpisodeData) -> Iterator[Finding]:
     rows, columns = (np.unique(values[has_pair], return_inverse=True)[1] for values in (pairs, maps))
     cells = np.zeros((rows.max() + 1, columns.max() + 1), np.int64)
     np.add.at(cells, (rows, columns), 1)
+    from scipy.stats import chi2_contingency
+
     result = chi2_contingency(cells)
     smallest = float(np.asarray(result[3]).min())
     if smallest < data.limit("balance.expected"):
