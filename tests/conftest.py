@@ -26,6 +26,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 _FEW_FILES = 3
+_LONGEST_SOCKET_FOLDER = 90  # characters: the system refuses names of sockets of more than 107
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
@@ -91,7 +92,7 @@ def _computed_once():
 @pytest.fixture(scope="session")
 def warm_python(run_folder) -> list[str]:
     """The start of a command line of a new Python process that has imported LeRobot already, see `warm_python.py`."""
-    if not sys.platform.startswith("linux"):
+    if not sys.platform.startswith("linux") or len(str(run_folder)) > _LONGEST_SOCKET_FOLDER:
         return [sys.executable]
     from filelock import FileLock
     from warm_python import warm_python
