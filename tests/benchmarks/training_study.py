@@ -78,7 +78,7 @@ def train(row: Row, dataset: Path, folder: Path, seed: int, device: str = "cpu",
         return run
     if run.exists() and reached is None:
         shutil.rmtree(run)  # interrupted before its first checkpoint
-    every = max(1, row.steps // checkpoints)
+    every = -(-row.steps // checkpoints)  # rounded up: the last checkpoint is that of the last step
     logged = max(1, every // 5)
     numbers = (
         f"--steps={row.steps}", f"--save_freq={every}", f"--log_freq={logged}", "--env_eval_freq=0",
