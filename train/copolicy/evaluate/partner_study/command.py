@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,10 +27,9 @@ from ..study_flags import (
 )
 from ..summary import not_measured, percent
 from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
-from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
+from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
 
 if TYPE_CHECKING:
-    from ..partners.partner import StudyPartner
     from .robots import StudyRobot
 
 _LABEL = "human-in-the-loop protocol with SIMULATED partners: "
@@ -99,6 +98,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partners.partner import make_partner
     from .figure import save_partner_figure
     from .robots import scripted_robots
+    from .settings import partner_settings
     from .study import run_with_partners
     from .summary import definitions, differences, summarise_with_partners
 
@@ -155,15 +155,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
         "label": partners_label(named, task),
         **described[0],
         "settings": {
-            "maps": chosen.label,
-            "map_set": chosen.describe(),
-            "configurations": len(scenarios),
-            "map_count": len(scenarios),
-            "complete_set": len(scenarios) == len({scenario.digest for scenario in all_starts(chosen)}),
-            "orientations": task.orientations > 1,
-            "partners": {partner.name: _described(partner, profiles) for partner in partners},
-            "partner_seed": arguments.partner_seed,
-            "repeats": arguments.repeats,
+            **partner_settings(chosen, len(scenarios), partners, arguments.partner_seed, arguments.repeats),
             **study_settings(arguments, protocol, scenarios),
             **({"starts": "the recorded ones of the replay"} if partners[0].recorded is not None else {}),
         },
@@ -208,12 +200,6 @@ def partners_label(partners: Sequence[PartnerName], task: PairTask) -> str:
     }
     kinds = [text for kind, text in texts.items() if any(partner.kind == kind for partner in partners)]
     return f"{_LABEL}{', '.join(kinds)} sit at the human seat, no person took part in the study"
-
-
-def _described(partner: "StudyPartner", profiles: Mapping[str, Any]) -> Mapping[str, Any]:
-    described = dict(partner.describe())
-    plain = described.get("kind") == SCRIPTED and partner.name in profiles
-    return asdict(profiles[partner.name]) if plain else described
 
 
 def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, "StudyRobot"]) -> "StudyRobot":
