@@ -36,7 +36,10 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
 
 
 # Minutes in a few tests: first, so that no core waits for another at the end.
-_LONG_FILES = ("test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_train_distributed.py")
+_LONG_FILES = (
+    "test_quickstart.py", "test_train_hub.py", "test_convert_scale_slurm.py", "test_sweep_executors.py",
+    "test_train_distributed.py",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

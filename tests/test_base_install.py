@@ -54,6 +54,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
     "copolicy-eval partners make": ("--out partners", "lerobot"),
     "copolicy-eval plans": ("--policy pretrained --map 0 --out eval/plans.png", "torch"),
     "copolicy-eval power": ("--robots 5 --effect 0.14", "pingouin"),
+    "copolicy-eval sweep": ("--runs pretrained --out swept", "torch"),
     "copolicy-eval table coplanning": ("--runs pretrained --out table", "torch"),
     "copolicy-quickstart": ("--out quick", "lerobot"),
     "copolicy-train export": ("pretrained --out exported", "torch"),

@@ -10,7 +10,8 @@ from sharded_calls import EPISODES, call, content
 
 from copolicy.convert.cli import main
 from copolicy.dataset.distributed import ray_executor
-from copolicy.dataset.distributed.executors import Job, LocalExecutor
+from copolicy.dataset.distributed.executors import LocalExecutor
+from copolicy.dataset.distributed.job import Job
 
 
 class _InThisProcess(LocalExecutor):

@@ -27,6 +27,7 @@ from .study_flags import (
     study_policy,
     study_protocol,
 )
+from .sweep import add_sweep_command
 from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file
 from .within_subject.command import add_power_command
 
@@ -60,6 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_compare_command(commands)
     add_plans_command(commands)
     add_power_command(commands)
+    add_sweep_command(commands)
     add_table_command(commands)
     return run(parser, argv)
 

@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from copolicy.dataset.distributed.executors import Job, Step, run_tasks, submit_slurm
+from copolicy.dataset.distributed.executors import run_tasks, submit_slurm
 from copolicy.dataset.distributed.flags import Distribution
+from copolicy.dataset.distributed.job import Job, Step
 from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.files.staging import replace_json
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any
 
@@ -9,7 +10,7 @@ from datatrove.executor import RayPipelineExecutor
 
 from ..command_line.commands import progress_bar
 from ..exceptions import CopolicyError, InvalidValueError
-from .executors import Job, run_rank
+from .job import Job, run_rank
 
 RETRIES = 3
 """How often Ray runs a rank again whose process was killed."""
@@ -29,11 +30,7 @@ class RayExecutor(RayPipelineExecutor):
             address: of the cluster; None for the one of this process, of `RAY_ADDRESS`, or of this machine.
         """
         super().__init__([job.step], job.tasks, workers or -1, logging_dir=str(job.logs), cpus_per_task=job.threads)
-        self._job, self._address = job, address
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A job has functions of the command, which a worker does not need.
-        return {name: value for name, value in self.__dict__.items() if name not in ("_job", "_address")}
+        self.noun, self.environment, self.address = job.noun, dict(job.environment), address
 
     def run(self) -> list[CopolicyError]:
         """Runs the unfinished ranks.
@@ -42,14 +39,14 @@ class RayExecutor(RayPipelineExecutor):
             The errors of the failed ranks.
 
         Raises:
-            RunError: the process of a rank was killed more than `RETRIES` times; the other ranks are finished.
+            BrokenProcessPool: the process of a rank was killed more than `RETRIES` times; the other ranks have ended.
             InvalidValueError: there is no cluster at the address.
         """
         ranks = self.get_incomplete_ranks()
         if not ranks:
             return []
         self.save_executor_as_json()
-        with _cluster(self._address), progress_bar(len(ranks), self._job.noun) as bar:
+        with _cluster(self.address), progress_bar(len(ranks), self.noun) as bar:
             import ray
             from ray.exceptions import RayError, RayTaskError
 
@@ -57,7 +54,7 @@ class RayExecutor(RayPipelineExecutor):
                 num_cpus=self.cpus_per_task,
                 memory=int(self.mem_per_cpu_gb * self.cpus_per_task * 2**30),
                 max_retries=RETRIES,
-                runtime_env={"env_vars": dict(self._job.environment)} if self._job.environment else None,
+                runtime_env={"env_vars": self.environment} if self.environment else None,
             )
             executor = ray.put(self)
             running: list[Any] = []
@@ -76,7 +73,7 @@ class RayExecutor(RayPipelineExecutor):
                 errors += [error] if error else []
                 bar.update()
         if killed:
-            raise self._job.killed()
+            raise BrokenProcessPool
         return errors
 
 

@@ -85,7 +85,8 @@ class SweepTask:
 
     Attributes:
         run: its training seed, or the first digits of its weights' sha256 if it does not state one.
-        source: its folder, as results name it.
+        source: folder of its weights, as results name it.
+        checkpoint: the same, absolute.
         maps: label of the map set, or `RECORDED`.
         partner: None for co-planning.
         fps: actions per second of the policy.
@@ -103,6 +104,11 @@ class SweepTask:
     fps: int
     determined_by: Mapping[str, Any]
     file: Path
+
+    @property
+    def robot(self) -> str:
+        """Name of the training run."""
+        return f"{self.method} {self.run}"
 
     @property
     def key(self) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def _task(
     settings = determined_by(run, chosen, partner, replace(protocol, fps=fps), flags)
     file = task_file(out, method.name, name, maps, partner_label(partner))
     return SweepTask(
-        method.name, name, run.seed, os.path.relpath(run.folder), run.checkpoint.absolute(), maps, partner, fps,
+        method.name, name, run.seed, os.path.relpath(run.checkpoint), run.checkpoint.absolute(), maps, partner, fps,
         settings, file,
     )  # fmt: skip
 

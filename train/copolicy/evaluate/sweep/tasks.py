@@ -100,11 +100,17 @@ def _with_partner(plan: SweepPlan, task: SweepTask, named: PartnerName) -> dict[
             **({"starts": "the recorded ones of the replay"} if partner.recorded is not None else {}),
         },
         "summary": summary,
-        **({"overlap": plan.overlap} if plan.overlap else {}),
+        **_overlap(plan, task),
         **not_measured(protocol.task, summary),
         "definitions": definitions(protocol.task, summary),
         "episodes": [episode.to_json() for episode in episodes],
     }
+
+
+def _overlap(plan: SweepPlan, task: SweepTask) -> dict[str, Any]:
+    """The `overlap` entry of a result: pairs that both the robot and the partner learned from."""
+    shared = plan.overlap.get("shared", {}).get(task.robot, {}).get(task.key["partner"])
+    return {"overlap": {"allowed": True, "shared": shared}} if shared else {}
 
 
 def _map_set(plan: SweepPlan, task: SweepTask) -> Any:
