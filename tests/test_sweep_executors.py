@@ -67,6 +67,20 @@ def test_ray_gives_the_results_of_one_process(ray, run, digest, tmp_path, monkey
     assert table(Path("out"))["results_sha256"] == digest
 
 
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("127.0.0.1:1", "expected a Ray cluster that answers, found '127.0.0.1:1: "),
+        ("ray://127.0.0.1:1", "expected a Ray cluster that answers, found 'ray://127.0.0.1:1: "),
+        ("cluster", "expected HOST:PORT, ray://HOST:PORT or auto, found 'cluster'"),
+    ],
+)
+def test_an_address_without_a_cluster_is_one_line(ray, run, tmp_path, capsys, address, message):
+    assert sweep(run, tmp_path / "out", "--executor", "ray", "--address", address) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"copolicy-eval: --address: {message}")
+    assert not (tmp_path / "out").exists()
+
+
 def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monkeypatch, capsys):
     cluster = stand_in_cluster(tmp_path / "cluster", monkeypatch)
     out = tmp_path / "out"

@@ -39,7 +39,9 @@ def run_tasks(job: Job, distribution: Distribution) -> list[CopolicyError]:
         with quiet():
             return executor.run()
     except BrokenProcessPool:
-        raise job.killed() from None
+        if job.finished() < job.tasks:
+            raise job.killed() from None
+        return []  # killed after its last task
 
 
 def submit_slurm(job: Job, last: Job, distribution: Distribution) -> dict[str, Any]:

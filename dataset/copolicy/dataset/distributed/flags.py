@@ -3,6 +3,7 @@
 import argparse
 import importlib.util
 import shutil
+import socket
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,8 @@ from ..command_line.flag_numbers import whole_number
 from ..exceptions import InvalidValueError
 
 EXECUTORS = ("local", "slurm", "ray")
+
+_ANSWER_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -51,11 +54,14 @@ class Distribution:
         """Checks that the executor is usable on this machine.
 
         Raises:
-            InvalidValueError: Ray is not installed, sbatch is not found, or no partition is given.
+            InvalidValueError: Ray is not installed, nothing answers at its address, sbatch is not found, or no
+                partition is given.
         """
         if self.executor == "ray" and importlib.util.find_spec("ray") is None:
             expected = "local or slurm, as ray is not installed (pip install ray)"
             raise InvalidValueError("--executor", expected, self.executor)
+        if self.address is not None:
+            _require_answer(self.address)
         if self.executor == "slurm":
             if shutil.which("sbatch") is None:
                 raise InvalidValueError("--executor", "sbatch on the PATH, for slurm", "none")
@@ -113,6 +119,19 @@ def distribution_from_flags(arguments: argparse.Namespace) -> Distribution:
     if arguments.workers is not None and arguments.workers < 1:
         raise InvalidValueError("workers", "at least 1", arguments.workers)
     return Distribution(executor, arguments.workers, SlurmOptions(**slurm), arguments.address)
+
+
+def _require_answer(address: str) -> None:
+    """Checks that something answers at an address; Ray itself tries for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if address in ("auto", "local"):
+        return
+    if not colon or not port.isdecimal():
+        raise InvalidValueError("--address", "HOST:PORT, ray://HOST:PORT or auto", address)
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise InvalidValueError("--address", "a Ray cluster that answers", f"{address}: {error}") from None
 
 
 def _option(text: str) -> tuple[str, str]:

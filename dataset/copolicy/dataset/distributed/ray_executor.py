@@ -1,9 +1,10 @@
 """Runs ranks as tasks of a Ray cluster."""
 
 import logging
+import sys
 from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
 from datatrove.executor import RayPipelineExecutor
@@ -32,7 +33,7 @@ class RayExecutor(RayPipelineExecutor):
         super().__init__([job.step], job.tasks, workers or -1, logging_dir=str(job.logs), cpus_per_task=job.threads)
         self.noun, self.environment, self.address = job.noun, dict(job.environment), address
 
-    def run(self) -> list[CopolicyError]:
+    def run(self) -> list[CopolicyError]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Runs the unfinished ranks.
 
         Returns:
@@ -47,8 +48,8 @@ class RayExecutor(RayPipelineExecutor):
             return []
         self.save_executor_as_json()
         with _cluster(self.address), progress_bar(len(ranks), self.noun) as bar:
-            import ray
-            from ray.exceptions import RayError, RayTaskError
+            import ray  # pyright: ignore[reportMissingImports]
+            from ray.exceptions import RayError, RayTaskError  # pyright: ignore[reportMissingImports]
 
             remote = ray.remote(run_rank).options(
                 num_cpus=self.cpus_per_task,
@@ -79,20 +80,21 @@ class RayExecutor(RayPipelineExecutor):
 
 @contextmanager
 def _cluster(address: str | None) -> Iterator[None]:
-    """Connects to a cluster, unless this process is connected."""
-    import ray
+    """Connects to a cluster, unless this process is connected; what Ray prints goes to stderr."""
+    import ray  # pyright: ignore[reportMissingImports]
 
-    if ray.is_initialized():
-        yield
-        return
-    try:
-        ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        if address is None:
-            raise
-        found = f"{address}: {next(iter(str(error).splitlines()), type(error).__name__)}"
-        raise InvalidValueError("--address", "a Ray cluster that answers", found) from None
-    try:
-        yield
-    finally:
-        ray.shutdown()
+    with redirect_stdout(sys.stderr):  # a message for each killed process
+        if ray.is_initialized():
+            yield
+            return
+        try:
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            if address is None:
+                raise
+            found = f"{address}: {next(iter(str(error).splitlines()), type(error).__name__)}"
+            raise InvalidValueError("--address", "a Ray cluster that answers", found) from None
+        try:
+            yield
+        finally:
+            ray.shutdown()
