@@ -106,7 +106,6 @@ def test_the_table_has_a_row_for_each_task(swept):
         assert (row["robot_share"] == "") is (row["partner"] == "co-planning")
         assert float(row["wall_s"]) > 0
         assert row["episodes_sha256"] == of["episodes_sha256"] == result["sweep"]["episodes_sha256"]
-        assert result["sweep"]["threads"] == 1
     assert len({row["episodes_sha256"] for row in rows}) == 4
     text = (swept / "sweep.md").read_text(encoding="utf-8")
     assert "no person took part" in text
@@ -192,6 +191,7 @@ def test_results_of_other_settings_weights_and_partners_are_refused(made, copied
 
     line = refused(made, "--seed", "1")
     assert line == f"{path}: expected seed 1 as in this run (another --out, or --overwrite), found 'seed 0'"
+    assert ": expected threads 2 as in this run" in refused(made, "--threads", "2")
     assert ": expected world {" in refused(made, "--step-limit", "27")
     assert "expected overrides {" in refused(made, "--num-inference-steps", "3")
     other = Path(shutil.copytree(made, tmp_path / "other", symlinks=True))

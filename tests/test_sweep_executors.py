@@ -85,16 +85,16 @@ def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monk
     cluster = stand_in_cluster(tmp_path / "cluster", monkeypatch)
     out = tmp_path / "out"
     flags = ("--executor", "slurm", "--partition", "cpu", "--time", "00:20:00", "--sbatch", "account=lab")
-    assert sweep(run, out, *flags, "--workers", "1", "--threads", "2", "--memory-gb", "6") == 0
+    assert sweep(run, out, *flags, "--workers", "1", "--memory-gb", "6") == 0
     summary = json.loads(capsys.readouterr().out)
     logs = {path.name: path.read_text(encoding="utf-8") for path in sorted(cluster.glob("*.log"))}
     assert (out / "sweep.json").is_file(), logs
     assert (summary["tasks"], summary["finished_before"]) == (2, 0)
     script = (cluster / f"{summary['jobs']['tasks']}.job").read_text(encoding="utf-8").splitlines()
-    options = ("array=0-1%1", "partition=cpu", "time=00:20:00", "account=lab", "mem-per-cpu=3G", "cpus-per-task=2")
+    options = ("array=0-1%1", "partition=cpu", "time=00:20:00", "account=lab", "mem-per-cpu=6G", "cpus-per-task=1")
     for option in options:
         assert f"#SBATCH --{option}" in script
-    (setup,) = [line for line in script if line.startswith("export OMP_NUM_THREADS=2")]
+    (setup,) = [line for line in script if line.startswith("export OMP_NUM_THREADS=1")]
     assert sys.prefix in setup
     arguments = (cluster / f"{summary['jobs']['sweep-table']}.arguments").read_text(encoding="utf-8")
     assert f"--dependency=afterok:{summary['jobs']['tasks']}" in arguments

@@ -55,6 +55,7 @@ class StudyFlags:
         partner_n_action_steps: the same with partners.
         limit: number of maps of co-planning; all if None.
         configurations: number of starts with partners, see `study_configurations`.
+        threads: of a task; the last digits of a policy's sums depend on them.
         overrides: settings of the policy that flags override.
     """
 
@@ -67,6 +68,7 @@ class StudyFlags:
     seed: int
     partner_seed: int
     device: str
+    threads: int
     overrides: Mapping[str, Any]
 
     @classmethod
@@ -74,7 +76,7 @@ class StudyFlags:
         """From the flags of the command."""
         names = (
             "n_action_steps", "partner_n_action_steps", "orientations", "limit", "configurations", "repeats", "seed",
-            "partner_seed", "device",
+            "partner_seed", "device", "threads",
         )  # fmt: skip
         return cls(**{name: getattr(arguments, name) for name in names}, overrides=policy_settings(arguments))
 
@@ -124,7 +126,6 @@ class SweepPlan:
         world: settings of the world.
         contradictions: see `Protocol`.
         map_sets: by label.
-        threads: of a task.
         overlap: see `check_overlap`.
     """
 
@@ -135,7 +136,6 @@ class SweepPlan:
     flags: StudyFlags
     map_sets: Mapping[str, ScenarioSet]
     tasks: tuple[SweepTask, ...]
-    threads: int
     overlap: Mapping[str, Any]
 
     @property
@@ -231,6 +231,7 @@ def determined_by(
         "starts_sha256": _sha256("".join(scenario.digest for scenario in starts)),
         "repeats": flags.repeats,
         "seed": flags.seed,
+        "threads": flags.threads,
     }
     if partner is not None:
         described |= {

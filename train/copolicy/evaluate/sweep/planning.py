@@ -58,7 +58,7 @@ def make_plan(arguments: argparse.Namespace) -> SweepPlan:
     ]
     return SweepPlan(
         out, protocol.task.spec.name, protocol.settings, protocol.contradictions, flags,
-        {chosen.label: chosen for chosen in map_sets}, tuple(tasks), arguments.threads, overlap,
+        {chosen.label: chosen for chosen in map_sets}, tuple(tasks), overlap,
     )  # fmt: skip
 
 

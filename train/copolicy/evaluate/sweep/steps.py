@@ -32,9 +32,9 @@ class Collect(Step):
 def sweep_job(plan: SweepPlan) -> Job:
     """The tasks of a plan."""
     # Before a process loads its libraries: afterwards the variable changes nothing.
-    environment = {"OMP_NUM_THREADS": str(plan.threads)}
+    environment = {"OMP_NUM_THREADS": str(plan.flags.threads)}
     return Job(
-        RunTask(plan), len(plan.tasks), plan.out, plan.logs, "tasks", plan.finished, plan.threads, environment
+        RunTask(plan), len(plan.tasks), plan.out, plan.logs, "tasks", plan.finished, plan.flags.threads, environment
     )  # fmt: skip
 
 

@@ -42,7 +42,7 @@ def run_task(plan: SweepPlan, rank: int) -> None:
     for partial in task.file.parent.glob(f".{task.file.name}.*.partial"):
         partial.unlink(missing_ok=True)
     started = perf_counter()
-    with _threads(plan.threads):
+    with _threads(plan.flags.threads):
         result = _coplanning(plan, task) if task.partner is None else _with_partner(plan, task, task.partner)
     _require_unchanged(plan, task)
     result["policy"]["checkpoint"] = task.source  # not relative to the folder of a worker
@@ -50,7 +50,6 @@ def run_task(plan: SweepPlan, rank: int) -> None:
         **task.key,
         "seed": task.seed,
         "version": version("lerobot_policy_copolicy"),
-        "threads": plan.threads,
         "wall_s": perf_counter() - started,
         "episodes_sha256": digest([task.determined_by, result["episodes"]]),
         "determined_by": task.determined_by,
