@@ -16,7 +16,8 @@ from copolicy.dataset.scenarios import base_name
 
 from ..comparison.paired import BOOTSTRAP, between_runs, clustered_mean
 from ..markdown_table import markdown_table
-from .plan import COPLANNING, NAME, PLAN_FILE, RECORDED, TABLES, digest
+from .determinants import digest
+from .plan import COPLANNING, NAME, PLAN_FILE, RECORDED, TABLES
 
 LABEL = (
     "Simulated: in co-planning both players act on one sampled plan, else a simulated partner sits at the human's "

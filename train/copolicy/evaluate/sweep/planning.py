@@ -18,7 +18,8 @@ from ..coplanning_table.training_runs import TrainedMethod, TrainingRun, read_tr
 from ..partners.names import PROXY, REPLAY, PartnerName, parse_partners
 from ..partners.overlap import check_overlap
 from ..study_flags import Protocol, study_protocol
-from .plan import RECORDED, StudyFlags, SweepPlan, SweepTask, determined_by, partner_label, task_file
+from .determinants import StudyFlags, determined_by
+from .plan import RECORDED, SweepPlan, SweepTask, partner_label, task_file
 
 DEFAULT_MAPS = ("holdout", "unseen")
 

@@ -25,7 +25,8 @@ from ..partners.partner import make_partner
 from ..stored_settings import without_run
 from ..study_flags import study_policy, study_settings
 from ..summary import not_measured
-from .plan import SweepPlan, SweepTask, determined_by, digest, starts_of
+from .determinants import determined_by, digest, starts_of
+from .plan import SweepPlan, SweepTask
 
 
 def run_task(plan: SweepPlan, rank: int) -> None:
