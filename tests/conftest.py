@@ -39,7 +39,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
 _LONG_FILES = (
     "test_quickstart.py", "test_scripted_players.py", "test_train_hub.py", "test_convert_scale_restart.py",
     "test_train_distributed.py", "test_convert_scale_slurm.py", "test_damaged_sets.py", "test_simulate.py",
-    "test_policy_fast_planning.py", "test_recover.py",
+    "test_policy_fast_planning.py", "test_sweep_executors.py", "test_recover.py",
 )  # fmt: skip
 
 

@@ -114,6 +114,7 @@ def test_a_video_is_merged_with_the_same_content(unsharded, tmp_path):
             "--executor: expected local or slurm, as ray is not installed (pip install ray), found 'ray'",
         ),
         (("--partition", "cpu"), "--partition: expected --executor slurm beside it, found 'local'"),
+        (("--address", "auto"), "--address: expected --executor ray beside it, found 'local'"),
         (("--sbatch", "account=lab"), "--sbatch: expected --executor slurm beside it, found 'local'"),
         (
             ("--executor", "slurm", "--sbatch", "--account"),
@@ -136,7 +137,8 @@ def test_a_wrong_call(unsharded, tmp_path, capsys, monkeypatch, flags, message):
 @pytest.fixture
 def without_datatrove(monkeypatch) -> Callable[[], None]:
     def hide() -> None:
-        for name in [name for name in sys.modules if name.startswith("copolicy.convert.scale.")]:
+        rooms = ("copolicy.convert.scale.", "copolicy.dataset.distributed.")
+        for name in [name for name in sys.modules if name.startswith(rooms)]:
             monkeypatch.delitem(sys.modules, name)
         for name in ("datatrove", "datatrove.executor", "datatrove.executor.local", "datatrove.pipeline.base"):
             monkeypatch.setitem(sys.modules, name, None)

@@ -1,4 +1,4 @@
-"""Shards on Ray: with Ray itself where it is installed, and with datatrove's local executor in its place elsewhere."""
+"""Shards on Ray: with Ray itself where it is installed, and with the local executor in its place elsewhere."""
 
 import importlib.util
 import json
@@ -6,18 +6,19 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from datatrove.executor import LocalPipelineExecutor
 from sharded_calls import EPISODES, call, content
 
 from copolicy.convert.cli import main
-from copolicy.convert.scale import executors
+from copolicy.dataset.distributed import ray_executor
+from copolicy.dataset.distributed.executors import LocalExecutor
+from copolicy.dataset.distributed.job import Job
 
 
-class _InThisProcess(LocalPipelineExecutor):
-    """Takes what `RayPipelineExecutor` takes, and runs one rank after the other here."""
+class _InThisProcess(LocalExecutor):
+    """Takes what `RayExecutor` takes, and runs one rank after the other here."""
 
-    def __init__(self, pipeline: list, tasks: int, workers: int, logging_dir: str):
-        super().__init__(pipeline, tasks=tasks, workers=1, logging_dir=logging_dir)
+    def __init__(self, job: Job, workers: int | None, address: str | None):
+        super().__init__(job, 1)
 
 
 @pytest.fixture(params=["stand-in", "ray"])
@@ -30,7 +31,7 @@ def ray(request, monkeypatch, tmp_path_factory):
         (folder / "ray").mkdir()
         (folder / "ray" / "__init__.py").touch()
         monkeypatch.syspath_prepend(folder)
-    monkeypatch.setattr(executors, "RayPipelineExecutor", _InThisProcess)
+    monkeypatch.setattr(ray_executor, "RayExecutor", _InThisProcess)
 
 
 def _ray(unsharded: Path, root: Path, *flags: str) -> list[str]:

@@ -1,47 +1,19 @@
 """Conversions in shards as SLURM jobs, on programs that stand for a cluster's."""
 
 import json
-import os
-import shlex
 import shutil
-import stat
 from pathlib import Path
 
 import pytest
 from sharded_calls import EPISODES, call, content, damage
+from slurm_cluster import stand_in_cluster
 
 from copolicy.convert.cli import main
 
 
 @pytest.fixture
 def cluster(tmp_path, monkeypatch, warm_python) -> Path:
-    """Programs that stand for a cluster's: `sbatch` keeps a script and runs it here, once for each array index."""
-    folder = tmp_path / "cluster"
-    folder.mkdir()
-    programs = {
-        "sbatch": """#!/bin/bash
-script="${@: -1}"
-number=$(($(ls "$CLUSTER"/*.job 2>/dev/null | wc -l) + 1))
-cp "$script" "$CLUSTER/$number.job"
-echo "$@" >"$CLUSTER/$number.arguments"
-last=$(sed -n 's/^#SBATCH --array=0-\\([0-9]*\\).*/\\1/p' "$script")
-for index in $(seq 0 "$last"); do
-  SLURM_ARRAY_TASK_ID=$index SLURM_NODELIST=node SLURM_JOB_ID=$number bash "$script" >>"$CLUSTER/$number.log" 2>&1
-done
-echo "Submitted batch job $number"
-""",
-        "srun": f"""#!/bin/bash
-while [[ "$1" == -* ]]; do [ "$1" = -n ] && shift; shift; done
-exec {shlex.join(warm_python)} "$(command -v "$1")" "${{@:2}}"
-""",
-        "scontrol": '#!/bin/bash\necho "${@: -1}"\n',
-    }
-    for name, text in programs.items():
-        (folder / name).write_text(text, encoding="utf-8")
-        (folder / name).chmod((folder / name).stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setenv("CLUSTER", str(folder))
-    return folder
+    return stand_in_cluster(tmp_path / "cluster", monkeypatch, warm_python)
 
 
 def test_slurm_jobs_make_the_shards_and_merge_them(unsharded, tmp_path, cluster, capsys):

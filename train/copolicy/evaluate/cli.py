@@ -29,6 +29,7 @@ from .study_flags import (
     study_policy,
     study_protocol,
 )
+from .sweep import add_sweep_command
 from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file
 from .within_subject.command import add_power_command
 
@@ -67,6 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_plans_command(commands)
     add_figures_command(commands)
     add_power_command(commands)
+    add_sweep_command(commands)
     help = "tables of the paper, from training runs and from recordings with people"
     tables = add_group(commands, "table", help, help, _TABLES)
     add_coplanning_table_command(tables)

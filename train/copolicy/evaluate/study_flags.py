@@ -42,8 +42,10 @@ def add_study_flags(command: argparse.ArgumentParser, n_action_steps: int) -> No
     add_protocol_flags(command, n_action_steps)
 
 
-def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:
-    """Adds the flags of inference, of the world's settings, `--seed` and `--overwrite`."""
+def add_protocol_flags(
+    command: argparse.ArgumentParser, n_action_steps: int, overwrite: str = "replace an existing result"
+) -> None:
+    """Adds the flags of inference, of the world's settings, `--seed` and `--overwrite`, with the help of the last."""
     samplers, backends = ("ddpm", "ddim", "dpmsolver++"), ("auto", "torch", "onnx", "numba")
     command.add_argument("--sampler", choices=samplers, help="diffusion sampler (default: the checkpoint's)")
     command.add_argument("--backend", choices=backends, help="runs the network (default: the checkpoint's)")
@@ -54,7 +56,7 @@ def add_protocol_flags(command: argparse.ArgumentParser, n_action_steps: int) ->
     codes = ("drawn", "inferred", "episode")
     command.add_argument("--code", choices=codes, help="how cogail gets its code (default: the checkpoint's)")
     add_world_flags(command, n_action_steps)
-    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
+    command.add_argument("--overwrite", action="store_true", help=overwrite)
 
 
 def add_world_flags(command: argparse.ArgumentParser, n_action_steps: int) -> None:

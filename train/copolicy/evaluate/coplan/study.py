@@ -1,7 +1,7 @@
 """The co-planning study of one policy on one map set: its settings, and its result and figure as files."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from ..study_flags import Protocol, study_settings
 from ..summary import not_measured, percent, summarise
 from ..trajectories import trajectories_beside, write_trajectories
 from .figure import save_path_figure
-from .rollouts import coplan
+from .rollouts import EpisodeResult, coplan
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -39,6 +39,42 @@ def coplan_settings(arguments: argparse.Namespace, protocol: Protocol, chosen: S
     }
 
 
+def coplan_result(
+    policy: "Checkpoint",
+    protocol: Protocol,
+    scenarios: Sequence[Any],
+    settings: Mapping[str, Any],
+    on_step: Callable[[int], object] = lambda finished: None,
+) -> tuple[dict[str, Any], list[EpisodeResult]]:
+    """Runs the study; returns its result and its episodes.
+
+    Args:
+        policy: with the number of actions of a chunk that are executed.
+        settings: see `coplan_settings`.
+        on_step: called after each step with the number of finished episodes.
+    """
+    episodes = coplan(
+        policy,
+        scenarios,
+        protocol.settings,
+        repeats=settings["repeats"],
+        fps=protocol.fps,
+        seed=settings["seed"],
+        on_step=on_step,
+    )
+    summary = summarise(episodes, policy)
+    result = {
+        "study": "coplan",
+        "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
+        "policy": policy.describe(),
+        "settings": settings,
+        "summary": summary,
+        **not_measured(protocol.task, summary),
+        "episodes": [episode.to_json() for episode in episodes],
+    }
+    return result, episodes
+
+
 def write_coplan_result(
     policy: "Checkpoint",
     protocol: Protocol,
@@ -58,27 +94,11 @@ def write_coplan_result(
         trajectories: also write the trajectories beside the result.
     """
     first = bar.n
-    episodes = coplan(
-        policy,
-        scenarios,
-        protocol.settings,
-        repeats=settings["repeats"],
-        fps=protocol.fps,
-        seed=settings["seed"],
-        on_step=lambda finished: bar.update(first + finished - bar.n),
+    result, episodes = coplan_result(
+        policy, protocol, scenarios, settings, lambda finished: bar.update(first + finished - bar.n)
     )
-    summary = summarise(episodes, policy)
-    result = {
-        "study": "coplan",
-        "label": "co-planning in simulation: both players act on one sampled plan, no person took part",
-        "policy": policy.describe(),
-        "settings": settings,
-        "summary": summary,
-        **not_measured(protocol.task, summary),
-        "episodes": [episode.to_json() for episode in episodes],
-    }
     out.parent.mkdir(parents=True, exist_ok=True)
-    success = summary["success"]
+    success = result["summary"]["success"]
     title = f"co-planning on {settings['maps']}: {percent(success)} of {success['episodes']} episodes"
     if protocol.task.outline is not None:
         save_path_figure(episodes, out.with_suffix(".png"), title)

@@ -93,8 +93,12 @@ class TrainingRun:
         """What runs of one method have in common: everything but the seed."""
         first = {name: self.config.get(name) for name in ("type", "preset")}  # the first difference is reported
         shared = {"data set": self.data, "frames a second": self.conditions.fps, "batch_size": self.batch_size}
-        policy = {name: value for name, value in self.config.items() if name not in _PLACES}
-        return {**first, **shared, "steps": self.steps, **policy}
+        return {**first, **shared, "steps": self.steps, **self.policy_settings}
+
+    @property
+    def policy_settings(self) -> dict[str, Any]:
+        """The entries of `config.json` that say which policy it is, not where it was trained and kept."""
+        return {name: value for name, value in self.config.items() if name not in _PLACES}
 
 
 @dataclass(frozen=True)

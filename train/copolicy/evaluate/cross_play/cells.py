@@ -10,7 +10,6 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.task import PairTask
@@ -19,6 +18,7 @@ from ..file_names import file_name
 from ..partner_study.robots import StudyRobot
 from ..partner_study.study import run_with_partners
 from ..partners.partner import StudyPartner
+from ..stored_settings import require_same_settings, without_run
 from ..trajectories import trajectories_beside, write_trajectories
 from .measures import Row, episode_row
 
@@ -26,7 +26,6 @@ OWN_KIND = "own-kind"
 """Row of the matrix in which each partner meets its own kind."""
 
 _FOLDER = "cells"
-_OF_A_RUN = ("checkpoint", "planned_with")  # entries of a description that do not determine the episodes
 
 
 class CellDocument(TypedDict):
@@ -97,7 +96,7 @@ def run_cell(
     settings = _described(play, robot, partner)
     if path.exists() and not overwrite:
         stored = read_json(path, CellDocument, "a cell of a cross-play")
-        _require_same(path, stored["settings"], settings)
+        require_same_settings(path, stored["settings"], settings)
         if not trajectories or trajectories_beside(path).exists():
             return stored
     already = 0 if robot.policy is None else len(robot.policy.inference_seconds)
@@ -137,21 +136,7 @@ def _described(play: Play, robot: StudyRobot, partner: StudyPartner) -> dict[str
     described = {
         **play.described,
         "fps": play.fps(robot),
-        "robot": _without_run(robot.describe()),
-        "partner": _without_run(partner.describe()),
+        "robot": without_run(robot.describe()),
+        "partner": without_run(partner.describe()),
     }
     return json.loads(json.dumps(described))  # as it is read again: tuples are lists
-
-
-def _without_run(described: Any) -> Any:
-    if not isinstance(described, Mapping):
-        return described
-    return {name: _without_run(value) for name, value in described.items() if name not in _OF_A_RUN}
-
-
-def _require_same(path: Path, stored: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    for name in (*now, *stored):
-        if stored.get(name) != now.get(name):
-            first, second = (json.dumps(each.get(name))[:80] for each in (now, stored))
-            expected = f"{name} {first} as in this run (another --out, or --overwrite)"
-            raise InvalidValueError(str(path), expected, f"{name} {second}")

@@ -1,10 +1,8 @@
 """`copolicy-eval partner`."""
 
 import argparse
-from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.dataset.command_line.commands import Commands, add_command, progress_bar
@@ -14,7 +12,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import get_task
 
-from ..partners.names import PARTNERS_HELP, PROXY, SCRIPTED, parse_partners, partners_label
+from ..partners.names import PARTNERS_HELP, PROXY, parse_partners, partners_label
 from ..study_flags import (
     POLICY_HELP,
     add_study_flags,
@@ -26,11 +24,8 @@ from ..study_flags import (
 )
 from ..summary import not_measured, percent
 from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
-from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, all_starts, study_configurations
+from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
 from .robots import make_robot, scripted_robots, split_name
-
-if TYPE_CHECKING:
-    from ..partners.partner import StudyPartner
 
 
 def add_partner_command(commands: Commands) -> None:
@@ -94,6 +89,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     from ..partners.overlap import check_overlap
     from ..partners.partner import make_partner
     from .figure import save_partner_figure
+    from .settings import partner_settings
     from .study import run_with_partners
     from .summary import definitions, differences, summarise_with_partners
 
@@ -150,15 +146,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
         "label": partners_label(named, task),
         **described[0],
         "settings": {
-            "maps": chosen.label,
-            "map_set": chosen.describe(),
-            "configurations": len(scenarios),
-            "map_count": len(scenarios),
-            "complete_set": len(scenarios) == len({scenario.digest for scenario in all_starts(chosen)}),
-            "orientations": task.orientations > 1,
-            "partners": {partner.name: _described(partner, profiles) for partner in partners},
-            "partner_seed": arguments.partner_seed,
-            "repeats": arguments.repeats,
+            **partner_settings(chosen, len(scenarios), partners, arguments.partner_seed, arguments.repeats),
             **study_settings(arguments, protocol, scenarios),
             **({"starts": "the recorded ones of the replay"} if partners[0].recorded is not None else {}),
         },
@@ -189,12 +177,6 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
         **({"trajectories": str(trajectories)} if trajectories else {}),
         **not_measured(task, summaries[0]),
     }
-
-
-def _described(partner: "StudyPartner", profiles: Mapping[str, Any]) -> Mapping[str, Any]:
-    described = dict(partner.describe())
-    plain = described.get("kind") == SCRIPTED and partner.name in profiles
-    return asdict(profiles[partner.name]) if plain else described
 
 
 def _report(summary: dict) -> dict[str, Any]:

@@ -1,0 +1,102 @@
+"""Sweeps on Ray (itself where it is installed, else the local executor in its place) and on stand-ins for SLURM."""
+
+import json
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from policy_runs import save_run
+from slurm_cluster import stand_in_cluster
+
+from copolicy.dataset.distributed import ray_executor
+from copolicy.dataset.distributed.executors import LocalExecutor
+from copolicy.dataset.distributed.job import Job
+from copolicy.evaluate.cli import main
+
+
+class _InThisProcess(LocalExecutor):
+    """Takes what `RayExecutor` takes, and runs one rank after the other here."""
+
+    def __init__(self, job: Job, workers: int | None, address: str | None):
+        super().__init__(job, 1)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    return save_run(tmp_path_factory.mktemp("method") / "seed_0")
+
+
+@pytest.fixture(scope="module")
+def digest(run, tmp_path_factory) -> str:
+    """The results of one process."""
+    out = tmp_path_factory.mktemp("local") / "out"
+    assert sweep(run, out) == 0
+    return table(out)["results_sha256"]
+
+
+def sweep(run: Path, out: Path, *flags: str) -> int:
+    limits = ("--limit", "2", "--configurations", "4", "--step-limit", "24", "--maps", "unseen")
+    return main(
+        ["sweep", "--runs", f"ours={run}", "--partners", "stubborn", "--out", str(out), *limits, *flags, "--json"]
+    )
+
+
+def table(out: Path) -> dict:
+    return json.loads((out / "sweep.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(params=["stand-in", "ray"])
+def ray(request, monkeypatch, tmp_path_factory):
+    if request.param == "ray":
+        pytest.importorskip("ray")
+        return
+    if find_spec("ray") is None:
+        folder = tmp_path_factory.mktemp("packages")
+        (folder / "ray").mkdir()
+        (folder / "ray" / "__init__.py").touch()
+        monkeypatch.syspath_prepend(folder)
+    monkeypatch.setattr(ray_executor, "RayExecutor", _InThisProcess)
+
+
+def test_ray_gives_the_results_of_one_process(ray, run, digest, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(run, "run", symlinks=True)
+    assert sweep(Path("run"), Path("out"), "--executor", "ray", "--workers", "2") == 0
+    assert table(Path("out"))["results_sha256"] == digest
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("127.0.0.1:1", "expected a Ray cluster that answers, found '127.0.0.1:1: "),
+        ("ray://127.0.0.1:1", "expected a Ray cluster that answers, found 'ray://127.0.0.1:1: "),
+        ("cluster", "expected HOST:PORT, ray://HOST:PORT or auto, found 'cluster'"),
+    ],
+)
+def test_an_address_without_a_cluster_is_one_line(ray, run, tmp_path, capsys, address, message):
+    assert sweep(run, tmp_path / "out", "--executor", "ray", "--address", address) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"copolicy-eval: --address: {message}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monkeypatch, capsys):
+    cluster = stand_in_cluster(tmp_path / "cluster", monkeypatch, warm_python)
+    out = tmp_path / "out"
+    flags = ("--executor", "slurm", "--partition", "cpu", "--time", "00:20:00", "--sbatch", "account=lab")
+    assert sweep(run, out, *flags, "--workers", "1", "--memory-gb", "6") == 0
+    summary = json.loads(capsys.readouterr().out)
+    logs = {path.name: path.read_text(encoding="utf-8") for path in sorted(cluster.glob("*.log"))}
+    assert (out / "sweep.json").is_file(), logs
+    assert (summary["tasks"], summary["finished_before"]) == (2, 0)
+    script = (cluster / f"{summary['jobs']['tasks']}.job").read_text(encoding="utf-8").splitlines()
+    options = ("array=0-1%1", "partition=cpu", "time=00:20:00", "account=lab", "mem-per-cpu=6G", "cpus-per-task=1")
+    for option in options:
+        assert f"#SBATCH --{option}" in script
+    (setup,) = [line for line in script if line.startswith("export OMP_NUM_THREADS=1")]
+    assert sys.prefix in setup
+    arguments = (cluster / f"{summary['jobs']['sweep-table']}.arguments").read_text(encoding="utf-8")
+    assert f"--dependency=afterok:{summary['jobs']['tasks']}" in arguments
+    assert table(out)["results_sha256"] == digest
+    assert main(["sweep", "--out", str(out), "--collect"]) == 0
