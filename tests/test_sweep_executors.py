@@ -81,7 +81,7 @@ def test_an_address_without_a_cluster_is_one_line(ray, run, tmp_path, capsys, ad
     assert not (tmp_path / "out").exists()
 
 
-def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monkeypatch, capsys):
+def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monkeypatch, warm_python, capsys):
     cluster = stand_in_cluster(tmp_path / "cluster", monkeypatch, warm_python)
     out = tmp_path / "out"
     flags = ("--executor", "slurm", "--partition", "cpu", "--time", "00:20:00", "--sbatch", "account=lab")
