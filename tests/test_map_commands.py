@@ -182,7 +182,8 @@ def test_co_planning_on_a_split_of_a_file(walked, capsys):
 
 def test_the_plan_of_a_human_study_keeps_the_names_of_a_file(tmp_path):
     pytest.importorskip("lerobot")
-    from copolicy.evaluate.human_study.plan import Robot, StudyPlan, make_plan
+    from copolicy.evaluate.human_study.design import make_plan
+    from copolicy.evaluate.human_study.plan import Robot, StudyPlan
     from copolicy.evaluate.partner_study.configurations import study_configurations
 
     chosen = get_task().scenario_set(str(write_lab(tmp_path)))

@@ -102,7 +102,7 @@ def test_every_reader_takes_every_layout(source, tmp_path, name):
     notes = json.loads((root / "meta" / "copolicy.json").read_text(encoding="utf-8"))["notes"]
     assert notes == ({"layouts": list(episode.notes)} if expected else {})
     assert list(find_raw_recordings(root, folder).files) == ["raw/episode_000.mcap"]
-    (row,), left_out = study_rows(folder, None)
+    (row,), left_out = study_rows([folder], None)
     assert (row["steps"], left_out) == (len(truth.episode.actions), {})
 
 

@@ -21,7 +21,7 @@ def plan(planner, batch: int = 3, seed: int = 0, actions: int | None = None) -> 
     return planner.sample_actions(columns(batch, 3, seed=seed), torch.Generator().manual_seed(seed), actions=actions)
 
 
-@pytest.mark.parametrize("network", [{**TRANSFORMER, "n_layers": 2}, MLP], ids=["transformer", "mlp"])
+@pytest.mark.parametrize("network", [{**TRANSFORMER, "n_layers": 3}, MLP], ids=["transformer", "mlp"])
 @pytest.mark.parametrize(("sampler", "steps"), SAMPLERS)
 @pytest.mark.parametrize("prediction_type", ["epsilon", "sample", "v_prediction"])
 def test_plans_are_those_of_the_plain_sampler(network, sampler, steps, prediction_type):

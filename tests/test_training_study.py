@@ -86,4 +86,4 @@ def test_curves_are_of_the_checkpoints_along_a_training(tmp_path):
 def test_every_row_names_its_budget():
     table = rivals.budgets(rivals.ROWS)
     assert table.count("\n") == len(rivals.ROWS) + 1
-    assert "| bc-scan-10hz | bc_lstm_gmm, scan | 10 | 20,000 | 100 |" in table
+    assert "| bc-scan-10hz | bc_lstm_gmm, scan | 10 | 6,000 | 100 |" in table

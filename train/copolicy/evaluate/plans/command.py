@@ -71,6 +71,8 @@ def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
     from .sampling import sample_chunks
 
     policy = study_policy(arguments.policy, arguments)
+    if policy.chunk_size < 2:
+        raise InvalidValueError("--policy", "a policy of action chunks", f"{policy.name}, which acts frame by frame")
     protocol = study_protocol(arguments, [(str(arguments.policy), policy.conditions)])
     branch_points = [
         sample_chunks(

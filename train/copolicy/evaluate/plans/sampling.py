@@ -10,7 +10,7 @@ from copolicy.collect.agents import PolicyAgent, RecordedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset import clock
 from copolicy.dataset.arrays import Array
-from copolicy.dataset.exceptions import InvalidValueError, RunError
+from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.outline import Outline, Pose
 from copolicy.dataset.task import PairTask, World, get_task
 
@@ -77,11 +77,8 @@ def sample_chunks(
 
     Raises:
         CopolicyError: the policy's task has no outline.
-        InvalidValueError: the policy acts frame by frame.
         RunError: the episode ended before `seconds`, or the policy keeps its own history, which cannot be copied.
     """
-    if policy.chunk_size < 2:
-        raise InvalidValueError("--policy", "a policy of action chunks", f"{policy.name}, which acts frame by frame")
     rate = fps or policy.fps
     task = get_task(policy.task)
     outline, record_hz = task.required_outline, task.spec.record_hz
