@@ -1,6 +1,6 @@
 """Measures of one episode with a simulated partner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -28,11 +28,12 @@ class PartnerEpisodeResult(EpisodeResult):
     partner: str
     still: Array | None
     partner_changes: int | None
+    actions: Array = field(kw_only=True, repr=False)  # required here
 
     @cached_property
     def forces(self) -> tuple[Array, Array] | None:
         """`(steps, 2)` forces of robot and of partner, in full forces; None if the task has no outline."""
-        if self.task.outline is None or self.actions is None:
+        if self.task.outline is None:
             return None
         forces = self.task.outline.forces(self.actions)
         return forces[:, :2], forces[:, 2:]
