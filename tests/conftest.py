@@ -113,6 +113,17 @@ def _logging_as_found():
         root.removeHandler(handler)
 
 
+@pytest.fixture(params=["stand-in", "ray"])
+def ray(request, monkeypatch, tmp_path_factory):
+    """Ray itself where it is installed, and the local executor in its place."""
+    if request.param == "ray":
+        pytest.importorskip("ray")
+        return
+    from ray_stand_in import stand_in_ray
+
+    stand_in_ray(tmp_path_factory.mktemp("packages"), monkeypatch)
+
+
 @pytest.fixture
 def own_joysticks():
     """SDL's joysticks and display from nothing, and nothing left of them."""

@@ -9,29 +9,6 @@ import pytest
 from sharded_calls import EPISODES, call, content
 
 from copolicy.convert.cli import main
-from copolicy.dataset.distributed import ray_executor
-from copolicy.dataset.distributed.executors import LocalExecutor
-from copolicy.dataset.distributed.job import Job
-
-
-class _InThisProcess(LocalExecutor):
-    """Takes what `RayExecutor` takes, and runs one rank after the other here."""
-
-    def __init__(self, job: Job, workers: int | None, address: str | None):
-        super().__init__(job, 1)
-
-
-@pytest.fixture(params=["stand-in", "ray"])
-def ray(request, monkeypatch, tmp_path_factory):
-    if request.param == "ray":
-        pytest.importorskip("ray")
-        return
-    if find_spec("ray") is None:
-        folder = tmp_path_factory.mktemp("packages")
-        (folder / "ray").mkdir()
-        (folder / "ray" / "__init__.py").touch()
-        monkeypatch.syspath_prepend(folder)
-    monkeypatch.setattr(ray_executor, "RayExecutor", _InThisProcess)
 
 
 def _ray(unsharded: Path, root: Path, *flags: str) -> list[str]:

@@ -3,24 +3,13 @@
 import json
 import shutil
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from policy_runs import save_run
 from slurm_cluster import stand_in_cluster
 
-from copolicy.dataset.distributed import ray_executor
-from copolicy.dataset.distributed.executors import LocalExecutor
-from copolicy.dataset.distributed.job import Job
 from copolicy.evaluate.cli import main
-
-
-class _InThisProcess(LocalExecutor):
-    """Takes what `RayExecutor` takes, and runs one rank after the other here."""
-
-    def __init__(self, job: Job, workers: int | None, address: str | None):
-        super().__init__(job, 1)
 
 
 @pytest.fixture(scope="module")
@@ -45,19 +34,6 @@ def sweep(run: Path, out: Path, *flags: str) -> int:
 
 def table(out: Path) -> dict:
     return json.loads((out / "sweep.json").read_text(encoding="utf-8"))
-
-
-@pytest.fixture(params=["stand-in", "ray"])
-def ray(request, monkeypatch, tmp_path_factory):
-    if request.param == "ray":
-        pytest.importorskip("ray")
-        return
-    if find_spec("ray") is None:
-        folder = tmp_path_factory.mktemp("packages")
-        (folder / "ray").mkdir()
-        (folder / "ray" / "__init__.py").touch()
-        monkeypatch.syspath_prepend(folder)
-    monkeypatch.setattr(ray_executor, "RayExecutor", _InThisProcess)
 
 
 def test_ray_gives_the_results_of_one_process(ray, run, digest, tmp_path, monkeypatch):
