@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
-from untrained_policy import save_untrained_policy
+from untrained_policy import save_untrained_policy, untrained_robots
 
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.questionnaire import read_questionnaire
@@ -258,10 +257,7 @@ def test_only_the_chosen_robot_plans():
 def study(tmp_path_factory) -> Path:
     """A plan of two robots, a person and two short starts, with checkpoints that differ in their weights."""
     folder = tmp_path_factory.mktemp("study")
-    robots = []
-    for name in ("first", "second"):
-        torch.manual_seed(len(robots))
-        robots.append(Robot.from_checkpoint(name, str(save_untrained_policy(folder / name))))
+    robots = untrained_robots(folder)
     plan = make_plan(robots, "custom", SHORT, 1, 2, 0, settings={"num_inference_steps": 2})
     replace_json(folder / "plan.json", plan.to_json())
     return folder

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import torch
 from own_questionnaire import OWN
-from untrained_policy import save_untrained_policy
+from untrained_policy import untrained_robots
 
 from copolicy.collect.questionnaire import Questionnaire, answers_in
 from copolicy.collect.session import iter_recordings
@@ -123,10 +122,7 @@ def test_questionnaires_are_scored_and_their_consistency_stated():
 def study(tmp_path_factory) -> Path:
     """A plan of two robots, one person, both set-ups and a questionnaire of a lab's own."""
     folder = tmp_path_factory.mktemp("study")
-    robots = []
-    for name in ("first", "second"):
-        torch.manual_seed(len(robots))
-        robots.append(Robot.from_checkpoint(name, str(save_untrained_policy(folder / name))))
+    robots = untrained_robots(folder)
     form = Questionnaire.from_json(json.dumps(OWN), "own")
     plan = make_plan(
         robots, "custom", STARTS, 1, 2, 0, STUDIES.fronts, settings={"num_inference_steps": 2}, questionnaires=(form,)

@@ -32,21 +32,18 @@ from .task_parts import (
     Outcome,
     Player,
     PolicyFeatures,
-    PublishedFront,
-    PublishedMethod,
-    PublishedPeople,
     Rule,
     Scenario,
     SceneView,
     SeatExchange,
     Settings,
     SimulatedPlayers,
-    Studies,
     TaskRules,
     TaskStatistics,
     World,
 )
 from .task_spec import PLAYERS, RECORD_HZ, TaskSpec, Vector
+from .task_studies import PublishedFront, PublishedMethod, PublishedPeople, Studies
 from .task_words import TaskWords
 from .trajectory_figures import PublishedFigures, TrajectoryFigures
 
@@ -228,6 +225,11 @@ class PairTask(ABC):
     def path(self, states: Array) -> Array | None:
         """`(T, 2)` positions of the tracked point, for figures and statistics; None if the task tracks none."""
         return None
+
+    def tracked_path(self, states: Array) -> Array | None:
+        """`path`, or else `(T, 2)` positions of the outline's body; None if the task has neither."""
+        path = self.path(states)
+        return path if path is not None or self.outline is None else self.outline.poses(states)[:, :2]
 
     def interaction(self, states: Array, actions: Array) -> Array | None:
         """`(T,)` interaction measure in states `(T, n)` under joint actions `(T, 2 m)`; None if the task has none."""

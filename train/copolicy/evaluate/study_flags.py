@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from copolicy.train.checkpoint import Checkpoint
 
 POLICY_HELP = "folder of a training run or a checkpoint, or pretrained (the model in the package)"
-_POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend", "code")
+POLICY_SETTINGS = ("sampler", "num_inference_steps", "initial_noise_scale", "backend", "code")
+"""Settings of a policy that flags override."""
 
 
 def figure_beside(result: Path) -> Path:
@@ -81,7 +82,7 @@ def study_needs(arguments: argparse.Namespace) -> tuple[str, ...]:
 
 def policy_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """Settings of the policy that the flags override."""
-    return {name: getattr(arguments, name) for name in _POLICY_SETTINGS if getattr(arguments, name) is not None}
+    return {name: getattr(arguments, name) for name in POLICY_SETTINGS if getattr(arguments, name) is not None}
 
 
 def checkpoint_task(path: Path | str) -> PairTask:

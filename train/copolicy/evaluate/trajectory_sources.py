@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.task import PairTask
 
 from .trajectories import SUFFIX, Trajectories, Trajectory, demonstrations, read_trajectories
@@ -15,7 +16,9 @@ SOURCE_HELP = (
     "folder of a data set (demonstrations), result with trajectories beside it, trajectories file, or folder of a "
     "cross-play, each with a name; SOURCE#ROBOT takes one robot of a study"
 )
-_CELLS = "cells"
+CELLS = "cells"
+"""Folder of a cross-play with a file for each robot and partner."""
+
 _EXPECTED = "a data set, a result with trajectories (--trajectories), or the folder of a cross-play with them"
 
 
@@ -68,7 +71,7 @@ def read_sources(texts: Sequence[str]) -> tuple[PairTask, list[Source]]:
     task: PairTask | None = None
     for text in texts:
         name, path, robot = _parsed(text)
-        is_data_set = (path / "meta" / "info.json").is_file()
+        is_data_set = (path / INFO_FILE).is_file()
         read = demonstrations(path) if is_data_set else _study(path)
         if not read.episodes:
             raise FileFormatError(path, "at least one episode", "none")
@@ -136,7 +139,7 @@ def _study(path: Path) -> Trajectories:
         if path.suffix not in (".json", ".parquet"):
             raise FileFormatError(path, _EXPECTED, "another file" if path.exists() else "no such file")
         return read_trajectories(path)
-    cells = sorted((path / _CELLS).glob(f"*{SUFFIX}"))
+    cells = sorted((path / CELLS).glob(f"*{SUFFIX}"))
     if not cells:
         raise FileFormatError(path, _EXPECTED, "none")
     read = [read_trajectories(cell) for cell in cells]

@@ -1,13 +1,11 @@
 """Short videos of the clearest instance of each behaviour."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from copolicy.collect.replay.track import Track, TrackEvent, track_from_episode
+from copolicy.collect.replay.track import TrackEvent, track_from_episode
 from copolicy.collect.replay.video import write_gif
-from copolicy.dataset.arrays import Array
 from copolicy.dataset.episode import Episode, EpisodeMeta, termination_reasons
 from copolicy.dataset.task import PairTask
 
@@ -28,21 +26,15 @@ def write_clip(path: Path, task: PairTask, trajectory: Trajectory, event: Event,
         fps: frames per second by which the event counts.
         title: at the top of the video.
     """
-    episode = _cut(task, trajectory, max(0.0, event.first / fps - MARGIN_S), event.end / fps + MARGIN_S)
-    track = replace(_track(episode, title), events=_marks(task, trajectory, event, fps))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    begin, hz = max(0.0, event.first / fps - MARGIN_S), task.spec.record_hz
+    episode = _cut(task, trajectory, begin, event.end / fps + MARGIN_S)
+    marks = tuple(
+        TrackEvent(round((frame / fps - begin) * hz), "note", text)
+        for frame, text in ((event.first, "begins"), (event.end, "ends"))
+    )
+    track = track_from_episode(Path(title), episode, marks)
     path.unlink(missing_ok=True)
     write_gif(track, path, speed=max(1.0, track.seconds / LONGEST_S))
-
-
-def _track(episode: Episode, title: str) -> Track:
-    return track_from_episode(Path(title), episode)
-
-
-def _marks(task: PairTask, trajectory: Trajectory, event: Event, fps: int) -> tuple[TrackEvent, ...]:
-    begin = max(0.0, event.first / fps - MARGIN_S)
-    steps = [round((time / fps - begin) * task.spec.record_hz) for time in (event.first, event.end)]
-    return tuple(TrackEvent(step, "note", text) for step, text in zip(steps, ("begins", "ends"), strict=True))
 
 
 def _cut(task: PairTask, trajectory: Trajectory, begin_s: float, end_s: float) -> Episode:
@@ -52,7 +44,7 @@ def _cut(task: PairTask, trajectory: Trajectory, begin_s: float, end_s: float) -
     end_s = min(end_s, (len(states) - 1) / trajectory.fps)
     times = np.arange(round(begin_s * hz), round(end_s * hz) + 1) / hz * trajectory.fps
     frame = np.minimum(times.astype(int), len(trajectory.actions) - 1)
-    cut: Array = np.column_stack([np.interp(times, np.arange(len(states)), column) for column in states.T])
+    cut = np.column_stack([np.interp(times, np.arange(len(states)), column) for column in states.T])
     reason = str(columns.get("reason", columns.get("termination_reason", "unknown")))
     meta = EpisodeMeta(
         str(columns.get("episode_uuid", "")),

@@ -17,8 +17,6 @@ from ..markdown_table import markdown_table
 from ..trajectory_sources import SOURCE_HELP, common_rate, read_sources
 
 if TYPE_CHECKING:
-    from copolicy.dataset.task import PairTask
-
     from .definitions import Behaviour
     from .motion import Event, Motion
 
@@ -48,6 +46,7 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
         raise InvalidValueError("--out", "a folder", str(arguments.out))
     files = [arguments.out / name for name in _FILES]
     require_new(*files, overwrite=arguments.overwrite)
+    from .clips import write_clip  # pygame
     from .counts import count, rate_text
     from .definitions import behaviours_of
     from .motion import Motion
@@ -77,7 +76,8 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
             entry[behaviour.name]["clearest"] = _described(motion, events[0])
             if not arguments.no_videos and task.outline is not None:
                 video = arguments.out / f"{behaviour.name}-{file_name(name)}.gif"
-                _write_video(video, task, motion, behaviour, events[0], name)
+                title = f"{behaviour.name.replace('_', ' ')}, {name}"
+                write_clip(video, task, source.episodes[events[0].episode], events[0], fps, title)
                 videos[f"{behaviour.name}, {name}"] = str(video)
         result["methods"][name] = entry
     replace_text(files[1], _markdown(result, counted))
@@ -109,15 +109,6 @@ def _described(motion: "Motion", event: "Event") -> dict[str, Any]:
         "score": round(event.score, 4),
         **event.details,
     }
-
-
-def _write_video(
-    path: Path, task: "PairTask", motion: "Motion", behaviour: "Behaviour", event: "Event", method: str
-) -> None:
-    from .clips import write_clip
-
-    title = f"{behaviour.name.replace('_', ' ')}, {method}"
-    write_clip(path, task, motion.trajectories[event.episode], event, motion.frames.fps, title)
 
 
 def _markdown(result: Mapping[str, Any], counted: Sequence["Behaviour"]) -> str:

@@ -49,7 +49,7 @@ def count(behaviour: Behaviour, motion: Motion, seed: int) -> tuple[dict[str, An
     proportion = bootstrap.estimate(
         (number > 0).astype(float), np.ones(episodes), "1", "Proportion of episodes with at least one.", episodes
     )
-    entries = sorted({name for event in events for name in event.details if name != "turn"})
+    entries = sorted({name for event in events for name in event.details})
     found = {name: dict(Counter(event.details[name] for event in events).most_common()) for name in entries}
     described: dict[str, Any] = {
         "number": len(events),

@@ -6,7 +6,7 @@ import numpy as np
 
 from copolicy.dataset.arrays import Array
 
-from ..partner_study.clearance import distances
+from ..partner_study.clearance import distances, placed
 from .motion import Event, Motion
 
 SPIN = 0.3
@@ -36,8 +36,8 @@ def pivots(motion: Motion, obstacles: Array | None) -> list[Event]:
         poses = outline.poses(states)
         theta = np.unwrap(poses[:, 2])
         spin = np.gradient(theta) * data.fps
-        ends = np.array([_placed(hand, poses) for hand in outline.hands])  # (2, T, 2)
-        slow, fast = np.sort(np.linalg.norm(np.gradient(ends, axis=1), axis=-1), axis=0)
+        ends = placed(np.array(outline.hands), poses)  # (T, 2, 2)
+        slow, fast = np.sort(np.linalg.norm(np.gradient(ends, axis=0), axis=-1), axis=1).T
         turning = (np.abs(spin) >= SPIN) & (slow <= HAND_SPEEDS * fast)
         if not turning.any():
             continue
@@ -51,13 +51,5 @@ def pivots(motion: Motion, obstacles: Array | None) -> list[Event]:
         for _, first, last in motion.runs(flags, 2 / data.fps):
             angle = abs(float(theta[last - 1] - theta[first]))
             if angle >= TURN:
-                events.append(Event(index, first, last, angle, {"turn": f"{math.degrees(angle):.0f} deg"}))
+                events.append(Event(index, first, last, angle, {}))
     return events
-
-
-def _placed(point: tuple[float, float], poses: Array) -> Array:
-    """Scene coordinates `(T, 2)` of a point of the body at poses `(T, 3)`, see `outline.to_scene`."""
-    x, y, theta = poses.T
-    u, v = point
-    cos, sin = np.cos(theta), np.sin(theta)
-    return np.column_stack((x + u * cos + v * sin, y - u * sin + v * cos))

@@ -98,10 +98,7 @@ def coplan(
     agent = PolicyAgent(policy, get_task(policy.task), fps=fps, seed=seed)
     rollout = coplanning_rollout(agent, [scenario for _, scenario, _ in episodes], settings)
     trace = run_traced(rollout, on_step)
-    return [
-        EpisodeResult(*episode, *episode_measures(rollout, trace, agent, k), **motion(rollout, trace, k))
-        for k, episode in enumerate(episodes)
-    ]
+    return [EpisodeResult(*episode, **episode_fields(rollout, trace, agent, k)) for k, episode in enumerate(episodes)]
 
 
 def coplanning_rollout(agent: PolicyAgent, scenarios: Sequence[Any], settings: Any) -> Rollout:
@@ -118,25 +115,19 @@ def run_traced(rollout: Rollout, on_step: Callable[[int], object]) -> Trace:
     return trace
 
 
-def episode_measures(
-    rollout: Rollout, trace: Trace, agent: Any, index: int
-) -> tuple[bool, str, int, Array | None, Array | None]:
-    """The fields `success` to `interaction` of a world's `EpisodeResult`."""
-    outcome, states = rollout.outcomes[index], trace.states(index)
-    interaction = rollout.task.interaction_recorded(states[1:], trace.actions(index))
-    chunks = int(agent.chunks[index]) if isinstance(agent, PolicyAgent) else 0
-    return outcome.success, outcome.reason, chunks, _tracked_path(rollout.task, states), interaction
-
-
-def motion(rollout: Rollout, trace: Trace, index: int) -> dict[str, Any]:
-    """The fields `task`, `end`, `states` and `actions` of a world's `EpisodeResult`."""
-    task = rollout.task
-    states = task.states_of(trace.states(index))
-    return {"task": task, "end": rollout.ends[index], "states": states, "actions": trace.actions(index)}
-
-
-def _tracked_path(task: PairTask, recorded: Array) -> Array | None:
-    """`(T, 2)` the task's tracked point in recorded states, or else the centre of its outline's body."""
+def episode_fields(rollout: Rollout, trace: Trace, agent: Any, index: int) -> dict[str, Any]:
+    """The fields of a world's `EpisodeResult` from `success` on."""
+    task, outcome = rollout.task, rollout.outcomes[index]
+    recorded, actions = trace.states(index), trace.actions(index)
     states = task.states_of(recorded)
-    path = task.path(states)
-    return path if path is not None or task.outline is None else task.outline.poses(states)[:, :2]
+    return {
+        "success": outcome.success,
+        "reason": outcome.reason,
+        "chunks": int(agent.chunks[index]) if isinstance(agent, PolicyAgent) else 0,
+        "path": task.tracked_path(states),
+        "interaction": task.interaction_recorded(recorded[1:], actions),
+        "task": task,
+        "end": rollout.ends[index],
+        "states": states,
+        "actions": actions,
+    }

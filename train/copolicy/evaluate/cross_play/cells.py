@@ -20,12 +20,11 @@ from ..partner_study.study import run_with_partners
 from ..partners.partner import StudyPartner
 from ..stored_settings import require_same_settings, without_run
 from ..trajectories import trajectories_beside, write_trajectories
+from ..trajectory_sources import CELLS
 from .measures import Row, episode_row
 
 OWN_KIND = "own-kind"
 """Row of the matrix in which each partner meets its own kind."""
-
-_FOLDER = "cells"
 
 
 class CellDocument(TypedDict):
@@ -72,7 +71,7 @@ def own_kind_robot(partner: StudyPartner, repeats: int) -> StudyRobot:
 def cell_file(out: Path, robot: str, partner: str) -> Path:
     """The file of a cell: readable names, and a check sum of the exact ones."""
     readable = "--".join(file_name(name) for name in (robot, partner))
-    return out / _FOLDER / f"{readable}--{zlib.crc32(repr((robot, partner)).encode()):08x}.json"
+    return out / CELLS / f"{readable}--{zlib.crc32(repr((robot, partner)).encode()):08x}.json"
 
 
 def run_cell(

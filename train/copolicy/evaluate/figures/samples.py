@@ -6,6 +6,7 @@ import numpy as np
 
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.clock import stride
+from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.task import PairTask
 
 from ..trajectories import Trajectory
@@ -35,8 +36,10 @@ def path_of(task: PairTask, states: Array) -> Array:
     Raises:
         CopolicyError: the task has no outline.
     """
-    path = task.path(states)
-    return task.required_outline.poses(states)[:, :2] if path is None else path
+    path = task.tracked_path(states)
+    if path is None:
+        raise CopolicyError(task.missing("outline"))
+    return path
 
 
 def states_after(episode: Trajectory) -> Array:

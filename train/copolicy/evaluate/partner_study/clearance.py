@@ -57,15 +57,15 @@ def _distances(bodies: Sequence[Array], obstacle: Array, poses: Array) -> Array:
     for first in range(0, len(poses), _CHUNK):
         part = poses[first : first + _CHUNK]
         for body in bodies:
-            corners = _placed(body, part)
+            corners = placed(body, part)
             fixed = np.broadcast_to(obstacle, (len(part), *obstacle.shape))
             distance = np.minimum(_to_polygon(corners, fixed), _to_polygon(fixed, corners))
             np.minimum(found[first : first + _CHUNK], distance, out=found[first : first + _CHUNK])
     return found
 
 
-def _placed(body: Array, poses: Array) -> Array:
-    """Scene coordinates `(T, corners, 2)` of a body `(corners, 2)` at poses `(T, 3)`, see `outline.to_scene`."""
+def placed(body: Array, poses: Array) -> Array:
+    """Scene coordinates `(T, p, 2)` of points of a body `(p, 2)` at poses `(T, 3)`, see `outline.to_scene`."""
     x, y, theta = poses.T[..., None]
     u, v = body.T
     cos, sin = np.cos(theta), np.sin(theta)

@@ -11,7 +11,7 @@ from copolicy.collect.rollout import Rollout
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 
-from ..coplan.rollouts import episode_measures, motion, run_traced
+from ..coplan.rollouts import episode_fields, run_traced
 from ..partners.partner import StudyPartner, scripted_partners
 from .episode_result import PartnerEpisodeResult
 from .robots import StudyRobot
@@ -81,11 +81,10 @@ def run_with_partners(
             index,
             scenario,
             repeat,
-            *episode_measures(rollout, trace, agent, k),
-            chosen[owner].name,
-            task.studies.at_rest(trace.states(k)[1:]),
-            _changes(partner, k),
-            **motion(rollout, trace, k),
+            partner=chosen[owner].name,
+            still=task.studies.at_rest(trace.states(k)[1:]),
+            partner_changes=_changes(partner, k),
+            **episode_fields(rollout, trace, agent, k),
         )
         for k, (index, scenario, owner, repeat) in enumerate(episodes)
     ]

@@ -14,7 +14,7 @@ from copolicy.dataset.exceptions import RunError
 from copolicy.dataset.outline import Outline, Pose
 from copolicy.dataset.task import PairTask, World, get_task
 
-from ..coplan.rollouts import EpisodeResult, coplanning_rollout, episode_measures
+from ..coplan.rollouts import EpisodeResult, coplanning_rollout, episode_fields
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,7 @@ def sample_chunks(
 
     chunk_samples = []
     for k, chunk in enumerate(chunks):
-        measures = episode_measures(branch, branch_trace, agent, k)
-        episode = EpisodeResult(0, scenario, k, *measures, task=task, end=branch.ends[k])
+        episode = EpisodeResult(0, scenario, k, **episode_fields(branch, branch_trace, agent, k))
         route = task.strategy(scenario, task.states_of(branch_trace.states(k))) if episode.success else None
         chunk_samples.append(ChunkSample(chunk, path(planned_trace.states(k)), episode, route))
     (pose,) = outline.poses(world.observation[None]).tolist()

@@ -22,7 +22,7 @@ from ..partner_study.summary import definitions, summarise_with_partners
 from ..partners.names import PartnerName, partners_label
 from ..partners.partner import make_partner
 from ..stored_settings import without_run
-from ..study_flags import study_policy, study_settings
+from ..study_flags import POLICY_SETTINGS, study_policy, study_settings
 from ..summary import not_measured
 from .determinants import determined_by, digest, starts_of
 from .plan import SweepPlan, SweepTask
@@ -120,9 +120,8 @@ def _map_set(plan: SweepPlan, task: SweepTask) -> Any:
 def _arguments(plan: SweepPlan, n_action_steps: int | None, default: int) -> Namespace:
     """The flags of a single study, as its functions read them."""
     flags = plan.flags
-    overridable = ("sampler", "num_inference_steps", "initial_noise_scale", "backend", "code")
     return Namespace(
-        **{name: flags.overrides.get(name) for name in overridable},
+        **{name: flags.overrides.get(name) for name in POLICY_SETTINGS},
         n_action_steps=n_action_steps,
         default_n_action_steps=default,
         orientations=flags.orientations,
