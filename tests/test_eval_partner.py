@@ -5,6 +5,7 @@ import json
 import math
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.partner_study.configurations import study_configurations
 from copolicy.evaluate.partner_study.episode_result import PartnerEpisodeResult
-from copolicy.evaluate.partner_study.robots import policy_robot, scripted_robots
+from copolicy.evaluate.partner_study.robots import hidden_partner_robot, policy_robot, scripted_robots, split_robot
 from copolicy.evaluate.partner_study.study import run_with_partners
 from copolicy.evaluate.partner_study.summary import differences, summarise_with_partners
 from copolicy.tasks.table.agents import PlayerProfile
@@ -95,6 +96,7 @@ class CountingPolicy:
     def __init__(self, n_action_steps=1):
         self.n_action_steps = n_action_steps
         self.calls: list[dict[str, np.ndarray]] = []
+        self.policy: SimpleNamespace | None = None  # LeRobot's policy, of which the configuration is read
 
     def describe(self):
         return {}
@@ -131,6 +133,36 @@ def test_one_action_a_plan_held_for_three_steps_from_the_newest_history():
     done = episode.actions[:30, 2:].reshape(10, 3, 2).mean(axis=1)
     np.testing.assert_allclose(last[HUMAN_ACTION][0], done[7:10])
     np.testing.assert_array_equal(last[ENVIRONMENT_STATE][0], np.tile(environment_state(MAPS[0]), (3, 1)))
+
+
+def test_a_robot_can_be_shown_zeros_as_the_past_action_of_its_partner():
+    planner = CountingPolicy()
+    planner.policy = SimpleNamespace(config=SimpleNamespace(past_human_action=True))
+    robot = hidden_partner_robot("counter", planner)  # pyright: ignore[reportArgumentType]
+    (hidden,) = run_with_partners(robot, MAPS[:1], ["stubborn"], Physics(step_limit=31))
+    calls, planner.calls = planner.calls, []
+    shown = policy_robot("counter", planner)  # pyright: ignore[reportArgumentType]
+    (open_eyed,) = run_with_partners(shown, MAPS[:1], ["stubborn"], Physics(step_limit=31))
+    np.testing.assert_array_equal(hidden.actions, open_eyed.actions)  # this policy makes nothing of it
+    assert len(calls) == len(planner.calls) == 11
+    assert planner.calls[-1][HUMAN_ACTION].any()
+    for seen, all_seen in zip(calls, planner.calls, strict=True):
+        assert not seen[HUMAN_ACTION].any()
+        assert seen[HUMAN_ACTION].shape == all_seen[HUMAN_ACTION].shape
+        np.testing.assert_array_equal(seen[STATE], all_seen[STATE])
+    assert robot.describe() == {"shown_past_human_action": "zero"}
+
+
+def test_nothing_can_be_hidden_from_a_policy_that_does_not_observe_it():
+    planner = CountingPolicy()
+    planner.policy = SimpleNamespace(config=SimpleNamespace(past_human_action=False))
+    with pytest.raises(InvalidValueError, match="codp: expected a policy that observes the human's past action"):
+        hidden_partner_robot("codp", planner)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_option_of_a_robot_is_no_part_of_its_path():
+    assert split_robot("mine=runs/a,b,past_human_action=zero") == ("mine", "runs/a,b", True)
+    assert split_robot("runs/a=b/c") == ("", "runs/a=b/c", False)
 
 
 def test_more_actions_a_plan_are_executed_in_turn():

@@ -77,7 +77,7 @@ def _cnn(preset: str, steps: int = 5_000) -> Row:
 ROWS: Mapping[str, Row] = {
     "codp-h": Row(),
     "codp": Row(policy_flags(past_human_action=False)),
-    "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), steps=20_000),
+    "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS)),
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),

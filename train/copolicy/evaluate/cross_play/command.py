@@ -17,7 +17,7 @@ from copolicy.dataset.task import PairTask, get_task
 
 from ..partner_study.command import add_overlap_flag
 from ..partner_study.configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
-from ..partner_study.robots import make_robot, scripted_robots, split_name
+from ..partner_study.robots import HIDDEN_HELP, make_robot, scripted_robots, split_robot
 from ..partners.names import PARTNERS_HELP, PROXY, PartnerName, parse_partners, partners_label
 from ..study_flags import POLICY_HELP, add_study_flags, checkpoint_task, study_needs, study_protocol, study_settings
 from ..trajectories import add_trajectories_flag
@@ -47,7 +47,7 @@ def add_cross_play_command(commands: Commands) -> None:
         required=True,
         nargs="+",
         metavar="[NAME=]CKPT",
-        help=f"robots: {POLICY_HELP}, with a name in the result; or {', '.join(_NAMES)}",
+        help=f"robots: {POLICY_HELP}, with a name in the result; or {', '.join(_NAMES)}. {HIDDEN_HELP}",
     )
     command.add_argument("--partners", required=True, nargs="+", metavar="PARTNER", help=PARTNERS_HELP)
     floors = "do not add the floors nothing (zero force), random, and the task's first scripted robot"
@@ -136,7 +136,7 @@ def _task(arguments: argparse.Namespace) -> PairTask:
     """The task of the first checkpoint among robots and partners; the table without any."""
     for text in arguments.robots:
         if text not in _NAMES:
-            return checkpoint_task(split_name(text)[1])
+            return checkpoint_task(split_robot(text)[1])
     for text in arguments.partners:
         if f"{PROXY}:" in text:
             named = parse_partners([text], get_task())[0]

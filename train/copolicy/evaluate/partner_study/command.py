@@ -25,7 +25,7 @@ from ..study_flags import (
 from ..summary import not_measured, percent
 from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
-from .robots import make_robot, scripted_robots, split_name
+from .robots import HIDDEN_HELP, make_robot, scripted_robots, split_robot
 
 
 def add_partner_command(commands: Commands) -> None:
@@ -38,7 +38,9 @@ def add_partner_command(commands: Commands) -> None:
         "copolicy-eval partner outputs/codp_h --baseline outputs/codp passive never-yields --out partner.json",
         study_needs,
     )
-    command.add_argument("policy", metavar="[NAME=]CKPT", help=f"{POLICY_HELP}; and its name in the result")
+    command.add_argument(
+        "policy", metavar="[NAME=]CKPT", help=f"{POLICY_HELP}; and its name in the result. {HIDDEN_HELP}"
+    )
     command.add_argument(
         "--baseline",
         nargs="+",
@@ -80,7 +82,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     require_new(arguments.out, figure, *([trajectories] if trajectories else []), overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
-    _, path = split_name(arguments.policy)
+    path = split_robot(arguments.policy)[1]
     task = checkpoint_task(path)
     profiles = simulated_players(task).partners
     named = parse_partners(profiles if arguments.partners is None else arguments.partners, task)

@@ -1,4 +1,8 @@
-"""Agents at the robot's seat in a study: a policy, or one of the scripted baselines."""
+"""Agents at the robot's seat in a study: a policy, or one of the scripted baselines.
+
+    [NAME=]CHECKPOINT[,past_human_action=zero]   a policy; with the option, shown zeros as its partner's past action
+nothing, random, ...                         a scripted robot
+"""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -11,6 +15,9 @@ import numpy as np
 from copolicy.collect.agents import ConstantAgent, PolicyAgent, RandomAgent, ScriptedAgent
 from copolicy.collect.agents.simulated_players import simulated_players
 from copolicy.collect.rollout import Agent, EpisodeStart
+from copolicy.dataset.arrays import Array
+from copolicy.dataset.exceptions import InvalidValueError
+from copolicy.dataset.features import HUMAN_ACTION
 from copolicy.dataset.task import PairTask, Player, get_task
 
 from ..study_flags import study_policy
@@ -23,6 +30,8 @@ NOTHING = "nothing"
 """Another name of `PASSIVE`."""
 
 _RANDOM_HOLD_S = 0.1
+_HIDE = ",past_human_action=zero"
+HIDDEN_HELP = f"CKPT{_HIDE} is shown zeros as the partner's past action"
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,39 @@ def policy_robot(name: str, policy: "Checkpoint") -> StudyRobot:
     """A robot that executes its half of a policy's joint action chunks."""
     task = get_task(policy.task)
     return StudyRobot(name, lambda seed, fps: PolicyAgent(policy, task, fps=fps, seed=seed), policy.describe, policy)
+
+
+def hidden_partner_robot(name: str, policy: "Checkpoint") -> StudyRobot:
+    """`policy_robot`, shown zeros in place of the partner's past actions.
+
+    Raises:
+        InvalidValueError: the policy does not observe them.
+    """
+    if not getattr(policy.policy.config, "past_human_action", False):
+        expected = "a policy that observes the human's past action (config.json: past_human_action)"
+        raise InvalidValueError(name, expected, "one that does not")
+    task = get_task(policy.task)
+    shown: Any = _HidesPartner(policy)
+    return StudyRobot(
+        name,
+        lambda seed, fps: PolicyAgent(shown, task, fps=fps, seed=seed),
+        lambda: {**policy.describe(), "shown_past_human_action": "zero"},
+        policy,
+    )
+
+
+class _HidesPartner:
+    """A policy that is shown zeros as the partner's past actions; otherwise the policy itself."""
+
+    def __init__(self, policy: "Checkpoint"):
+        self._policy = policy
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._policy, name)
+
+    def predict_action_chunk(self, observations: dict[str, Array]) -> Array:
+        hidden = np.zeros_like(observations[HUMAN_ACTION])
+        return self._policy.predict_action_chunk({**observations, HUMAN_ACTION: hidden})
 
 
 def scripted_robots(task: PairTask) -> dict[str, StudyRobot]:
@@ -84,19 +126,28 @@ def _scripted(task: PairTask, name: str) -> StudyRobot:
 
 
 def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, StudyRobot]) -> StudyRobot:
-    """The robot named by `[NAME=]CKPT` or by the name of a scripted robot.
+    """The robot named by `[NAME=]CKPT[,past_human_action=zero]` or by the name of a scripted robot.
 
     Raises:
         FileFormatError: the checkpoint does not exist.
-        InvalidValueError: its chunks have fewer actions than are to be executed.
+        InvalidValueError: its chunks have fewer actions than are to be executed, or it does not observe the partner's
+            past action and this is to be hidden.
     """
     if text in scripted:
         return scripted[text]
     if text == NOTHING:
         return replace(scripted[PASSIVE], name=NOTHING)
-    name, path = split_name(text)
+    name, path, hides = split_robot(text)
     policy = study_policy(path, arguments)
+    if hides:
+        return hidden_partner_robot(name or policy.name + _HIDE, policy)
     return policy_robot(name or policy.name, policy)
+
+
+def split_robot(text: str) -> tuple[str, str, bool]:
+    """Splits `NAME=PATH,past_human_action=zero` into name (empty without one), path, and whether it has the option."""
+    hides = text.endswith(_HIDE)
+    return (*split_name(text.removesuffix(_HIDE)), hides)
 
 
 def split_name(text: str) -> tuple[str, str]:
