@@ -107,7 +107,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
         **study_settings(arguments, protocol, scenarios),
     }
     digest = hashlib.sha256("".join(scenario.digest for scenario in scenarios).encode()).hexdigest()
-    # The rate is of each robot, and a device changes no result beyond rounding.
+    # The rate is of each robot. On another device the noise of a sampler can be another draw of the same distribution.
     shared = {
         name: value for name, value in settings.items() if name not in ("fps", "hold", "device", "told_otherwise")
     }
