@@ -256,7 +256,11 @@ def test_the_command_counts_each_robot(study, tmp_path, capsys):
     video = out / "passivity_robot-p_passive.gif"
     assert video.read_bytes()[:4] == b"GIF8"
     assert str(out / "behaviours.md") in capsys.readouterr().out
-    assert "| passivity_robot |" in (out / "behaviours.md").read_text(encoding="utf-8")
+    text = (out / "behaviours.md").read_text(encoding="utf-8")
+    assert "| passivity_robot |" in text
+    # The episodes are on two maps.
+    assert passive["passivity_robot"]["per_minute"]["resampled"] == "episodes"
+    assert "intervals are over maps, of fewer than 5 maps over episodes" in text
     assert main(["behaviours", str(study), "--out", str(out)]) == 2
 
 

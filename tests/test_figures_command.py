@@ -92,6 +92,18 @@ def test_the_same_call_gives_the_same_files(study, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
+def test_the_document_says_which_map_was_chosen(study, tmp_path):
+    name_of_map = f"custom-{carry().scenario.digest}"
+    for name, flags in (("all", ()), ("one", ("--map", name_of_map))):
+        call = ["figures", f"S={study}", "--only", "success-by-map", "--out", str(tmp_path / name)]
+        assert main([*call, *flags]) == 0
+    documents = [json.loads((tmp_path / name / "figures.json").read_text(encoding="utf-8")) for name in ("all", "one")]
+    assert [document.get("map") for document in documents] == [None, name_of_map]
+    figure = documents[1]["figures"]["success-by-map"]
+    assert figure["unit"] == "proportion"
+    assert figure["definition"].startswith("proportion of the episodes")
+
+
 def test_a_figure_is_not_replaced_without_being_told(study, tmp_path, capsys):
     call = ["figures", f"S={study}", "--only", "visitation", "--out", str(tmp_path / "out")]
     assert main(call) == 0

@@ -30,7 +30,7 @@ def add_behaviours_command(commands: Commands) -> None:
         commands,
         "behaviours",
         _behaviours,
-        "count adaptation, leadership switches, passivity, pivots and dissent of each method, against chance",
+        "count adaptation, leadership switches, passivity, pivots and dissent of methods, with null distributions",
         "copolicy-eval behaviours people=data/pairs ours=outputs/eval.json --out outputs/behaviours",
         lambda arguments: () if arguments.no_videos else ("PIL",),
     )
@@ -47,7 +47,7 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     files = [arguments.out / name for name in _FILES]
     require_new(*files, overwrite=arguments.overwrite)
     from .clips import write_clip  # pygame
-    from .counts import count, rate_text
+    from .counts import INTERVALS, count, rate_text
     from .definitions import behaviours_of
     from .motion import Motion
 
@@ -58,7 +58,7 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {
         "study": "behaviours",
         "task": task.spec.name,
-        "settings": {"fps": fps, "seed": arguments.seed, "unit_of_analysis": "an episode; intervals are over maps"},
+        "settings": {"fps": fps, "seed": arguments.seed, "unit_of_analysis": f"an episode; {INTERVALS}"},
         "definitions": {behaviour.name: behaviour.definition for behaviour in counted},
         "not_counted": {each.name: task.missing(each.missing) for each in chosen if each.missing},
         "methods": {},
@@ -113,10 +113,10 @@ def _described(motion: "Motion", event: "Event") -> dict[str, Any]:
 
 
 def _markdown(result: Mapping[str, Any], counted: Sequence["Behaviour"], players: tuple[str, str]) -> str:
-    from .counts import rate_text
+    from .counts import INTERVALS, rate_text
 
     methods = result["methods"]
-    text = ["Instances per minute, with 95 % interval over maps, mean of the null distribution and p:"]
+    text = [f"Instances per minute, with 95 % interval, mean of the null distribution and p; {INTERVALS}:"]
     rows = [
         [behaviour.name, *(rate_text(entry[behaviour.name]["per_minute"]) for entry in methods.values())]
         for behaviour in counted
