@@ -35,8 +35,8 @@ def differences(
 ) -> Iterator[tuple[str, Any, Any]]:
     """Names of entries that differ, with both values; those of nested entries are joined by dots, null is no entry."""
     for name in dict.fromkeys((*first, *second)):
-        values = first.get(name), second.get(name)
-        if all(isinstance(value, Mapping) for value in values):
-            yield from differences(*values, f"{prefix}{name}.")
-        elif values[0] != values[1]:
-            yield f"{prefix}{name}", *values
+        here, there = first.get(name), second.get(name)
+        if isinstance(here, Mapping) and isinstance(there, Mapping):
+            yield from differences(here, there, f"{prefix}{name}.")
+        elif here != there:
+            yield f"{prefix}{name}", here, there
