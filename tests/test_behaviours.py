@@ -1,5 +1,6 @@
 """Behaviours: constructed episodes of which the right events are known, and scripted players whose routes are known."""
 
+import itertools
 import json
 from typing import Any
 
@@ -10,12 +11,15 @@ from scipy.ndimage import uniform_filter1d
 from copolicy.collect.agents.scripted import ScriptedAgent
 from copolicy.collect.rollout import Rollout, Trace
 from copolicy.dataset.exceptions import CopolicyError
+from copolicy.dataset.statistics.leadership import lead_windows
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.behaviours import adaptation, forces, leadership, pivot
+from copolicy.evaluate.behaviours.command import _markdown
 from copolicy.evaluate.behaviours.counts import count
 from copolicy.evaluate.behaviours.definitions import behaviours_of
-from copolicy.evaluate.behaviours.motion import Motion
+from copolicy.evaluate.behaviours.motion import Motion, least_frames
 from copolicy.evaluate.cli import main
+from copolicy.evaluate.file_names import file_names
 from copolicy.evaluate.trajectories import Trajectory
 from copolicy.evaluate.trajectory_sources import common_rate, read_sources
 from copolicy.tasks.table.agents.route_forces import route_forces
@@ -155,6 +159,54 @@ def test_a_pivot_is_a_turn_about_one_end_beside_an_obstacle():
     assert pivot.pivots(_motion((_states(480.0, 300.0, theta), actions), scenario=near), None) == []
 
 
+def test_a_pivot_is_of_its_episode():
+    """Angles and obstacles are those of the episode, whatever its place."""
+    theta = np.concatenate((np.zeros(5), np.linspace(0, 1.2, 25), np.full(5, 1.2)))
+    hand = np.array(TASK.required_outline.hands[1])
+    x = 480 - hand[0] * np.cos(theta) - hand[1] * np.sin(theta)
+    y = 300 + hand[0] * np.sin(theta) - hand[1] * np.cos(theta)
+    maps = [
+        MapConfig(start=(200, 300, 0.0), goal=(1000, 300), obstacles=(obstacle,))
+        for obstacle in ((1000, 500), (560, 360))
+    ]
+    columns, carry = {"success": True, "map_id": "custom-1"}, (_states(x, y, theta), np.zeros((35, 4)))
+    motion = Motion(TASK, [Trajectory(*carry, None, FPS, scenario, columns) for scenario in maps], FPS)
+    (event,) = pivot.pivots(motion, None)
+    assert event.episode == 1
+    assert 1.0 <= event.score <= 1.2
+    (event,) = pivot.pivots(motion, np.array([1, 0]))  # each with the obstacles of the other
+    assert event.episode == 0
+    assert 1.0 <= event.score <= 1.2
+
+
+def test_a_time_is_not_shorter_at_a_low_rate():
+    assert [least_frames(*each) for each in ((0.2, 10), (0.3, 10), (1.0, 10), (0.2, 6), (0.5, 5), (0.2, 1))] == [
+        2, 3, 10, 2, 3, 1,
+    ]  # fmt: skip
+    actions = np.zeros((12, 4))
+    actions[2] = actions[6:8] = (1, 0, -1, 0)  # 1/6 s and 1/3 s
+    columns = {"success": True, "map_id": "custom-1"}
+    motion = Motion(TASK, [Trajectory(_states(np.full(12, 300.0)), actions, None, 6, MAP, columns)], 6)
+    (event,) = forces.dissent(motion, None, 0.25)
+    assert (event.first, event.end) == (6, 8)
+
+
+def test_a_leader_at_a_low_rate_is_steady_for_half_a_second_too():
+    """At 5 Hz the windows are 0.2 s apart, so that three of them are the first half of a second."""
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, size=(600, 4))
+    columns = {"success": True, "map_id": "custom-1"}
+    motion = Motion(TASK, [Trajectory(_states(np.full(600, 300.0)), actions, None, 5, MAP, columns)], 5)
+    runs = [(leader, len(list(group))) for leader, group in itertools.groupby(lead_windows(motion.frames).leader)]
+
+    def switches(shortest_s: float) -> int:
+        steady = [leader for leader, windows in runs if leader and windows * 0.2 >= shortest_s]
+        return sum(first != second for first, second in itertools.pairwise(steady))
+
+    assert len(leadership.leadership_switches(motion, None)) == switches(0.5)
+    assert switches(0.5) > switches(1.0) > 0
+
+
 def test_chance_is_the_null_distribution():
     """Players who act independently dissent as often as by chance; players who do the same dissent less often."""
     rng = np.random.default_rng(1)
@@ -204,8 +256,29 @@ def test_the_command_counts_each_robot(study, tmp_path, capsys):
     video = out / "passivity_robot-p_passive.gif"
     assert video.read_bytes()[:4] == b"GIF8"
     assert str(out / "behaviours.md") in capsys.readouterr().out
-    assert "| passivity_robot |" in (out / "behaviours.md").read_text(encoding="utf-8")
+    text = (out / "behaviours.md").read_text(encoding="utf-8")
+    assert "| passivity_robot |" in text
+    # The episodes are on two maps.
+    assert passive["passivity_robot"]["per_minute"]["resampled"] == "episodes"
+    assert "intervals are over maps, of fewer than 5 maps over episodes" in text
     assert main(["behaviours", str(study), "--out", str(out)]) == 2
+
+
+def test_videos_of_names_that_are_alike_are_two_files(study, tmp_path, capsys):
+    assert main(["behaviours", f"a b={study}#passive", f"a_b={study}#passive", "--out", str(tmp_path), "--json"]) == 0
+    videos = list(tmp_path.glob("passivity_robot-*.gif"))
+    assert len(videos) == 2
+    assert json.loads(capsys.readouterr().out)["videos"] == len(list(tmp_path.glob("*.gif")))
+    assert file_names(["a b", "a_b", "c"])["c"] == "c"
+
+
+def test_who_gave_way_is_named_as_the_players_are():
+    found = {"adaptation": {"per_minute": {"value": None}, "episodes": {"value": 1.0},
+             "details": {"gave_way": {"left": 2, "left and right": 1}}}, "label": "", "episodes": 1}  # fmt: skip
+    adapted = [each for each in behaviours_of(TASK) if each.name == "adaptation"]
+    result = {"methods": {"m": found}, "definitions": {}, "not_counted": {}}
+    text = _markdown(result, adapted, ("left", "right"))
+    assert "| method | left | right | left and right |\n| --- | --- | --- | --- |\n| m | 2 | 0 | 1 |" in text
 
 
 def test_sources_are_methods_of_one_name_each(study):

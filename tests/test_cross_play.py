@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,10 @@ from copolicy.evaluate.partners.names import parse_partners
 from copolicy.evaluate.partners.overlap import check_overlap
 from copolicy.evaluate.partners.partner import make_partner
 from copolicy.evaluate.study_flags import Protocol
+from copolicy.evaluate.trajectories import read_trajectories, trajectories_beside
 from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
+from copolicy.train.processor_files import processors_sha256
 from copolicy.train.training_data import TRAINING_DATA_FILE, training_pairs
 
 TABLE = get_task("table")
@@ -204,6 +207,81 @@ def record_pairs(checkpoint, folder, pairs, **more):
     facts = {"repo_id": "lab/a", "content_hash": "x", "pairs": pairs, "sources": ["human"], "people": [], **more}
     (folder / TRAINING_DATA_FILE).write_text(json.dumps(facts), encoding="utf-8")
     return folder
+
+
+def test_cells_of_a_policy_with_other_processors_are_refused(checkpoint, tmp_path, capsys):
+    """Equal weights with other processors are another policy, at either seat."""
+    policy, out = tmp_path / "policy", tmp_path / "out"
+    shutil.copytree(checkpoint, policy)
+    flags = ("--no-floors", "--partners", f"still=proxy:{policy}")
+    assert run(policy, out, *flags) == 0
+    other = tmp_path / "other"
+    shutil.copytree(policy, other)
+    processor = other / "policy_preprocessor.json"
+    processor.write_text(processor.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    capsys.readouterr()
+    for robot, proxy, entry in ((policy, other, "partner.policy"), (other, policy, "robot")):
+        assert run(robot, out, "--no-floors", "--partners", f"still=proxy:{proxy}") == 2
+        found, expected = (processors_sha256(folder) for folder in (policy, other))
+        assert found != expected
+        line = capsys.readouterr().err.strip().splitlines()[-1]
+        assert f': expected {entry}.processors_sha256 "{expected}" as in this run (another --out' in line
+        assert line.endswith(f"found '{entry}.processors_sha256 \"{found}\"'")
+    assert run(policy, out, *flags) == 0
+
+
+def test_cells_of_other_recordings_are_refused(recordings, tmp_path, capsys):
+    """Of as many recordings of the same names."""
+    folders, out = [tmp_path / name / "three" for name in ("first", "second")], tmp_path / "out"
+    shutil.copytree(recordings, folders[0])
+    call = ["--episodes", "3", "--seed", "3", "--maps", "training", "--start-noise", "1", "--workers", "1"]
+    assert collect(["simulate", *call, "--pairs", "S06", "--out", str(folders[1])]) == 0
+    flags = ["--no-floors", "--configurations", "4", "--step-limit", "10", "--maps", "unseen", "--out", str(out)]
+
+    def play(folder):
+        return main(["cross-play", "--robots", "nothing", "--partners", f"r=replay:{folder}", *flags])
+
+    assert play(folders[0]) == 0
+    assert play(folders[0]) == 0
+    capsys.readouterr()
+    assert play(folders[1]) == 2
+    assert ": expected recorded_sha256 " in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_a_cell_that_is_run_again_has_its_own_trajectories_or_none(checkpoint, tmp_path):
+    out = tmp_path / "out"
+
+    def steps():
+        (cell,) = (out / "cells").glob("ours--stubborn*.json")
+        beside = trajectories_beside(cell)
+        episodes = read_trajectories(beside).episodes if beside.exists() else None
+        stored = [row["steps"] for row in json.loads(cell.read_text(encoding="utf-8"))["episodes"]]
+        return stored, episodes and [len(episode.actions) for episode in episodes]
+
+    assert run(checkpoint, out, "--no-floors", "--trajectories") == 0
+    assert steps() == ([30] * 4, [30] * 4)
+    assert run(checkpoint, out, "--no-floors", "--overwrite", "--step-limit", "20") == 0
+    assert steps() == ([20] * 4, None)
+    assert run(checkpoint, out, "--no-floors", "--trajectories", "--step-limit", "20") == 0
+    assert steps() == ([20] * 4, [20] * 4)
+
+
+def test_trajectories_alone_are_not_removed_unless_told(checkpoint, tmp_path, capsys):
+    """Those of an earlier result must not stand beside another one."""
+    beside = tmp_path / "result.trajectories.parquet"
+    limits = ("--maps", "unseen", "--step-limit", "10", "--out", str(tmp_path / "result.json"))
+    studies = {
+        "coplan": ["coplan", "--policy", str(checkpoint), "--limit", "1"],
+        "partner": ["partner", str(checkpoint), "--no-baseline", "--partners", "stubborn", "--configurations", "4"],
+    }
+    for call in studies.values():
+        beside.write_bytes(b"of an earlier result")
+        assert main([*call, *limits]) == 2
+        assert f"{beside}: expected a path that does not exist yet, found one" in capsys.readouterr().err
+        assert main([*call, *limits, "--overwrite"]) == 0
+        assert not beside.exists()
+        (tmp_path / "result.json").unlink()
+        (tmp_path / "result.png").unlink()
 
 
 def test_two_runs_do_not_share_a_folder(checkpoint, tmp_path, capsys):

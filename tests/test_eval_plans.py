@@ -242,6 +242,9 @@ def test_several_maps_are_rows_of_one_sheet(checkpoint, tmp_path, capsys):
     assert command(checkpoint, one) == 0
     heights = [image.imread(path).shape[0] for path in (out, one)]
     assert heights[0] > 1.7 * heights[1]
+    twice = tmp_path / "twice.png"
+    assert command(checkpoint, twice, "--map", "7", "7") == 0  # a map counts once
+    assert image.imread(twice).shape == image.imread(one).shape
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from policy_runs import save_run
 
+from copolicy.dataset.policies.training_run import find_policy_folder
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan import study
 from copolicy.evaluate.coplanning_table import evaluations
+from copolicy.train.processor_files import processors_sha256
 
 SHORT = ("--limit", "4", "--step-limit", "24")
 
@@ -203,6 +205,22 @@ def test_results_with_another_sampler_are_not_mixed(results):
     kept.write_text(json.dumps(result), encoding="utf-8")
     assert _table(results) == 0
     assert _read(results)["left_out"] == [f"{kept}: left out, other settings: sampler ddpm, here ddim"]
+
+
+def test_results_with_other_processors_are_not_mixed(results):
+    """The weights are the same; the result says which processors it had."""
+    run = results / "codp-h" / "seed_0" / "training"
+    kept = run / "coplanning" / "unseen.json"
+    before = json.loads(kept.read_text(encoding="utf-8"))["policy"]["processors_sha256"]
+    checkpoint = find_policy_folder(run)
+    assert checkpoint is not None
+    with (checkpoint / "policy_preprocessor.json").open("a", encoding="utf-8") as file:
+        file.write("\n")
+    assert _table(results) == 0
+    after = processors_sha256(checkpoint)
+    left_out = _read(results)["left_out"]
+    assert f"{kept}: left out, other settings: processors_sha256 {before}, here {after}" in left_out
+    assert len(left_out) == 2  # of both map sets
 
 
 def test_results_of_the_coplan_command_are_used(methods, capsys):

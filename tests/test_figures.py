@@ -358,6 +358,9 @@ def test_a_map_is_its_obstacles_and_goal_whatever_the_start():
     second = source(carry(scenario=OTHER, map_id="two"), carry(scenario=turned, map_id="one-90deg"), name="B")
     kept = require_map(TABLE, [first, second], "one")
     assert [list(each.numbers) for each in kept] == [[0], [1]]
+    both = source(carry(), carry(scenario=OTHER, map_id="one"), carry(scenario=turned, map_id="three"), name="A")
+    (kept,) = require_map(TABLE, [both], "one")  # a name of two maps takes both
+    assert list(kept.numbers) == [0, 1, 2]
     with pytest.raises(
         InvalidValueError, match="--map: expected the map_id of an episode, such as one, two, found 'x'"
     ):

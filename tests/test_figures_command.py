@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_figures import carry
 
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import PairTask, get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan.rollouts import EpisodeResult
@@ -91,6 +92,18 @@ def test_the_same_call_gives_the_same_files(study, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
+def test_the_document_says_which_map_was_chosen(study, tmp_path):
+    name_of_map = f"custom-{carry().scenario.digest}"
+    for name, flags in (("all", ()), ("one", ("--map", name_of_map))):
+        call = ["figures", f"S={study}", "--only", "success-by-map", "--out", str(tmp_path / name)]
+        assert main([*call, *flags]) == 0
+    documents = [json.loads((tmp_path / name / "figures.json").read_text(encoding="utf-8")) for name in ("all", "one")]
+    assert [document.get("map") for document in documents] == [None, name_of_map]
+    figure = documents[1]["figures"]["success-by-map"]
+    assert figure["unit"] == "proportion"
+    assert figure["definition"].startswith("proportion of the episodes")
+
+
 def test_a_figure_is_not_replaced_without_being_told(study, tmp_path, capsys):
     call = ["figures", f"S={study}", "--only", "visitation", "--out", str(tmp_path / "out")]
     assert main(call) == 0
@@ -100,14 +113,48 @@ def test_a_figure_is_not_replaced_without_being_told(study, tmp_path, capsys):
     assert main([*call, "--overwrite"]) == 0
 
 
+def store_cell(folder: Path, name: str, episodes: list[tuple[str, Trajectory]], **settings) -> Path:
+    """A cell of a cross-play: its result, of which only the settings are read, and its trajectories."""
+    store(folder / f"cells/{name}.trajectories.parquet", episodes)
+    result = folder / f"cells/{name}.json"
+    result.write_text(json.dumps({"settings": settings}), encoding="utf-8")
+    return result
+
+
 def test_cells_of_a_cross_play_are_pooled_by_robot(tmp_path):
-    store(tmp_path / "cells/A--x.trajectories.parquet", [("A", carry()), ("A", carry())])
-    store(tmp_path / "cells/A--y.trajectories.parquet", [("A", carry())])
-    store(tmp_path / "cells/B--x.trajectories.parquet", [("B", carry())])
+    store_cell(tmp_path, "A--x", [("A", carry()), ("A", carry())], seed=0, fps=10, robot={"type": "a"})
+    store_cell(tmp_path, "A--y", [("A", carry())], seed=0, fps=10, robot={"type": "a"})
+    store_cell(tmp_path, "B--x", [("B", carry())], seed=0, fps=30, robot={"type": "b"})
     _, sources = read_sources([f"play={tmp_path}"])
     assert {source.name: len(source.episodes) for source in sources} == {"play: A": 3, "play: B": 1}
     _, (source,) = read_sources([f"play={tmp_path}#B"])
     assert (source.name, len(source.episodes)) == ("play", 1)
+
+
+def test_cells_of_two_cross_plays_are_not_pooled(tmp_path, capsys):
+    call = ["figures", f"play={tmp_path}", "--out", str(tmp_path / "out")]
+    store_cell(tmp_path, "A--x", [("A", carry())], seed=0, map_set={"name": "unseen", "version": 1})
+    cell = store_cell(tmp_path, "A--y", [("A", carry())], seed=0, map_set={"name": "unseen", "version": 2})
+    assert main(call) == 2
+    expected = f"{cell}: expected map_set.version 1, as in A--x.trajectories.parquet, found 2"
+    assert expected in capsys.readouterr().err
+    cell.unlink()  # as after a process that was killed between the two files
+    assert main(call) == 2
+    expected = f"{cell}: expected the result of the trajectories beside it, found no such file"
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_name_of_the_present_folder_is_its_name(tmp_path, monkeypatch):
+    (tmp_path / "play").mkdir()
+    store_cell(tmp_path / "play", "A--x", [("A", carry())])
+    monkeypatch.chdir(tmp_path / "play")
+    assert [source.name for source in read_sources(["."])[1]] == ["play"]
+
+
+def test_a_data_set_has_no_robots(unsharded):
+    with pytest.raises(InvalidValueError, match="expected a data set without #ROBOT, found 'A'"):
+        read_sources([f"pairs={unsharded / 'whole'}#A"])
 
 
 def test_a_name_is_that_of_the_file_if_there_is_none(study):

@@ -23,6 +23,8 @@ from copolicy.collect.cli import main as collect
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.sweep import tasks
+from copolicy.evaluate.trajectories import trajectories_beside
+from copolicy.evaluate.trajectory_sources import read_sources
 
 SHORT = ("--limit", "2", "--configurations", "4", "--step-limit", "24", "--maps", "unseen", "--partners", "stubborn")
 
@@ -192,8 +194,9 @@ def test_results_of_other_settings_weights_and_partners_are_refused(made, copied
     line = refused(made, "--seed", "1")
     assert line == f"{path}: expected seed 1 as in this run (another --out, or --overwrite), found 'seed 0'"
     assert ": expected threads 2 as in this run" in refused(made, "--threads", "2")
-    assert ": expected world {" in refused(made, "--step-limit", "27")
-    assert "expected overrides {" in refused(made, "--num-inference-steps", "3")
+    assert ": expected world.step_limit 27 as in this run" in refused(made, "--step-limit", "27")
+    assert ": expected overrides.num_inference_steps 3 as in this run" in refused(made, "--num-inference-steps", "3")
+    assert ': expected device "cuda" as in this run' in refused(made, "--device", "cuda:1")
     other = Path(shutil.copytree(made, tmp_path / "other", symlinks=True))
     shutil.rmtree(other / "seed_1")
     save_run(other / "seed_1" / "training", seed=1, weights=7)
@@ -218,6 +221,39 @@ def test_overwrite_replaces_results_of_other_settings_alone(made, copied, tmp_pa
     assert json.loads(capsys.readouterr().out)["finished_before"] == 2
     changed = {name for name, when in results(copied).items() if before[name] != when}
     assert changed == {result_of(copied, 1, partner)[0].name for partner in ("co-planning", "stubborn")}
+
+
+def test_trajectories_are_those_of_the_results(made, copied, capsys):
+    """A finished task without them is run again, with the same result; another call leaves them where they are."""
+    digests = table(copied)["results_sha256"]
+    capsys.readouterr()
+    assert sweep(made, copied, "--trajectories") == 0
+    assert json.loads(capsys.readouterr().out)["finished_before"] == 0
+    assert table(copied)["results_sha256"] == digests
+    before = results(copied)
+    for path in before:
+        result = json.loads((copied / "tasks" / path).read_text(encoding="utf-8"))
+        (source,) = read_sources([f"S={copied / 'tasks' / path}"])[1]
+        assert source.label == result["label"]
+        robot = f"{result['sweep']['method']} {result['sweep']['run']}"
+        assert [episode.columns for episode in source.episodes] == [
+            {"robot": robot, **row} for row in result["episodes"]
+        ]
+        assert [len(episode.actions) for episode in source.episodes] == [row["steps"] for row in result["episodes"]]
+    for flags in ((), ("--trajectories",)):
+        assert sweep(made, copied, *flags) == 0
+        assert json.loads(capsys.readouterr().out)["finished_before"] == 4
+    assert results(copied) == before
+    lost = trajectories_beside(result_of(copied, 0, "stubborn")[0])
+    lost.unlink()
+    partial = lost.with_name(f".{lost.name}.0123abcd.partial")  # of a killed process
+    partial.write_bytes(b"")
+    assert sweep(made, copied, "--trajectories") == 0
+    assert json.loads(capsys.readouterr().out)["finished_before"] == 3
+    assert lost.exists()
+    assert not partial.exists()
+    assert sweep(made, copied, "--overwrite", "--step-limit", "12") == 0
+    assert not list(copied.glob("tasks/*.parquet"))
 
 
 def test_a_failed_task_does_not_stop_the_others(made, tmp_path, capsys):
@@ -342,6 +378,10 @@ def test_two_calls_do_not_work_in_one_folder(made, tmp_path, capsys):
         (("--workers", "0"), "workers: expected at least 1, found 0"),
         (("--threads", "0"), "--threads: expected at least 1, found 0"),
         (("--maps", "nowhere"), "unknown map set 'nowhere'; available: "),
+        (
+            ("--partners", "co-planning=stubborn"),
+            "--partners: expected partners of other names than co-planning, found 'co-planning'",
+        ),
         (("--partners", "kind"), "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
         (("--configurations", "3"), "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
         (("--partners", "p=proxy:nowhere"), "nowhere: expected a checkpoint folder with config.json and"),

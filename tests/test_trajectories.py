@@ -1,6 +1,8 @@
 """Trajectories beside a result are the episodes that were run."""
 
+import errno
 import json
+import os
 
 import numpy as np
 import pytest
@@ -9,7 +11,13 @@ from test_eval_partner import MAPS, ROBOTS
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.partner_study.study import run_with_partners
-from copolicy.evaluate.trajectories import demonstrations, read_trajectories, trajectories_beside, write_trajectories
+from copolicy.evaluate.trajectories import (
+    demonstrations,
+    read_trajectories,
+    trajectories_beside,
+    write_result,
+    write_trajectories,
+)
 from copolicy.tasks.table.physics import Physics
 
 
@@ -70,3 +78,65 @@ def test_demonstrations_leave_out_excluded_episodes(unsharded, tmp_path):
     remaining = demonstrations(copy).episodes
     assert len(remaining) == len(episodes) - 1
     np.testing.assert_array_equal(remaining[1].states, episodes[2].states)
+
+
+@pytest.fixture
+def earlier(written, tmp_path):
+    """A result with the trajectories of four episodes, and a function that replaces it by one of other episodes."""
+    _, episodes = written
+    path = tmp_path / "result.json"
+
+    def write(result, episodes):
+        named = None if episodes is None else [("never-yields", episode) for episode in episodes]
+        write_result(path, {"of": result}, get_task(), "simulated", named)
+
+    write("earlier", episodes)
+    return path, lambda result="new", count=1: write(result, None if count is None else episodes[:count])
+
+
+def of(path):
+    """Which result there is, and the number of episodes of the trajectories beside it."""
+    result = json.loads(path.read_text(encoding="utf-8"))["of"] if path.exists() else None
+    beside = trajectories_beside(path)
+    return result, len(read_trajectories(beside).episodes) if beside.exists() else None
+
+
+def test_a_result_without_trajectories_leaves_none_of_an_earlier_one(earlier):
+    path, write = earlier
+    assert of(path) == ("earlier", 4)
+    write()
+    assert of(path) == ("new", 1)
+    write(count=None)
+    assert of(path) == ("new", None)
+
+
+def test_a_full_disk_leaves_the_earlier_result_with_its_trajectories(earlier, monkeypatch):
+    import pyarrow.parquet as pq
+
+    path, write = earlier
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(pq, "write_table", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        write()
+    assert of(path) == ("earlier", 4)
+    assert len(list(path.parent.iterdir())) == 2
+
+
+@pytest.mark.parametrize("renames", [0, 1])
+def test_a_killed_process_leaves_no_result_beside_trajectories_of_other_episodes(earlier, monkeypatch, renames):
+    """The process ends before its first rename, or between that of the trajectories and that of the result."""
+    path, write = earlier
+    replace, done = os.replace, []
+
+    def killed(*arguments):
+        if len(done) == renames:
+            raise KeyboardInterrupt
+        done.append(replace(*arguments))
+
+    monkeypatch.setattr(os, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert of(path) == (None, 1 if renames else 4)

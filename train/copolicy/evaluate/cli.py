@@ -30,7 +30,7 @@ from .study_flags import (
     study_protocol,
 )
 from .sweep import add_sweep_command
-from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file
+from .trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_beside
 from .within_subject.command import add_power_command
 
 _DEFAULT_MAPS = "holdout"
@@ -77,8 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure, trajectories = figure_beside(arguments.out), trajectories_file(arguments)
-    require_new(arguments.out, figure, *([trajectories] if trajectories else []), overwrite=arguments.overwrite)
+    figure, trajectories = figure_beside(arguments.out), trajectories_beside(arguments.out)
+    require_new(arguments.out, figure, trajectories, overwrite=arguments.overwrite)
     task = checkpoint_task(arguments.policy)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, _DEFAULT_MAPS))
     if arguments.orientations:
@@ -106,6 +106,6 @@ def _coplan(arguments: argparse.Namespace) -> dict[str, Any]:
         "planning_ms_per_call": summary["planning_ms_per_call"]["p50"],
         "result": str(arguments.out),
         "figure": str(figure) if task.outline is not None else task.missing("outline"),
-        **({"trajectories": str(trajectories)} if trajectories else {}),
+        **({"trajectories": str(trajectories)} if arguments.trajectories else {}),
         **{name: result[name] for name in ("not_measured",) if name in result},
     }

@@ -11,7 +11,7 @@ import numpy as np
 
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.exceptions import CopolicyError, FileFormatError
-from copolicy.dataset.files.staging import replacement
+from copolicy.dataset.files.staging import replace_json, replacement, replacements
 from copolicy.dataset.task import PairTask, get_task
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 SUFFIX = ".trajectories.parquet"
 BESIDE_RESULT = f"beside the result as NAME{SUFFIX}"
+NamedEpisode = tuple[str, "EpisodeResult"]
+"""Name of the robot, and its episode."""
+
 _KEY = b"copolicy"
 _EXPECTED = "the trajectories of a study (--trajectories of copolicy-eval)"
 
@@ -76,18 +79,41 @@ def trajectories_beside(result: Path) -> Path:
     return result.with_name(result.name.removesuffix(".json") + SUFFIX)
 
 
-def trajectories_file(arguments: argparse.Namespace) -> Path | None:
-    """The file that `--trajectories` writes beside `--out`; None without the flag."""
-    return trajectories_beside(arguments.out) if arguments.trajectories else None
+def write_result(
+    path: Path, result: Mapping[str, Any], task: PairTask, label: str, episodes: Iterable[NamedEpisode] | None = None
+) -> None:
+    """Writes a result (JSON) and, of given episodes, the trajectories beside it; existing files are replaced.
+
+    The trajectories of an earlier result are removed, also by a result without any. A process that is killed in the
+    meantime leaves the earlier result, or trajectories alone, but no result beside trajectories of other episodes.
+
+    Args:
+        label, episodes: see `write_trajectories`.
+    """
+    beside = trajectories_beside(path)
+    if episodes is None:
+        beside.unlink(missing_ok=True)
+        replace_json(path, result, indent=1)
+        return
+    with replacements([beside, path]) as (trajectories, document):
+        _write(trajectories, task, label, episodes)
+        document.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        path.unlink(missing_ok=True)
 
 
-def write_trajectories(path: Path, task: PairTask, label: str, episodes: Iterable[tuple[str, "EpisodeResult"]]) -> None:
+def write_trajectories(path: Path, task: PairTask, label: str, episodes: Iterable[NamedEpisode]) -> None:
     """Writes trajectories: float32 states and actions at the task's rate, and per episode its scenario and row.
 
     Args:
         path: replaced if it exists.
+        label: see `Trajectories`.
         episodes: name of the robot and episode.
     """
+    with replacement(path) as partial:
+        _write(partial, task, label, episodes)
+
+
+def _write(path: Path, task: PairTask, label: str, episodes: Iterable[NamedEpisode]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -112,8 +138,7 @@ def write_trajectories(path: Path, task: PairTask, label: str, episodes: Iterabl
         }
     )
     described = {"task": task.spec.name, "label": label, "fps": task.spec.record_hz, "episodes": rows}
-    with replacement(path) as partial:
-        pq.write_table(table.replace_schema_metadata({_KEY: json.dumps(described)}), partial, compression="zstd")
+    pq.write_table(table.replace_schema_metadata({_KEY: json.dumps(described)}), path, compression="zstd")
 
 
 def read_trajectories(path: Path) -> Trajectories:

@@ -1,15 +1,17 @@
 """The sources of figures and behaviours: data sets, results with trajectories, and the cells of a cross-play."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.task import PairTask
 
+from .stored_settings import differences
 from .trajectories import SUFFIX, Trajectories, Trajectory, demonstrations, read_trajectories
 
 SOURCE_HELP = (
@@ -19,7 +21,14 @@ SOURCE_HELP = (
 CELLS = "cells"
 """Folder of a cross-play with a file for each robot and partner."""
 
+OF_A_CELL = ("fps", "robot", "partner", "recorded_sha256")
+"""Settings of a cell; the others are of the whole cross-play."""
+
 _EXPECTED = "a data set, a result with trajectories (--trajectories), or the folder of a cross-play with them"
+
+
+class _CellSettings(TypedDict):
+    settings: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -49,14 +58,14 @@ class Source:
         """Rates of the episodes, frames per second."""
         return sorted({episode.fps for episode in self.episodes})
 
-    def of_layout(self, task: PairTask, layout: Any) -> "Source":
-        """The episodes with the obstacles and goal of a map, whatever their start."""
-        kept = [
+    def of_layouts(self, task: PairTask, layouts: Collection[Hashable]) -> "Source":
+        """The episodes with the obstacles and goal of one of the maps, whatever their start."""
+        on_map = [
             (number, episode)
             for number, episode in zip(self.numbers, self.episodes, strict=True)
-            if task.layout(episode.scenario, with_goal=True) == layout
+            if task.layout(episode.scenario, with_goal=True) in layouts
         ]
-        numbers, episodes = zip(*kept, strict=True) if kept else ((), ())
+        numbers, episodes = zip(*on_map, strict=True) if on_map else ((), ())
         return replace(self, numbers=numbers, episodes=episodes)
 
 
@@ -65,7 +74,7 @@ def read_sources(texts: Sequence[str]) -> tuple[PairTask, list[Source]]:
 
     Raises:
         FileFormatError: a source does not exist, has no episodes, or no trajectories.
-        InvalidValueError: equal names, an unknown robot, or sources of several tasks.
+        InvalidValueError: equal names, an unknown robot, the robot of a data set, or sources of several tasks.
     """
     sources: list[Source] = []
     task: PairTask | None = None
@@ -79,6 +88,8 @@ def read_sources(texts: Sequence[str]) -> tuple[PairTask, list[Source]]:
             raise InvalidValueError(text, f"a source of the task {task.spec.name} as before it", read.task.spec.name)
         task = read.task
         if is_data_set:
+            if robot:
+                raise InvalidValueError(text, "a data set without #ROBOT", robot)
             numbers = [int(episode.columns["episode_index"]) for episode in read.episodes]
             sources.append(Source(name, read.label, str(path), True, read.episodes, numbers))
         else:
@@ -105,11 +116,11 @@ def require_map(task: PairTask, sources: Sequence[Source], map_id: str) -> list[
     }
     if not of_map:
         raise InvalidValueError("--map", f"the map_id of an episode, such as {_some_maps(sources[0])}", map_id)
-    kept = [source.of_layout(task, next(iter(of_map))) for source in sources]
-    for source in kept:
+    on_map = [source.of_layouts(task, of_map) for source in sources]
+    for source in on_map:
         if not source.episodes:
             raise InvalidValueError("--map", f"a map on which {source.name} has episodes", map_id)
-    return kept
+    return on_map
 
 
 def common_rate(sources: Sequence[Source], largest: int) -> int:
@@ -131,7 +142,8 @@ def _parsed(text: str) -> tuple[str, Path, str]:
     if not Path(rest).exists() and "#" in rest:
         rest, _, robot = rest.rpartition("#")
     path = Path(rest)
-    return name or path.name.removesuffix(SUFFIX).removesuffix(".json"), path, robot
+    own_name = path.name or path.absolute().name  # of `.`, the folder's
+    return name or own_name.removesuffix(SUFFIX).removesuffix(".json"), path, robot
 
 
 def _study(path: Path) -> Trajectories:
@@ -142,15 +154,32 @@ def _study(path: Path) -> Trajectories:
     cells = sorted((path / CELLS).glob(f"*{SUFFIX}"))
     if not cells:
         raise FileFormatError(path, _EXPECTED, "none")
-    read = [read_trajectories(cell) for cell in cells]
-    for cell, one in zip(cells, read, strict=True):
-        if one.task.spec.name != read[0].task.spec.name:
-            raise FileFormatError(cell, f"episodes of the task {read[0].task.spec.name}", one.task.spec.name)
-    episodes = [episode for one in read for episode in one.episodes]
+    _require_one_study(cells)
+    studies = [read_trajectories(cell) for cell in cells]
+    for cell, study in zip(cells, studies, strict=True):
+        if study.task.spec.name != studies[0].task.spec.name:
+            raise FileFormatError(cell, f"episodes of the task {studies[0].task.spec.name}", study.task.spec.name)
+    episodes = [episode for study in studies for episode in study.episodes]
     partners = sorted({str(episode.columns["partner"]) for episode in episodes if "partner" in episode.columns})
     named = f" with {', '.join(partners)}" if partners else ""
     label = f"cross-play in simulation{named}, no person took part in the study"
-    return Trajectories(read[0].task, label, episodes)
+    return Trajectories(studies[0].task, label, episodes)
+
+
+def _require_one_study(cells: Sequence[Path]) -> None:
+    """Checks that the cells of a cross-play have one protocol; after `--overwrite` others can be left in the folder.
+
+    Raises:
+        FileFormatError: a cell has no result, or other settings than the first.
+    """
+    first: Mapping[str, Any] | None = None
+    for cell in cells:
+        result = cell.with_name(cell.name.removesuffix(SUFFIX) + ".json")
+        stored = read_json(result, _CellSettings, "the result of the trajectories beside it")["settings"]
+        settings = {name: value for name, value in stored.items() if name not in OF_A_CELL}
+        first = settings if first is None else first
+        for name, expected, found in differences(first, settings):
+            raise FileFormatError(result, f"{name} {expected}, as in {cells[0].name}", str(found))
 
 
 def _by_robot(name: str, path: Path, robot: str, read: Trajectories) -> list[Source]:

@@ -26,6 +26,7 @@ from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import PairTask, get_task
 
 from .plugins import register_plugins
+from .processor_files import processors_sha256
 
 _OBSERVATIONS = (STATE, ENVIRONMENT_STATE, HUMAN_ACTION)
 _DESCRIBED = (
@@ -86,6 +87,7 @@ class Checkpoint:
             ) from error
         self.policy: Any = policy
         self.weights_sha256: str = hashlib.sha256((folder / "model.safetensors").read_bytes()).hexdigest()
+        self._processors_sha256 = processors_sha256(folder)
         self._config: Any = self.policy.config
         self.task: str = self.conditions.task
         self.name: str = f"policy:{self._config.type}-{self.weights_sha256[:8]}"
@@ -130,11 +132,12 @@ class Checkpoint:
         return actions[:, : self.n_predicted_actions]
 
     def describe(self) -> dict[str, Any]:
-        """The `policy` entry of a result: type, size, inference settings, sha256 of the weights."""
+        """The `policy` entry of a result: type, size, inference settings, sha256 of weights and of processors."""
         return {
             "checkpoint": os.path.relpath(self.folder),
             "type": self._config.type,
             "weights_sha256": self.weights_sha256,
+            "processors_sha256": self._processors_sha256,
             "learned": self.conditions.to_json(),
             "parameters": sum(p.numel() for p in self.policy.parameters() if p.requires_grad),
             **{name: getattr(self._config, name) for name in _DESCRIBED if hasattr(self._config, name)},

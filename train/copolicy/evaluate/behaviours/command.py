@@ -12,7 +12,7 @@ from copolicy.dataset.command_line.flag_numbers import seed
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, replace_text, require_new
 
-from ..file_names import file_name
+from ..file_names import file_names
 from ..markdown_table import markdown_table
 from ..trajectory_sources import SOURCE_HELP, common_rate, read_sources
 
@@ -30,7 +30,7 @@ def add_behaviours_command(commands: Commands) -> None:
         commands,
         "behaviours",
         _behaviours,
-        "count adaptation, leadership switches, passivity, pivots and dissent of each method, against chance",
+        "count adaptation, leadership switches, passivity, pivots and dissent of methods, with null distributions",
         "copolicy-eval behaviours people=data/pairs ours=outputs/eval.json --out outputs/behaviours",
         lambda arguments: () if arguments.no_videos else ("PIL",),
     )
@@ -47,7 +47,7 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     files = [arguments.out / name for name in _FILES]
     require_new(*files, overwrite=arguments.overwrite)
     from .clips import write_clip  # pygame
-    from .counts import count, rate_text
+    from .counts import INTERVALS, count, rate_text
     from .definitions import behaviours_of
     from .motion import Motion
 
@@ -58,13 +58,14 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {
         "study": "behaviours",
         "task": task.spec.name,
-        "settings": {"fps": fps, "seed": arguments.seed, "unit_of_analysis": "an episode; intervals are over maps"},
+        "settings": {"fps": fps, "seed": arguments.seed, "unit_of_analysis": f"an episode; {INTERVALS}"},
         "definitions": {behaviour.name: behaviour.definition for behaviour in counted},
         "not_counted": {each.name: task.missing(each.missing) for each in chosen if each.missing},
         "methods": {},
     }
     arguments.out.mkdir(parents=True, exist_ok=True)
     videos: dict[str, str] = {}
+    endings = file_names([source.name for source in sources])
     for source in progress(sources, len(sources), "methods"):
         motion, name = Motion(task, source.episodes, fps), source.name
         entry: dict[str, Any] = {"label": source.label, "episodes": len(source.episodes)}
@@ -75,12 +76,12 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
                 continue
             entry[behaviour.name]["clearest"] = _described(motion, events[0])
             if not arguments.no_videos and task.outline is not None:
-                video = arguments.out / f"{behaviour.name}-{file_name(name)}.gif"
+                video = arguments.out / f"{behaviour.name}-{endings[name]}.gif"
                 title = f"{behaviour.name.replace('_', ' ')}, {name}"
                 write_clip(video, task, source.episodes[events[0].episode], events[0], fps, title)
                 videos[f"{behaviour.name}, {name}"] = str(video)
         result["methods"][name] = entry
-    replace_text(files[1], _markdown(result, counted))
+    replace_text(files[1], _markdown(result, counted, task.spec.players))
     replace_text(files[2], _csv(result, counted))
     replace_json(files[0], result, indent=1)
     return {
@@ -111,11 +112,11 @@ def _described(motion: "Motion", event: "Event") -> dict[str, Any]:
     }
 
 
-def _markdown(result: Mapping[str, Any], counted: Sequence["Behaviour"]) -> str:
-    from .counts import rate_text
+def _markdown(result: Mapping[str, Any], counted: Sequence["Behaviour"], players: tuple[str, str]) -> str:
+    from .counts import INTERVALS, rate_text
 
     methods = result["methods"]
-    text = ["Instances per minute, with 95 % interval over maps, mean of the null distribution and p:"]
+    text = [f"Instances per minute, with 95 % interval, mean of the null distribution and p; {INTERVALS}:"]
     rows = [
         [behaviour.name, *(rate_text(entry[behaviour.name]["per_minute"]) for entry in methods.values())]
         for behaviour in counted
@@ -130,17 +131,15 @@ def _markdown(result: Mapping[str, Any], counted: Sequence["Behaviour"]) -> str:
     ]
     text.append("Episodes with at least one:\n\n" + markdown_table(["behaviour", *methods], rows))
     if any(behaviour.name == "adaptation" for behaviour in counted):
-        rows = [[name, *(_gave_way(entry["adaptation"], who) for who in _WHO)] for name, entry in methods.items()]
-        text.append("Who gave way in adaptations:\n\n" + markdown_table(["method", *_WHO], rows))
+        everyone = (*players, " and ".join(players))
+        rows = [[name, *(_gave_way(entry["adaptation"], who) for who in everyone)] for name, entry in methods.items()]
+        text.append("Who gave way in adaptations:\n\n" + markdown_table(["method", *everyone], rows))
     text.append(
         "\n".join(f"- {name}: {entry['label']}; {entry['episodes']} episodes." for name, entry in methods.items())
     )
     notes = {**result["definitions"], **result["not_counted"]}
     text.append("\n".join(f"- {name}: {note}" for name, note in notes.items()))
     return "\n\n".join(text) + "\n"
-
-
-_WHO = ("robot", "human", "robot and human")
 
 
 def _gave_way(entry: Mapping[str, Any], who: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.scenarios import base_name
 from copolicy.dataset.statistics.estimate import Estimate, Null
-from copolicy.dataset.statistics.resampling import Bootstrap, circular_shift
+from copolicy.dataset.statistics.resampling import MIN_CLUSTERS, Bootstrap, circular_shift
 
 from ..comparison.paired import REPLICATES
 from .definitions import MIN_SHIFT_S, NULLS, Behaviour
@@ -19,6 +19,9 @@ from .motion import Event, Motion
 
 DRAWS = 39
 """Draws of a null distribution; the smallest p is 1 / 40."""
+
+INTERVALS = f"intervals are over maps, of fewer than {MIN_CLUSTERS} maps over episodes, which is too narrow"
+"""What the bootstrap resamples."""
 
 
 def count(behaviour: Behaviour, motion: Motion, seed: int) -> tuple[dict[str, Any], list[Event]]:

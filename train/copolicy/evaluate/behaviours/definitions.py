@@ -18,7 +18,8 @@ MIN_SHIFT_S = 2.0
 """Smallest circular shift of a null distribution, s."""
 
 NULLS: dict[NullMethod, str] = {
-    "shift": f"the human's actions circularly shifted in time within each episode by at least {MIN_SHIFT_S:g} s",
+    "shift": f"the human's actions circularly shifted in time within each episode by at least {MIN_SHIFT_S:g} s, or by "
+    f"half of an episode shorter than {2 * MIN_SHIFT_S:g} s",
     "obstacles": "the obstacles of each episode replaced by those of another one with a different layout",
 }
 

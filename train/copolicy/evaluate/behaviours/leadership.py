@@ -7,7 +7,7 @@ import numpy as np
 from copolicy.dataset.arrays import Array
 from copolicy.dataset.statistics.leadership import HOP_S, WINDOW_S, lead_windows
 
-from .motion import Event, Motion
+from .motion import Event, Motion, least_frames
 
 STEADY_S = 0.5
 """Time for which the same player leads before and after a switch, s."""
@@ -20,7 +20,8 @@ def leadership_switches(motion: Motion, order: Array | None) -> list[Event]:
     after.
     """
     data, windows = motion.frames, lead_windows(motion.frames, order)
-    steady, window = max(1, round(STEADY_S / HOP_S)), round(WINDOW_S * data.fps)
+    hops_per_s = data.fps / max(1, round(HOP_S * data.fps))  # at low rates a hop is a frame, longer than `HOP_S`
+    steady, window = least_frames(STEADY_S, hops_per_s), round(WINDOW_S * data.fps)
     events = []
     for episode in np.unique(windows.episode).tolist():
         inside = windows.episode == episode

@@ -1,5 +1,6 @@
 """The episodes of one method at a common rate, with what the detectors of behaviours need of them."""
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -31,6 +32,11 @@ class Event(NamedTuple):
     end: int
     score: float
     details: dict[str, str]
+
+
+def least_frames(seconds: float, fps: float) -> int:
+    """Smallest number of frames, at least 1, that last at least so long."""
+    return max(1, math.ceil(seconds * fps - 1e-9))  # 0.3 s at 10 Hz is 3 frames, in spite of rounding
 
 
 class Motion:
@@ -104,7 +110,7 @@ class Motion:
     def runs(self, flags: Array, shortest_s: float) -> list[tuple[int, int, int]]:
         """Episode, first frame and end of each run of true flags `(N,)` that lasts at least `shortest_s`."""
         data, found = self.frames, []
-        shortest = max(1, round(shortest_s * data.fps))
+        shortest = least_frames(shortest_s, data.fps)
         for index, (start, end) in enumerate(zip(data.starts.tolist(), data.ends.tolist(), strict=True)):
             edges = np.flatnonzero(np.diff(flags[start:end].astype(np.int8), prepend=0, append=0)).tolist()
             found += [

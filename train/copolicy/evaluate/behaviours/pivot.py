@@ -26,30 +26,33 @@ def pivots(motion: Motion, obstacles: Array | None) -> list[Event]:
         obstacles: `(E,)` indices of the episodes whose obstacles replace those of each episode, for the null
             distribution.
     """
-    data, outline = motion.frames, motion.task.required_outline
-    near = math.dist(*outline.hands) / 2
-    events = []
+    data = motion.frames
+    near = math.dist(*motion.task.required_outline.hands) / 2
+    flags, angles = np.zeros(len(data.states), bool), np.zeros(len(data.states))
     for index, (start, end) in enumerate(zip(data.starts, data.ends, strict=True)):
         if end - start < 3:
             continue
         states = data.states[start:end]
-        poses = outline.poses(states)
-        theta = np.unwrap(poses[:, 2])
-        spin = np.gradient(theta) * data.fps
-        ends = placed(np.array(outline.hands), poses)  # (T, 2, 2)
-        slow, fast = np.sort(np.linalg.norm(np.gradient(ends, axis=0), axis=-1), axis=1).T
-        turning = (np.abs(spin) >= SPIN) & (slow <= HAND_SPEEDS * fast)
-        if not turning.any():
-            continue
+        turning, angles[start:end] = _turns(motion, states)
         scenario = data.rows[index if obstacles is None else int(obstacles[index])].scenario
-        distance = np.full(len(states), np.inf)
-        found = distances(motion.task, scenario, states[turning])
-        if found is not None:
-            distance[turning] = found
-        flags = np.zeros(len(data.states), bool)
-        flags[start:end] = turning & (distance <= near)
-        for _, first, last in motion.runs(flags, 2 / data.fps):
-            angle = abs(float(theta[last - 1] - theta[first]))
-            if angle >= TURN:
-                events.append(Event(index, first, last, angle, {}))
+        distance = distances(motion.task, scenario, states[turning]) if turning.any() else None
+        if distance is not None:
+            flags[start:end][turning] = distance <= near
+    events = []
+    for index, first, last in motion.runs(flags, 2 / data.fps):
+        offset = data.starts[index]
+        angle = abs(float(angles[offset + last - 1] - angles[offset + first]))
+        if angle >= TURN:
+            events.append(Event(index, first, last, angle, {}))
     return events
+
+
+def _turns(motion: Motion, states: Array) -> tuple[Array, Array]:
+    """`(T,)` whether the body turns about one end in the states of an episode, and its angle, rad, without jumps."""
+    outline = motion.task.required_outline
+    poses = outline.poses(states)
+    theta = np.unwrap(poses[:, 2])
+    spin = np.gradient(theta) * motion.frames.fps
+    ends = placed(np.array(outline.hands), poses)  # (T, 2, 2)
+    slow, fast = np.sort(np.linalg.norm(np.gradient(ends, axis=0), axis=-1), axis=1).T
+    return (np.abs(spin) >= SPIN) & (slow <= HAND_SPEEDS * fast), theta

@@ -5,12 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.scenarios import ScenarioSet
 
 from ..study_flags import Protocol, study_settings
 from ..summary import not_measured, percent, summarise
-from ..trajectories import trajectories_beside, write_trajectories
+from ..trajectories import write_result
 from .figure import save_path_figure
 from .rollouts import EpisodeResult, coplan
 
@@ -102,8 +101,7 @@ def write_coplan_result(
     title = f"co-planning on {settings['maps']}: {percent(success)} of {success['episodes']} episodes"
     if protocol.task.outline is not None:
         save_path_figure(episodes, out.with_suffix(".png"), title)
-    if trajectories:
-        named = ((policy.name, episode) for episode in episodes)
-        write_trajectories(trajectories_beside(out), protocol.task, result["label"], named)
-    replace_json(out, result, indent=1)  # last, so that an existing result is always complete
+    named = ((policy.name, episode) for episode in episodes)
+    # Last, so that an existing result is always complete.
+    write_result(out, result, protocol.task, result["label"], named if trajectories else None)
     return result

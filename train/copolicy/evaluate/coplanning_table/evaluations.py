@@ -24,7 +24,7 @@ from .training_runs import TrainedMethod, TrainingRun
 RESULTS = "coplanning"
 """Folder of the table's results in the folder of a run."""
 
-# What may differ between results of one protocol: neither changes an action by more than rounding.
+# What may differ between results of one protocol: none changes the distribution of the actions.
 _FREE = ("device", "told_otherwise", "unseen")
 _POLICY_PLACES = ("checkpoint", "learned", "planned_with", "backend", "planner")
 

@@ -11,7 +11,6 @@ from typing import Any, TypedDict
 import numpy as np
 
 from copolicy.dataset.files.json_file import read_json
-from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.task import PairTask
 
 from ..file_names import file_name
@@ -19,7 +18,7 @@ from ..partner_study.robots import StudyRobot
 from ..partner_study.study import run_with_partners
 from ..partners.partner import StudyPartner
 from ..stored_settings import require_same_settings, without_run
-from ..trajectories import trajectories_beside, write_trajectories
+from ..trajectories import trajectories_beside, write_result
 from ..trajectory_sources import CELLS
 from .measures import Row, episode_row
 
@@ -123,11 +122,9 @@ def run_cell(
         "planning_ms_per_call": 1e3 * float(np.median(inference)) if inference else None,
         "episodes": rows,
     }
-    if trajectories:
-        label = f"{robot.name} with {partner.name}, no person took part in the study"
-        named = ((robot.name, episode) for episode in episodes)
-        write_trajectories(trajectories_beside(path), play.task, label, named)
-    replace_json(path, cell, indent=1)
+    label = f"{robot.name} with {partner.name}, no person took part in the study"
+    named = ((robot.name, episode) for episode in episodes)
+    write_result(path, cell, play.task, label, named if trajectories else None)
     return cell
 
 
@@ -137,5 +134,6 @@ def _described(play: Play, robot: StudyRobot, partner: StudyPartner) -> dict[str
         "fps": play.fps(robot),
         "robot": without_run(robot.describe()),
         "partner": without_run(partner.describe()),
+        **({} if partner.recorded is None else {"recorded_sha256": partner.recorded.sha256}),
     }
     return json.loads(json.dumps(described))  # as it is read again: tuples are lists

@@ -107,7 +107,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
         **study_settings(arguments, protocol, scenarios),
     }
     digest = hashlib.sha256("".join(scenario.digest for scenario in scenarios).encode()).hexdigest()
-    # The rate is of each robot, and a device changes no result beyond rounding.
+    # The rate is of each robot. On another device the noise of a sampler can be another draw of the same distribution.
     shared = {
         name: value for name, value in settings.items() if name not in ("fps", "hold", "device", "told_otherwise")
     }
@@ -124,12 +124,12 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     refusal = f"{arguments.out}: expected a folder in which no other cross-play runs, found one running"
     with FolderLock(arguments.out / _LOCK, refusal):
         cells = _run(arguments, play, robots, partners)
-    floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-    result = matrix_result(task, settings, robots, partners, cells, floor_names)
-    result = {"study": "cross-play", "label": partners_label(named, task), **result}
-    if overlap:
-        result["overlap"] = overlap
-    return _write(arguments.out, result)
+        floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
+        result = matrix_result(task, settings, robots, partners, cells, floor_names)
+        result = {"study": "cross-play", "label": partners_label(named, task), **result}
+        if overlap:
+            result["overlap"] = overlap
+        return _write(arguments.out, result)
 
 
 def _task(arguments: argparse.Namespace) -> PairTask:

@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping
 from typing import Any
 
-from ..markdown_table import markdown_table
+from ..markdown_table import estimate_text, markdown_table
 from .cells import OWN_KIND
 from .measures import MEASURES, label
 from .score import FACTOR
@@ -26,7 +26,7 @@ def markdown(result: Mapping[str, Any]) -> str:
     ]
     if separation := scores.get("separation"):
         rows = [
-            [robot, floor, _estimate(difference, 100, 1), _ratio(difference["standard_errors"])]
+            [robot, floor, estimate_text(difference, 100, 1), _ratio(difference["standard_errors"])]
             for robot, floors in separation.items()
             for floor, difference in floors.items()
         ]
@@ -34,7 +34,7 @@ def markdown(result: Mapping[str, Any]) -> str:
     partners = list(result["partners"])
     if scores:
         rows = [
-            [robot, *(_estimate(score["by_partner"].get(partner), 100, 1) for partner in partners)]
+            [robot, *(estimate_text(score["by_partner"].get(partner), 100, 1) for partner in partners)]
             for robot, score in scores["robots"].items()
         ]
         text.append(f"**{SCORE_LABEL}**\n\n" + markdown_table(["robot", *partners], rows))
@@ -59,7 +59,9 @@ def _scores(result: Mapping[str, Any]) -> str:
         score, row = scores.get(robot), result["cells"][robot]
         first = "" if score is None or "first" not in score else f"{100 * score['first']:.0f} %"
         timely = "none" if score is None else f"{100 * score['in_time']:.1f}"
-        rows.append([robot, _estimate(score, 100, 1), first, timely, *(_over_partners(row, name) for name in shown)])
+        rows.append(
+            [robot, estimate_text(score, 100, 1), first, timely, *(_over_partners(row, name) for name in shown)]
+        )
     head = [
         "robot",
         "partner score, %",
@@ -78,15 +80,7 @@ def _over_partners(row: Mapping[str, Any], name: str) -> str:
 
 def _cell(cell: Mapping[str, Any] | None, name: str) -> str:
     measure = MEASURES[name]
-    return "none" if cell is None else _estimate(cell["measures"][name], measure.scale, measure.digits)
-
-
-def _estimate(value: Mapping[str, Any] | None, scale: float, digits: int) -> str:
-    if value is None:
-        return "none"
-    error = value["standard_error"]
-    mean = f"{scale * value['mean']:.{digits}f}"
-    return mean if error is None else f"{mean} ± {scale * error:.{digits}f}"
+    return "none" if cell is None else estimate_text(cell["measures"][name], measure.scale, measure.digits)
 
 
 def _ratio(value: float | None) -> str:

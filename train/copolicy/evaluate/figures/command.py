@@ -100,6 +100,7 @@ def _figures(arguments: argparse.Namespace) -> dict[str, Any]:
             for name, figure in figures.items()
         },
         "left_out": left_out,
+        **({} if arguments.map is None else {"map": arguments.map}),
         **_described_sources(task, sources),
     }
     saved = save_files(arguments.out, figures, json.dumps(document, allow_nan=False) + "\n")

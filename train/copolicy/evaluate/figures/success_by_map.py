@@ -17,8 +17,8 @@ from ..summary import success_rate
 from ..trajectory_sources import Source
 
 DEFINITION = (
-    "percent of the episodes on the map that succeeded; 95 % interval by Wilson, which takes the episodes of a map as "
-    "independent; maps by rising rate of all sources together, then by name"
+    "proportion of the episodes on the map that succeeded; 95 % interval by Wilson, which takes the episodes of a map "
+    "as independent; maps by rising rate of all sources together, then by name"
 )
 _ROWS = 30  # maps in a column of the figure
 _MANY = 20  # maps from which those without a failure share a row

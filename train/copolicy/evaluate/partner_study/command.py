@@ -9,7 +9,7 @@ from copolicy.dataset.command_line.commands import Commands, add_command, progre
 from copolicy.dataset.command_line.flag_numbers import LARGEST_SEED, add_whole_number
 from copolicy.dataset.command_line.maps_flag import add_maps_flag, map_set_name
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.files.staging import replace_json, require_new
+from copolicy.dataset.files.staging import require_new
 from copolicy.dataset.task import get_task
 
 from ..partners.names import PARTNERS_HELP, PROXY, parse_partners, partners_label
@@ -23,7 +23,7 @@ from ..study_flags import (
     study_settings,
 )
 from ..summary import not_measured, percent
-from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_file, write_trajectories
+from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_beside, write_result
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
 from .robots import HIDDEN_HELP, make_robot, scripted_robots, split_robot
 
@@ -78,8 +78,8 @@ def add_overlap_flag(command: argparse.ArgumentParser) -> None:
 
 
 def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
-    figure, trajectories = figure_beside(arguments.out), trajectories_file(arguments)
-    require_new(arguments.out, figure, *([trajectories] if trajectories else []), overwrite=arguments.overwrite)
+    figure, trajectories = figure_beside(arguments.out), trajectories_beside(arguments.out)
+    require_new(arguments.out, figure, trajectories, overwrite=arguments.overwrite)
     if arguments.partner_seed < 0:
         raise InvalidValueError("--partner-seed", "a whole number, not negative", arguments.partner_seed)
     path = split_robot(arguments.policy)[1]
@@ -163,10 +163,8 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     size = f"{len(scenarios)} starts, {episodes_per_robot} episodes per robot"
     title = f"simulated partners on {chosen.label}: {size}, no person"
     save_partner_figure(by_name, figure, title)
-    if trajectories:
-        named = ((robot.name, episode) for robot, episodes in pairs for episode in episodes)
-        write_trajectories(trajectories, task, result["label"], named)
-    replace_json(arguments.out, result, indent=1)
+    with_names = ((robot.name, episode) for robot, episodes in pairs for episode in episodes)
+    write_result(arguments.out, result, task, result["label"], with_names if arguments.trajectories else None)
     return {
         "label": "simulated partners, no person took part",
         "episodes_per_robot": episodes_per_robot,
@@ -176,7 +174,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
         },
         "result": str(arguments.out),
         "figure": str(figure),
-        **({"trajectories": str(trajectories)} if trajectories else {}),
+        **({"trajectories": str(trajectories)} if arguments.trajectories else {}),
         **not_measured(task, summaries[0]),
     }
 

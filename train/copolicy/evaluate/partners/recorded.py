@@ -1,5 +1,6 @@
 """Recorded episodes as partners: the human's actions from the recorded starts, without feedback."""
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -55,6 +56,13 @@ class RecordedStarts:
     def describe(self) -> dict[str, Any]:
         """The description in results."""
         return {"recordings": self.origin, "starts": len(self.scenarios), "source": list(self.sources)}
+
+    @property
+    def sha256(self) -> str:
+        """sha256 of the starts and actions."""
+        parts = [scenario.digest.encode() for scenario in self.scenarios]
+        parts += [values.tobytes() for values in (*self.states, *self.actions)]
+        return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def read_recorded_starts(folder: Path | str, task: PairTask, settings: Any, count: int) -> RecordedStarts:

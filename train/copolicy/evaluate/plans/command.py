@@ -77,14 +77,14 @@ def _plans(arguments: argparse.Namespace) -> dict[str, Any]:
     branch_points = [
         sample_chunks(
             policy,
-            scenarios[index],
+            scenario,
             protocol.settings,
             samples=arguments.samples,
             seconds=arguments.seconds,
             fps=protocol.fps,
             seed=arguments.seed,
         )
-        for index in arguments.map
+        for scenario in {scenarios[index].digest: scenarios[index] for index in arguments.map}.values()  # each once
     ]
     names = [task.identify(branch_point.scenario)[0] for branch_point in branch_points]
     seconds = (len(branch_points[0].approach) - 1) / task.spec.record_hz

@@ -15,7 +15,7 @@ from copolicy.dataset.files.staging import replace_json, replace_text
 from copolicy.dataset.scenarios import base_name
 
 from ..comparison.paired import BOOTSTRAP, between_runs, clustered_mean
-from ..markdown_table import markdown_table
+from ..markdown_table import estimate_text, markdown_table
 from .determinants import digest
 from .plan import COPLANNING, NAME, PLAN_FILE, RECORDED, TABLES
 
@@ -222,7 +222,7 @@ def markdown(table: Mapping[str, Any]) -> str:
                 group["method"],
                 str(group["seeds"]),
                 str(group["episodes"]),
-                *(_estimate(group[measure], *MEASURES[measure][1:]) for measure in shown),
+                *(estimate_text(group[measure], *MEASURES[measure][1:]) for measure in shown),
                 "none" if group["planning_ms"] is None else f"{group['planning_ms']['mean']:.2f}",
             ]
             for group in members
@@ -237,10 +237,3 @@ def markdown(table: Mapping[str, Any]) -> str:
         text += ["## Robots and partners that learned from a common pair", "\n".join(lines)]
     text += ["## Definitions", "\n".join(f"- {name}: {note}." for name, note in table["definitions"].items())]
     return "\n\n".join(text) + "\n"
-
-
-def _estimate(value: Mapping[str, Any] | None, scale: float, digits: int) -> str:
-    if value is None:
-        return "none"
-    mean, error = f"{scale * value['mean']:.{digits}f}", value["standard_error"]
-    return mean if error is None else f"{mean} ± {scale * error:.{digits}f}"

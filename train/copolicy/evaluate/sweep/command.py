@@ -15,6 +15,7 @@ from ..partner_study.command import add_overlap_flag
 from ..partner_study.configurations import DEFAULT_STARTS
 from ..partners.names import PARTNERS_HELP
 from ..study_flags import add_protocol_flags
+from ..trajectories import add_trajectories_flag
 from .plan import LOCK_FILE, TABLES, SweepPlan, require_own_folder
 
 _EXAMPLE = (
@@ -59,6 +60,7 @@ def add_sweep_command(commands: Commands) -> None:
     command.add_argument(
         "--collect", action="store_true", help="only make the table of what is finished, as after SLURM jobs"
     )
+    add_trajectories_flag(command, "beside the result of each task; a finished task without them is run again")
     add_overlap_flag(command)
     command.add_argument("--orientations", action="store_true", help="co-planning: each map with four orientations")
     add_whole_number(command, "--limit", "co-planning: use only the first N maps; recorded in the results")

@@ -10,6 +10,7 @@ from typing import Any
 
 from copolicy.dataset.scenarios import ScenarioSet
 from copolicy.dataset.task import PairTask
+from copolicy.train.processor_files import processors_sha256
 
 from ..coplanning_table.training_runs import TrainingRun
 from ..partner_study.configurations import study_configurations
@@ -26,6 +27,7 @@ class StudyFlags:
         partner_n_action_steps: the same with partners.
         limit: number of maps of co-planning; all if None.
         configurations: number of starts with partners, see `study_configurations`.
+        device: of the policies; its kind is one of the settings, its number not.
         threads: of a task; the last digits of a policy's sums depend on them.
         overrides: settings of the policy that flags override.
     """
@@ -61,7 +63,7 @@ def determined_by(
     described = {
         "study": "coplan" if partner is None else "partner",
         "weights_sha256": run.weights,
-        "processors_sha256": _processors(run.checkpoint),
+        "processors_sha256": processors_sha256(run.checkpoint),
         "policy": run.policy_settings,
         "overrides": dict(flags.overrides),
         "n_action_steps": flags.n_action_steps or "8, or all of a shorter chunk",
@@ -74,6 +76,7 @@ def determined_by(
         "repeats": flags.repeats,
         "seed": flags.seed,
         "threads": flags.threads,
+        "device": flags.device.partition(":")[0],  # a sampler may draw its noise on the device
     }
     if partner is not None:
         described |= {
@@ -105,24 +108,12 @@ def _partner_identity(partner: PartnerName, protocol: Protocol, starts: int) -> 
 
     if partner.kind == PROXY:
         proxy = TrainingRun.read(Path(partner.detail))
-        files = {"weights_sha256": proxy.weights, "processors_sha256": _processors(proxy.checkpoint)}
+        files = {"weights_sha256": proxy.weights, "processors_sha256": processors_sha256(proxy.checkpoint)}
         return {**partner.to_json(), **files, "policy": proxy.policy_settings, "fps": proxy.conditions.fps}
     if partner.kind == REPLAY:
         recorded = read_recorded_starts(partner.detail, protocol.task, protocol.settings, starts)
-        parts = [*(scenario.digest.encode() for scenario in recorded.scenarios)]
-        parts += [values.tobytes() for values in (*recorded.states, *recorded.actions)]
-        return {
-            **partner.to_json(),
-            **recorded.describe(),
-            "recorded_sha256": hashlib.sha256(b"".join(parts)).hexdigest(),
-        }
+        return {**partner.to_json(), **recorded.describe(), "recorded_sha256": recorded.sha256}
     return dict(make_partner(partner, protocol.task).describe())
-
-
-def _processors(checkpoint: Path) -> str:
-    """sha256 of the files of a policy's processors: their steps and statistics."""
-    files = sorted(path for path in checkpoint.glob("policy_*processor*") if path.is_file())
-    return _sha256("".join(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n" for path in files))
 
 
 def _sha256(text: str) -> str:

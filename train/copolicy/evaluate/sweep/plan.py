@@ -16,6 +16,7 @@ from ..file_names import file_name
 from ..partners.names import PartnerName
 from ..stored_settings import require_same_settings
 from ..study_flags import Protocol
+from ..trajectories import trajectories_beside
 from .determinants import StudyFlags, digest
 
 COPLANNING = "co-planning"
@@ -88,6 +89,7 @@ class SweepPlan:
         contradictions: see `Protocol`.
         map_sets: by label.
         overlap: see `check_overlap`.
+        trajectories: also store those of each task; a task without them is run again.
     """
 
     out: Path
@@ -98,6 +100,7 @@ class SweepPlan:
     map_sets: Mapping[str, ScenarioSet]
     tasks: tuple[SweepTask, ...]
     overlap: Mapping[str, Any]
+    trajectories: bool = False
 
     @property
     def logs(self) -> Path:
@@ -114,8 +117,11 @@ class SweepPlan:
         return Protocol(get_task(self.task), task.fps, self.world, self.contradictions)
 
     def is_finished(self, task: SweepTask) -> bool:
-        """Whether the result of a task exists and has its settings."""
-        return task.file.exists() and _stored(task.file) == task.determined_by
+        """Whether the result of a task exists and has its settings, and its trajectories exist if they are stored."""
+        return task.file.exists() and _stored(task.file) == task.determined_by and self._has_trajectories(task)
+
+    def _has_trajectories(self, task: SweepTask) -> bool:
+        return not self.trajectories or trajectories_beside(task.file).exists()
 
     def finished(self) -> int:
         """Number of finished tasks."""
@@ -141,12 +147,14 @@ class SweepPlan:
                 continue
             stored = _stored(task.file)
             if stored == task.determined_by:
-                finished.add(f"{rank:05d}")
+                if self._has_trajectories(task):
+                    finished.add(f"{rank:05d}")
             elif overwrite:
                 outdated.append(task.file)
             else:
                 require_same_settings(task.file, stored, task.determined_by)
         for path in outdated:
+            trajectories_beside(path).unlink(missing_ok=True)
             path.unlink()
         entries = [
             {**task.key, "seed": task.seed, "file": task.file.relative_to(self.out).as_posix(),

@@ -19,7 +19,7 @@ from ..partners.names import PROXY, REPLAY, PartnerName, parse_partners
 from ..partners.overlap import check_overlap
 from ..study_flags import Protocol, study_protocol
 from .determinants import StudyFlags, determined_by
-from .plan import RECORDED, SweepPlan, SweepTask, partner_label, task_file
+from .plan import COPLANNING, RECORDED, SweepPlan, SweepTask, partner_label, task_file
 
 DEFAULT_MAPS = ("holdout", "unseen")
 
@@ -29,7 +29,8 @@ def make_plan(arguments: argparse.Namespace) -> SweepPlan:
 
     Raises:
         FileFormatError: a folder has no runs, or runs that are not of one method; a file of a partner cannot be used.
-        InvalidValueError: two sets or methods of one name, shared pairs of robots and proxies, or other wrong flags.
+        InvalidValueError: two sets or methods of one name, a partner of the name of co-planning, shared pairs of robots
+            and proxies, or other wrong flags.
         UnknownNameError: no such map set or kind of partner.
     """
     methods = read_trained_methods(arguments.runs)
@@ -42,6 +43,8 @@ def make_plan(arguments: argparse.Namespace) -> SweepPlan:
         [_with_absolute_path(each) for each in parse_partners(arguments.partners, task)] if arguments.partners else []
     )
     studies: list[PartnerName | None] = [*([] if arguments.no_coplanning else [None]), *partners]
+    if any(partner.name == COPLANNING for partner in partners):
+        raise InvalidValueError("--partners", f"partners of other names than {COPLANNING}", COPLANNING)
     if not studies:
         raise InvalidValueError("--no-coplanning", "--partners beside it", "none")
     protocol = _protocol(arguments, methods, partners)
@@ -59,7 +62,7 @@ def make_plan(arguments: argparse.Namespace) -> SweepPlan:
     ]
     return SweepPlan(
         out, protocol.task.spec.name, protocol.settings, protocol.contradictions, flags,
-        {chosen.label: chosen for chosen in map_sets}, tuple(tasks), overlap,
+        {chosen.label: chosen for chosen in map_sets}, tuple(tasks), overlap, arguments.trajectories,
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Runs the study of one task of a sweep, and writes its result."""
 
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
@@ -11,8 +11,8 @@ from typing import Any
 import torch
 
 from copolicy.dataset.exceptions import RunError
-from copolicy.dataset.files.staging import replace_json
 
+from ..coplan.rollouts import EpisodeResult
 from ..coplan.study import coplan_result, coplan_settings
 from ..coplanning_table.training_runs import TrainingRun
 from ..partner_study.robots import policy_robot
@@ -24,14 +24,18 @@ from ..partners.partner import make_partner
 from ..stored_settings import without_run
 from ..study_flags import POLICY_SETTINGS, study_policy, study_settings
 from ..summary import not_measured
+from ..trajectories import write_result
 from .determinants import determined_by, digest, starts_of
 from .plan import SweepPlan, SweepTask
+
+_Study = tuple[dict[str, Any], Sequence[EpisodeResult]]  # its result, and its episodes
 
 
 def run_task(plan: SweepPlan, rank: int) -> None:
     """Runs a task unless it is finished; first removes a partial file of a killed process.
 
-    The result appears complete, in one rename, or not at all. All but wall times depends on `determined_by` alone.
+    The result appears complete, in one rename, or not at all, and after its trajectories, if the plan stores them. All
+    but wall times depends on `determined_by` alone.
 
     Raises:
         RunError: the policy or the partner is not that of the plan any more.
@@ -39,11 +43,12 @@ def run_task(plan: SweepPlan, rank: int) -> None:
     task = plan.tasks[rank]
     if plan.is_finished(task):
         return
-    for partial in task.file.parent.glob(f".{task.file.name}.*.partial"):
+    for partial in task.file.parent.glob(f".{task.file.stem}.*.partial"):
         partial.unlink(missing_ok=True)
     started = perf_counter()
     with _threads(plan.flags.threads):
-        result = _coplanning(plan, task) if task.partner is None else _with_partner(plan, task, task.partner)
+        study = _coplanning(plan, task) if task.partner is None else _with_partner(plan, task, task.partner)
+    result, episodes = study
     _require_unchanged(plan, task)
     result["policy"]["checkpoint"] = task.source  # not relative to the folder of a worker
     sweep = {
@@ -54,19 +59,21 @@ def run_task(plan: SweepPlan, rank: int) -> None:
         "episodes_sha256": digest([task.determined_by, result["episodes"]]),
         "determined_by": task.determined_by,
     }
-    replace_json(task.file, {**result, "sweep": sweep}, indent=1)
+    named = ((task.robot, episode) for episode in episodes)
+    world, label = plan.protocol(task).task, result["label"]
+    write_result(task.file, {**result, "sweep": sweep}, world, label, named if plan.trajectories else None)
 
 
-def _coplanning(plan: SweepPlan, task: SweepTask) -> dict[str, Any]:
+def _coplanning(plan: SweepPlan, task: SweepTask) -> _Study:
     protocol, flags = plan.protocol(task), _arguments(plan, plan.flags.n_action_steps, 8)
     policy = study_policy(task.checkpoint, flags)
     chosen = plan.map_sets[task.maps]
     chosen = protocol.task.turned(chosen) if plan.flags.orientations else chosen
     settings = coplan_settings(flags, protocol, chosen)
-    return coplan_result(policy, protocol, chosen.scenarios[: plan.flags.limit], settings)[0]
+    return coplan_result(policy, protocol, chosen.scenarios[: plan.flags.limit], settings)
 
 
-def _with_partner(plan: SweepPlan, task: SweepTask, named: PartnerName) -> dict[str, Any]:
+def _with_partner(plan: SweepPlan, task: SweepTask, named: PartnerName) -> _Study:
     protocol, flags = plan.protocol(task), _arguments(plan, plan.flags.partner_n_action_steps, 1)
     policy = study_policy(task.checkpoint, flags)
     chosen = _map_set(plan, task)
@@ -87,7 +94,7 @@ def _with_partner(plan: SweepPlan, task: SweepTask, named: PartnerName) -> dict[
     )
     summary = summarise_with_partners(episodes, policy)
     settings = partner_settings(chosen, len(scenarios), [partner], plan.flags.partner_seed, plan.flags.repeats)
-    return {
+    result = {
         "study": "partner",
         "label": partners_label([named], protocol.task),
         "name": task.method,
@@ -104,6 +111,7 @@ def _with_partner(plan: SweepPlan, task: SweepTask, named: PartnerName) -> dict[
         "definitions": definitions(protocol.task, summary),
         "episodes": [episode.to_json() for episode in episodes],
     }
+    return result, episodes
 
 
 def _overlap(plan: SweepPlan, task: SweepTask) -> dict[str, Any]:
