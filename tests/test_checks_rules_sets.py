@@ -124,7 +124,7 @@ def test_balance_of_maps(sound):
     assert [f.severity for f in find(episodes_of(sound, names, ["a"] * len(names)), "balance")] == ["info"]
 
 
-@pytest.mark.parametrize("recorded", ["training", "paper36", "varied"])
+@pytest.mark.parametrize("recorded", ["training", "paper36", "paper36-orders", "varied"])
 def test_every_set_is_balanced_by_its_own_shares(sound, recorded):
     """Maps of several sets carry the names of one; each is held against the set that was recorded."""
     named = [identify(config) for config in map_set(recorded)] * 10

@@ -16,6 +16,7 @@ from copolicy.tasks.table.maps import MAP_SETS, identify
 from copolicy.tasks.table.world import TableWorld
 
 FIXED = {"maps": "training", "seed": 0}
+_MAP_SETS = "holdout, paper36, paper36-orders, training, unseen, varied"
 _AN_ID = "letters, digits, '.', '_' or '-' (an id, no name of a person)"
 
 
@@ -192,7 +193,7 @@ def test_a_discarded_configuration_comes_back_after_the_others():
         ({"pair": "Ann & Bob"}, f"pair: expected {_AN_ID}, found 'Ann & Bob'"),
         ({"consents": ("", "a b")}, f"consent-1: expected {_AN_ID}, found 'a b'"),
         ({"episodes": 0}, "episodes: expected at least 1, found 0"),
-        ({"maps": "mine"}, "unknown map set 'mine'; available: holdout, paper36, training, unseen, varied"),
+        ({"maps": "mine"}, f"unknown map set 'mine'; available: {_MAP_SETS}"),
         ({"window": (10, 10)}, "window: expected WxH of at least 320x320, found '10x10'"),
     ],
 )

@@ -35,6 +35,8 @@ class Point:
     success: float
 
 
+_ORDERS = "pairs-sim-376-orders"
+"""Data of rows that read the obstacles as a list; the scan sees no order. See train/docs/results.md."""
 _PAPER_INPUTS = {"observation_features": "absolute", "mirror": False, "permute_obstacles": False}
 _PAPER_SETTINGS = {
     **_PAPER_INPUTS, "prediction_type": "epsilon", "sampler": "ddpm", "num_inference_steps": 100,
@@ -56,29 +58,39 @@ _BC_RATE = (
 )  # fmt: skip
 
 
+def _recipe(preset: str) -> str:
+    return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
+
+
 def _bc(preset: str, fps: int) -> Row:
     """robomimic's batch; `_BC_RATE` on a short budget."""
-    return Row(_BC_RATE, preset=preset, policy="bc_lstm_gmm", fps=fps, steps=6_000, batch=100, bf16=False)
+    settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": 6_000, "batch": 100}
+    return Row(_BC_RATE, preset, _recipe(preset), bf16=False, **settings)
 
 
 def _vrnn(preset: str) -> Row:
-    return Row(preset=preset, policy="vrnn", fps=_RIVALS_HZ, steps=10_000, batch=64, bf16=False)
+    return Row((), preset, _recipe(preset), 10_000, 64, policy="vrnn", fps=_RIVALS_HZ, bf16=False)
 
 
 def _cogail(preset: str) -> Row:
     """Its own command: a step is a frame in the world."""
-    return Row(preset=preset, policy="cogail", command="cogail", fps=_RIVALS_HZ, steps=6_000_000, batch=1, bf16=False)
+    settings = {"policy": "cogail", "command": "cogail", "fps": _RIVALS_HZ}
+    return Row((), preset, _recipe(preset), 6_000_000, 1, bf16=False, **settings)
 
 
 def _cnn(preset: str, steps: int = 5_000) -> Row:
-    return Row(preset=preset, steps=steps, batch=256, bf16=False)
+    return Row((), preset, _recipe(preset), steps, 256, bf16=False)
+
+
+def _lerobot(policy: str, *flags: str) -> Row:
+    return Row(flags, "", _ORDERS, 1_600, 64, policy=policy, bf16=False)
 
 
 ROWS: Mapping[str, Row] = {
     "codp-h": Row(),
     "codp": Row(policy_flags(past_human_action=False)),
-    "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS)),
-    "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), steps=20_000),
+    "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
+    "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
@@ -94,12 +106,10 @@ ROWS: Mapping[str, Row] = {
     "cogail": _cogail("paper"),
     "cogail-corrected": _cogail("corrected"),
     "cogail-scan": _cogail("scan"),
-    "diffusion": Row(_DIFFUSION, preset="", policy="diffusion", steps=1_600, batch=64, bf16=False),
-    "diffusion-scaled": Row((*_DIFFUSION, _SCALED), preset="", policy="diffusion", steps=1_600, batch=64, bf16=False),
-    "act": Row(_ACT, preset="", policy="act", steps=1_600, batch=64, bf16=False),
-    "act-scaled": Row(
-        (*_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")), "", "pairs-sim-376", 1_600, 64, (), "act", bf16=False
-    ),
+    "diffusion": _lerobot("diffusion", *_DIFFUSION),
+    "diffusion-scaled": _lerobot("diffusion", *_DIFFUSION, _SCALED),
+    "act": _lerobot("act", *_ACT),
+    "act-scaled": _lerobot("act", *_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")),
 }
 """The methods, each with its budget on a CPU."""
 
@@ -113,7 +123,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1, help="trainings at the same time, one thread each")
     parser.add_argument("--checkpoints", type=int, default=6, help="points of a curve (default: 6)")
     parser.add_argument("--scale", type=float, default=1.0, help="factor of every budget")
-    parser.add_argument("--data", nargs="+", default=[], metavar="HZ=FOLDER", help="data sets that exist already")
+    parser.add_argument("--data", type=Path, help="folder for data sets and recordings (default: OUT/data)")
     parser.add_argument("--limit", type=int, help="only the first N maps, also in the table; to try the script")
     parser.add_argument("--list", action="store_true", help="print the rows and their budgets")
     arguments = parser.parse_args()
@@ -132,10 +142,12 @@ def main() -> None:
 
 def budgets(rows: Mapping[str, Row]) -> str:
     """The rows as a Markdown table."""
-    lines = ["| row | policy, preset | Hz | steps | batch | flags |", "|---|---|---:|---:|---:|---|"]
+    lines = ["| row | policy, preset | data | Hz | steps | batch | flags |", "|---|---|---|---:|---:|---:|---|"]
     for name, row in rows.items():
         policy = ", ".join(filter(None, (row.policy, row.preset)))
-        lines.append(f"| {name} | {policy} | {row.fps} | {row.steps:,} | {row.batch} | `{' '.join(row.flags)}` |")
+        lines.append(
+            f"| {name} | {policy} | {row.recipe} | {row.fps} | {row.steps:,} | {row.batch} | `{' '.join(row.flags)}` |"
+        )
     return "\n".join(lines)
 
 
@@ -146,12 +158,10 @@ class Study:
         self.out: Path = arguments.out
         self._checkpoints, self._scale = arguments.checkpoints, arguments.scale
         self._limit = () if arguments.limit is None else ("--limit", str(arguments.limit))
-        given = dict(text.split("=", 1) for text in arguments.data)
-        rates = {row.fps: row.recipe for row in (ROWS[name] for name in arguments.rows)}
         # Made before the workers begin, which would make them twice.
         self._data = {
-            fps: Path(given[str(fps)]) if str(fps) in given else data_set(self.out, recipe, fps)
-            for fps, recipe in rates.items()
+            (row.recipe, row.fps): data_set(arguments.data or self.out / "data", row.recipe, row.fps)
+            for row in (ROWS[name] for name in arguments.rows)
         }
 
     def row(self, name: str) -> Row:
@@ -161,7 +171,7 @@ class Study:
     def train_and_follow(self, name: str, seed: int) -> str:
         """Trains a row with one seed and evaluates its checkpoints on the maps of the demonstrations."""
         row, folder = self.row(name), self.out / "runs" / name / f"seed_{seed}"
-        run = train(row, self._data[row.fps], folder, seed, checkpoints=self._checkpoints)
+        run = train(row, self._data[row.recipe, row.fps], folder, seed, checkpoints=self._checkpoints)
         for checkpoint in sorted(run.glob("checkpoints/[0-9]*")):
             result = self._curve_folder(name, seed) / f"{checkpoint.name}.json"
             evaluate(checkpoint / "pretrained_model", CURVE_MAPS, result, (*row.evaluation, *self._limit))

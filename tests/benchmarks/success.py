@@ -79,7 +79,7 @@ def main() -> None:
 def run(out: Path, name: str, seed: int, device: str) -> None:
     """Trains and evaluates one row with one seed, as far as it is not done."""
     row, folder = ROWS[name], out / name / f"seed_{seed}"
-    training = train(row, data_set(out, row.recipe, row.fps), folder, seed, device)
+    training = train(row, data_set(out / "data", row.recipe, row.fps), folder, seed, device)
     for maps in MAPS:
         evaluate(training, maps, folder / f"{maps}.json", row.evaluation, device)
     print(name, seed, *(f"{maps} {_successes(folder / f'{maps}.json').mean():.3f}" for maps in MAPS), flush=True)

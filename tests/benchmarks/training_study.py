@@ -142,12 +142,12 @@ def evaluate(policy: Path, maps: str, result: Path, flags: Sequence[str] = (), d
     return json.loads(result.read_text(encoding="utf-8"))
 
 
-def data_set(out: Path, recipe: str, fps: int = 10) -> Path:
-    """The data set of a recipe at a rate, made in `out` unless it is there."""
+def data_set(folder: Path, recipe: str, fps: int = 10) -> Path:
+    """The data set of a recipe at a rate, made in the folder unless it is there."""
     name = recipe if fps == 10 else f"{recipe}-{fps}hz"
-    dataset, recordings = out / "data" / name, out / "data" / f"{recipe}-recordings"
+    dataset, recordings = folder / name, folder / f"{recipe}-recordings"
     if not dataset.exists():
-        log = out / "data" / f"{name}.log"
+        log = folder / f"{name}.log"
         if not recordings.exists():
             run_command("copolicy-collect", "simulate", "--recipe", recipe, "--out", str(recordings), log=log)
         run_command(

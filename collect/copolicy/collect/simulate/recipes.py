@@ -18,6 +18,8 @@ class Recipe:
 RECIPES: dict[str, Recipe] = {
     # The size of the paper's training set: five pairs on its 36 configurations, with the clearance of people.
     "pairs-sim-376": Recipe(376, seed=0),
+    # The same with the obstacles in every order, as the original program records them, for policies that read a list.
+    "pairs-sim-376-orders": Recipe(376, seed=0, map_set="paper36-orders"),
     # The same with four start orientations.
     "pairs-sim-376-orientations": Recipe(376, seed=0, orientations=True),
     # The same with displaced starts and a wider clearance than people's.

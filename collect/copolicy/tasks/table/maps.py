@@ -9,7 +9,7 @@ import math
 import random
 import re
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Any
 
 from copolicy.dataset.exceptions import UnknownNameError
@@ -86,6 +86,14 @@ MAP_SETS: dict[str, tuple[MapConfig, ...]] = {
         for s, g in _START_GOALS
         for size in (1, 2, 3)
         for subset in (*combinations(range(3), size),) * (3 if size == 3 else 1)
+    ),
+    # The same with every order of the obstacles, as the recording program draws the order too: six entries for each
+    # configuration. A policy that reads the obstacles as a list learns from these alone that their order says nothing.
+    "paper36-orders": tuple(
+        _map(s, g, _family(order), 50)
+        for s, g in _START_GOALS
+        for size in (1, 2, 3)
+        for order in (*permutations(range(3), size),) * (2 if size == 1 else 1)
     ),
     "holdout": tuple(_map(*_START_GOALS[i // 7], _family(draw), 45) for i, draw in enumerate(_HOLDOUT)),
     "unseen": tuple(_map(s, g, layout, 45) for s, g in _START_GOALS for layout in _UNSEEN),
