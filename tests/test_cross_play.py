@@ -68,6 +68,8 @@ def test_times_relate_to_the_own_kind_on_the_same_start():
     assert measured["time_s"] == {"mean": 30.0, "standard_error": 0.0, "n": 2}
     assert measured["success"] == {"mean": 2 / 3, "standard_error": pytest.approx((2 / 27) ** 0.5), "n": 3}
     assert measured["interaction_force"] is measured["relative_force"] is None
+    spread = summary([row("a", 20.0), row("a", 40.0)], times)["time_s"]
+    assert spread == {"mean": 30.0, "standard_error": pytest.approx(10.0), "n": 2}
     own = own_kind_of_start([{**row("a", 10.0), "interaction_mean": 0.2}])
     found = summary([{**row("a", 20.0, False), "interaction_mean": 0.5}], own)["relative_force"]
     assert found == {"mean": 2.5, "standard_error": None, "n": 1}

@@ -113,11 +113,16 @@ def summary(rows: Sequence[Row], own: Callable[[Row], OwnKind | None]) -> dict[s
 
 
 def mean_and_error(values: Sequence[float]) -> dict[str, Any] | None:
-    """Mean, standard error of the mean (None for one value) and number of values; None without values."""
+    """Mean, standard error of the mean (None for one value) and number of values; None without values.
+
+    Of zeros and ones the error is that of a proportion, sqrt(p (1 - p) / n), as in all results; else it is the sample
+    standard deviation (divisor n - 1) over sqrt(n).
+    """
     if not values:
         return None
     n = len(values)
-    error = float(np.std(values) / math.sqrt(n)) if n > 1 else None
+    lost = 0 if set(values) <= {0.0, 1.0} else 1
+    error = float(np.std(values, ddof=lost) / math.sqrt(n)) if n > 1 else None
     return {"mean": float(np.mean(values)), "standard_error": error, "n": n}
 
 
