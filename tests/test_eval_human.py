@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from play_session import settings
 from untrained_policy import save_untrained_policy, untrained_robots
 
+from copolicy.collect.play.result import ResultPhase
+from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.questionnaire import read_questionnaire
 from copolicy.collect.session import EpisodeCounts, iter_recordings
@@ -199,7 +202,7 @@ class _Robot:
     name = ""
 
     def __init__(self):
-        self.latencies, self.chosen = [1.0], []
+        self.chosen = []
 
     def choose(self, robot):
         self.chosen.append(robot)
@@ -216,7 +219,7 @@ def test_practice_is_on_other_starts_in_both_set_ups_with_the_robots_in_turn():
     assert not {starts.index(scenario) for scenario in practised} & own
     assert [task.studies.front(scenario) for scenario in practised] == [*task.studies.fronts] * 2
     assert robot.chosen == list(plan.blocks_of("P02").values()) * 2
-    assert (robot.name, robot.latencies) == (f"study:{plan.plan_id}:P02:practice", [])
+    assert robot.name == f"study:{plan.plan_id}:P02:practice"
     assert json.loads(schedule.planned)["front"] == "robot_front"
     counts = EpisodeCounts()
     scenario, seats = schedule.next(counts)
@@ -228,6 +231,38 @@ def test_practice_is_on_other_starts_in_both_set_ups_with_the_robots_in_turn():
     # Where every start is the person's own, practice is on these.
     alone = make_plan(ROBOTS, "unseen", starts, 1, 24, 0, task.studies.fronts)
     assert StudySchedule(alone, "P01", robot, robot).practice(0) in starts
+
+
+def test_undo_and_redo_leave_one_recording_of_each_trial(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 0)
+    codes = [trial.code for trial in plan.trials_of("P01")]
+    robot: Any = _Robot()
+    players = (PlayerSpec("scripted", "S01"), PlayerSpec("scripted", "S02"))
+    with prepared(settings(tmp_path, players=players, headless=True, window=None)) as application:
+        game = application.game
+        game.schedule = StudySchedule(plan, "P01", robot, robot)
+
+        def play() -> str:
+            trial = game.next_trial()
+            trial.begin({})
+            while not trial.outcome.done:
+                trial.step(game.ticker.tick())
+            return json.loads(trial.planned)["trial"]
+
+        assert play() == codes[0]
+        game.close_trial("keep")
+        assert play() == codes[1]
+        game.close_trial("redo")
+        game.undo()  # of the first trial, before the second is repeated
+        assert play() == codes[0]
+        game.close_trial("keep")
+        assert play() == codes[1]
+        # An undo of the first trial now, with the second kept after it, would leave two of the second and none of it.
+        assert "undo" not in [value for _, value in ResultPhase(game).top.items]
+        game.close_trial("keep")
+        assert play() == codes[2]
+        game.close_trial("keep")
+        assert game.kept == 3
 
 
 def test_only_the_chosen_robot_plans():
@@ -313,6 +348,14 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     kept = [one for one in iter_recordings(out) if one.counts]
     assert read_episode(kept[-1].path).meta.controller_0 == codes[-1]
     assert len(kept) == 4
+
+    # A finished session is not begun again by mistake: its trials would be recorded twice.
+    assert main(["human", "run", str(study / "plan.json"), *flags]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"copolicy-eval: {out / 'P01-01'}: expected a session of P01 with episodes to play, or --new-session, found all "
+        "4 episodes kept"
+    )
+    assert sorted(folder.name for folder in out.iterdir() if folder.is_dir()) == ["P01-01"]
 
 
 def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsys):

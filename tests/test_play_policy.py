@@ -179,6 +179,10 @@ def test_a_slow_plan_lets_go_and_is_taken_up_where_it_is_due(agent, counter):
     assert _run(agent, world, 1).tolist() == [[0.0, 0.0]]
     assert len(agent.latencies) == 2
     assert agent.latencies[1] > 0
+    begin(agent)
+    agent.wait(10)
+    _run(agent, TableWorld(MAP), 1)
+    assert len(agent.latencies) == 1  # of this episode only
 
 
 def test_the_age_of_a_plan_is_recorded(agent):

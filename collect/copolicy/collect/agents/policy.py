@@ -75,7 +75,7 @@ class PolicyAgent(Agent):
 
     Attributes:
         task: of the worlds.
-        latencies: inference time of each chunk, s.
+        latencies: inference time of each chunk since the episodes began, s.
         chunks: `(worlds,)` number of chunks of each world.
     """
 
@@ -117,6 +117,7 @@ class PolicyAgent(Agent):
         if self._pending is not None:
             self._pending.cancel()
         self._pending, self._chunk = None, None
+        self.latencies = []
         # The policy may have been replaced since the last episode, so its rate is read here.
         self._seat, spec = seat, self.task.spec
         self._rate = self._fps or self._policy.fps

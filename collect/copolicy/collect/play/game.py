@@ -170,7 +170,9 @@ class Game:
         else:
             trial.interrupt("operator_discard", reason)
         self._count_trial(trial, verdict, reason)
-        self._redo = (trial.scenario, trial.seating ^ self.swapped) if verdict == "redo" else None
+        # A fixed order leads to the same episode again, and after an undo to the one before.
+        again = verdict == "redo" and not self.schedule.in_order
+        self._redo = (trial.scenario, trial.seating ^ self.swapped) if again else None
 
     def end_trial(self, reason: str) -> None:
         """Completes the recording of the current episode when the session ends; keeps it if it has an outcome.
