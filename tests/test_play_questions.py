@@ -251,10 +251,9 @@ def test_a_sheet_leads_through_its_pages_and_an_answer_that_was_not_written_stay
     )  # fmt: skip
     sheet.select(-1)  # back over the edge of the page
     assert (sheet.page, sheet.item) == (1, form.items[11])
-    with pytest.raises(OSError, match="full"):
-        for name, _, _ in sheet.changed():
-            if name == names[8]:
-                raise OSError("full")
+    for name, _, _ in sheet.changed():
+        if name == names[8]:
+            break  # the disk is full
     assert [name for name, _, _ in sheet.changed()] == names[8:12]
 
 

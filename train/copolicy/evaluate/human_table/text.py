@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..markdown_table import markdown_table
+from .tables import MEASURES
 
 _P_SMALLEST = 1e-4
 _NAMES = {"time_s": "simulated time", "interaction_mean": "interaction force"}
@@ -107,10 +108,11 @@ def _published_spread(paper: Mapping[str, Any]) -> list[str]:
 
 def _questionnaires(rows: Sequence[Mapping[str, Any]]) -> str:
     robots = list(rows[0]["robots"])
+    scored = {_form(row) for row in rows if row["kind"] == "score"}
     lines = []
     for row in rows:
-        if row["kind"] == "item" and any(other["kind"] == "score" for other in rows):
-            continue  # items are in the CSV and the JSON
+        if row["kind"] == "item" and _form(row) in scored:
+            continue  # its items are in the CSV and the JSON
         scale = "" if row["scale"] is None else f" ({row['scale'][0]:g} to {row['scale'][1]:g})"
         alpha = row.get("alpha")
         test = row["test"]
@@ -123,6 +125,11 @@ def _questionnaires(rows: Sequence[Mapping[str, Any]]) -> str:
             ]
         )
     return markdown_table(["question, mean ± SE", *robots, "Cronbach's alpha", "differences"], lines)
+
+
+def _form(row: Mapping[str, Any]) -> str:
+    """The name of a question's questionnaire."""
+    return row["question"].partition(".")[0]
 
 
 def _tests(tests: Mapping[str, Any]) -> str:
@@ -163,7 +170,7 @@ def csv_text(table: Mapping[str, Any]) -> str:
     label = table["source"] if table["source"] == "human" else "simulated, no person took part"
     for name, rows in (("robots", table["robots"]), ("fronts", table["fronts"])):
         for row in rows:
-            for measure in ("success", "time_s", "wall_time_s", "interaction_mean", "planning_ms"):
+            for measure in MEASURES:
                 paper = row["published"]
                 values = {
                     "table": name, "label": label, "robot": row["robot"], "front": row.get("front", ""),
