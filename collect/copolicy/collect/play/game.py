@@ -212,10 +212,10 @@ class Game:
         self.show_message(f"undone: {undone.path.name}; {repeated}" if undone else "nothing to undo")
 
     def storage_error(self) -> RunError:
-        """Returns the error for a recording that could not be written."""
+        """Returns the error for a recording or an answer that could not be written."""
         return RunError(
-            f"{self.folder.path}: expected space for a recording, found: {self.problem}; "
-            "finished episodes are complete, this one is kept as .part"
+            f"{self.folder.path}: expected space for recordings and answers, found: {self.problem}; "
+            "finished episodes and saved answers are complete, an unfinished episode is kept as .part"
         )
 
     def _count_trial(self, trial: Trial, verdict: str, reason: str) -> None:
