@@ -147,8 +147,7 @@ def _report(summary: dict) -> dict[str, Any]:
 
 
 def _value(measure: dict, scale: float, digits: int, unit: str) -> str:
-    if measure["mean"] is None:
-        return "none"
-    error = measure["standard_error"]
-    spread = "" if error is None else f" ± {scale * error:.{digits}f}"
-    return f"{scale * measure['mean']:.{digits}f}{spread}{unit} (of {measure['participants']} people)"
+    from .summary import mean_text
+
+    people = "" if measure["mean"] is None else f" (of {measure['participants']} people)"
+    return mean_text(measure, scale, digits, unit) + people

@@ -39,6 +39,7 @@ def add_human_table_command(steps: Commands) -> None:
 
 
 def _human(arguments: argparse.Namespace) -> dict[str, Any]:
+    from ..human_study.summary import mean_text
     from .tables import STUDY, human_table
     from .text import csv_text, markdown
 
@@ -56,16 +57,9 @@ def _human(arguments: argparse.Namespace) -> dict[str, Any]:
         "unit_of_analysis": table["unit_of_analysis"],
         "episodes": f"{len(rows)} of {table['planned']} planned",
         "left_out": left_out,
-        "success": {row["robot"]: _percent(row["success"]) for row in table["robots"]},
+        "success": {row["robot"]: mean_text(row["success"], 100, 1, " %") for row in table["robots"]},
         "table": str(arguments.out / f"{_NAME}.md"),
     }
-
-
-def _percent(cell: dict[str, Any]) -> str:
-    if cell["mean"] is None:
-        return "none"
-    error = cell["standard_error"]
-    return f"{100 * cell['mean']:.1f}" + ("" if error is None else f" ± {100 * error:.1f}") + " %"
 
 
 def _require_own_folder(out: Path, study: str) -> None:

@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..human_study.summary import mean_text
 from ..markdown_table import markdown_table
 from .tables import MEASURES
 
@@ -58,10 +59,10 @@ def _robots(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
                 str(row["success"]["participants"]),
                 str(row["episodes"]),
                 _with_deviation(row["success"]),
-                _mean(row["time_s"], 1, 1),
-                _mean(row["wall_time_s"], 1, 1),
-                _mean(row["interaction_mean"], 1, 3),
-                _mean(row["planning_ms"], 1, 2),
+                mean_text(row["time_s"], 1, 1),
+                mean_text(row["wall_time_s"], 1, 1),
+                mean_text(row["interaction_mean"], 1, 3),
+                mean_text(row["planning_ms"], 1, 2),
                 *(_published_results(row) if published else []),
             ]
         )
@@ -85,8 +86,8 @@ def _fronts(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
                 str(success["participants"]),
                 str(row["episodes"]),
                 *(_number(success[name], 100, 1) for name in ("mean", "sd", "standard_error")),
-                _mean(row["time_s"], 1, 1),
-                _mean(row["interaction_mean"], 1, 3),
+                mean_text(row["time_s"], 1, 1),
+                mean_text(row["interaction_mean"], 1, 3),
                 *(_published_spread(paper) if published else []),
             ]
         )
@@ -119,7 +120,7 @@ def _questionnaires(rows: Sequence[Mapping[str, Any]]) -> str:
         lines.append(
             [
                 f"{row['title']}{scale}",
-                *(_mean(row["robots"][name] or {"mean": None}, 1, 2) for name in robots),
+                *(mean_text(row["robots"][name] or {"mean": None}, 1, 2) for name in robots),
                 "" if alpha is None else f"{alpha:.2f}",
                 "" if test is None else f"{test['test']}, p {_p(test['p'])}",
             ]
@@ -200,15 +201,8 @@ def _without(heads: list[str], lines: list[list[str]], head: str) -> str:
 
 
 def _with_deviation(cell: Mapping[str, Any]) -> str:
-    text = _mean(cell, 100, 1)
+    text = mean_text(cell, 100, 1)
     return text if cell["sd"] is None else f"{text} ({100 * cell['sd']:.1f})"
-
-
-def _mean(cell: Mapping[str, Any], scale: float, digits: int) -> str:
-    if cell["mean"] is None:
-        return "none"
-    error = cell["standard_error"]
-    return f"{scale * cell['mean']:.{digits}f}" + ("" if error is None else f" ± {scale * error:.{digits}f}")
 
 
 def _number(value: float | None, scale: float, digits: int) -> str:
