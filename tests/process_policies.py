@@ -9,7 +9,7 @@ from copolicy.dataset.exceptions import FileFormatError
 
 
 class Constant:
-    """Pushes with its process's share of a force; `slow` sleeps and holds Python's lock for a while."""
+    """Pushes with a constant force; the one named `busy` computes for a while first, `dies` ends its process."""
 
     task = "table"
     n_obs_steps = 2

@@ -2,16 +2,20 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from play_session import settings
 from untrained_policy import save_untrained_policy, untrained_robots
 
+from copolicy.collect.play.result import ResultPhase
+from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec
-from copolicy.collect.questionnaire import read_questionnaire
+from copolicy.collect.questionnaire import Answer, AnswerFile, read_questionnaire
 from copolicy.collect.session import EpisodeCounts, iter_recordings
 from copolicy.collect.simulate.command import simulate
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
@@ -21,7 +25,7 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.design import make_plan, williams_square
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan
-from copolicy.evaluate.human_study.ratings import read_ratings
+from copolicy.evaluate.human_study.ratings import read_ratings, study_ratings
 from copolicy.evaluate.human_study.schedule import BlindPolicy, StudySchedule
 from copolicy.evaluate.human_study.session import run_session
 from copolicy.evaluate.human_study.summary import summarise_study
@@ -193,13 +197,62 @@ def test_ratings_get_their_robot_from_the_plan(tmp_path):
     assert str(error.value) == f"{path}: expected blocks of plan {plan.plan_id}, found P01 block 3 in row 1"
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("block,participant,fluent\n1,P01,3,5\n", "found more values than columns in row 1"),  # a comma in a number
+        ("participant,block,fluent\nP01,1.5,3\n", "expected the number of a block in row 1, found '1.5'"),
+        (
+            "participant,block,nasa-tlx.effort\nP01,1,105\n",
+            "expected 0 to 100 for 'nasa-tlx.effort' in row 1, found 105",
+        ),
+        ("participant,block,nasa-tlx.efort\nP01,1,5\n", "frustration, found nasa-tlx.efort"),
+        ("participant,block,nasa-tlx.raw_tlx\nP01,1,5\n", "frustration, found nasa-tlx.raw_tlx"),  # computed from items
+        ("participant,block,fluent\nP01,1,\xff\n", "found invalid UTF-8 (byte 31)"),
+        (
+            "participant,block,fluent\nP01,1,%s\n" % ("3" * 140_000),
+            "found no CSV (field larger than field limit (131072))",
+        ),
+    ],
+)
+def test_ratings_that_would_be_misread_are_refused_in_one_line(tmp_path, text, message):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 1, 0, questionnaires=(read_questionnaire("nasa-tlx"),))
+    path = tmp_path / "ratings.csv"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(FileFormatError) as error:
+        read_ratings(path, plan)
+    assert str(error.value).startswith(f"{path}: expected ")
+    assert str(error.value).endswith(message)
+
+
+def test_the_last_answer_in_a_session_counts_also_when_the_clock_was_set_back(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 1, 0)
+    first = Answer(plan.plan_id, "P01", 1, "own", "one", 4.0, 1.0, "human", time="2024-05-01T10:00:05.000+00:00")
+    changed = replace(first, value=6.0, time="2024-05-01T10:00:02.000+00:00")
+    later = replace(first, item="two", value=2.0, time="2024-05-02T09:00:00.000+00:00")
+    for name, answers in (("P01-01", (first, changed, replace(first, item="two"))), ("P01-02", (later,))):
+        (tmp_path / name).mkdir()
+        for answer in answers:
+            AnswerFile(tmp_path / name).add(answer)
+    (row,) = study_ratings([tmp_path], plan, [], None, "human")
+    assert (row["own.one"], row["own.two"]) == (6.0, 2.0)
+
+
+@pytest.mark.parametrize(("dx", "dy"), [(100.0, 100.0), (300.0, -300.0), (113.0, 113.0), (100.0, 0.0), (100.0, 37.0)])
+def test_a_start_in_a_set_up_is_of_that_set_up_also_at_45_degrees(dx, dy):
+    studies = get_task("table").studies
+    scenario = MapConfig((400.0, 350.0, 0.3), (400.0 + dx, 350.0 + dy))
+    for front in studies.fronts:
+        assert studies.front(studies.with_front(scenario, front)) == front
+
+
 class _Robot:
     """What a schedule tells the agent and the policies of a study."""
 
     name = ""
 
     def __init__(self):
-        self.latencies, self.chosen = [1.0], []
+        self.chosen = []
 
     def choose(self, robot):
         self.chosen.append(robot)
@@ -216,7 +269,7 @@ def test_practice_is_on_other_starts_in_both_set_ups_with_the_robots_in_turn():
     assert not {starts.index(scenario) for scenario in practised} & own
     assert [task.studies.front(scenario) for scenario in practised] == [*task.studies.fronts] * 2
     assert robot.chosen == list(plan.blocks_of("P02").values()) * 2
-    assert (robot.name, robot.latencies) == (f"study:{plan.plan_id}:P02:practice", [])
+    assert robot.name == f"study:{plan.plan_id}:P02:practice"
     assert json.loads(schedule.planned)["front"] == "robot_front"
     counts = EpisodeCounts()
     scenario, seats = schedule.next(counts)
@@ -228,6 +281,38 @@ def test_practice_is_on_other_starts_in_both_set_ups_with_the_robots_in_turn():
     # Where every start is the person's own, practice is on these.
     alone = make_plan(ROBOTS, "unseen", starts, 1, 24, 0, task.studies.fronts)
     assert StudySchedule(alone, "P01", robot, robot).practice(0) in starts
+
+
+def test_undo_and_redo_leave_one_recording_of_each_trial(tmp_path):
+    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 0)
+    codes = [trial.code for trial in plan.trials_of("P01")]
+    robot: Any = _Robot()
+    players = (PlayerSpec("scripted", "S01"), PlayerSpec("scripted", "S02"))
+    with prepared(settings(tmp_path, players=players, headless=True, window=None)) as application:
+        game = application.game
+        game.schedule = StudySchedule(plan, "P01", robot, robot)
+
+        def play() -> str:
+            trial = game.next_trial()
+            trial.begin({})
+            while not trial.outcome.done:
+                trial.step(game.ticker.tick())
+            return json.loads(trial.planned)["trial"]
+
+        assert play() == codes[0]
+        game.close_trial("keep")
+        assert play() == codes[1]
+        game.close_trial("redo")
+        game.undo()  # of the first trial, before the second is repeated
+        assert play() == codes[0]
+        game.close_trial("keep")
+        assert play() == codes[1]
+        # An undo of the first trial now, with the second kept after it, would leave two of the second and none of it.
+        assert "undo" not in [value for _, value in ResultPhase(game).top.items]
+        game.close_trial("keep")
+        assert play() == codes[2]
+        game.close_trial("keep")
+        assert game.kept == 3
 
 
 def test_only_the_chosen_robot_plans():
@@ -313,6 +398,14 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     kept = [one for one in iter_recordings(out) if one.counts]
     assert read_episode(kept[-1].path).meta.controller_0 == codes[-1]
     assert len(kept) == 4
+
+    # A finished session is not begun again by mistake: its trials would be recorded twice.
+    assert main(["human", "run", str(study / "plan.json"), *flags]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"copolicy-eval: {out / 'P01-01'}: expected a session of P01 with episodes to play, or --new-session, found "
+        "all 4 episodes kept"
+    )
+    assert sorted(folder.name for folder in out.iterdir() if folder.is_dir()) == ["P01-01"]
 
 
 def test_a_recording_that_contradicts_the_plan_is_refused(study, tmp_path, capsys):

@@ -115,7 +115,25 @@ def test_questionnaires_are_scored_and_their_consistency_stated():
     assert by_key["own.sum"]["robots"]["CoDP-H"]["mean"] == pytest.approx(1.0)
     assert by_key["free"]["kind"] == "file"
     assert by_key["own.one"]["test"]["test"] == "Friedman"
-    assert "| both (0 to 10) |" in markdown(table)
+    text = markdown(table)
+    assert "| both (0 to 10) |" in text
+    assert "| one" not in text.lower()  # items of a questionnaire with scores are in the CSV and the JSON
+
+
+def test_items_of_a_questionnaire_without_scores_are_shown_beside_one_with_scores():
+    rows, plan = _robot_study()
+    scored = OWN | {"name": "scored", "scores": [{"name": "sum", "title": "both", "items": ["one", "two"]}]}
+    forms = tuple(Questionnaire.from_json(json.dumps(content), "own") for content in (scored, OWN))
+    asked = StudyPlan(**{**vars(plan), "questionnaires": forms})
+    ratings = [
+        {"participant": person, "robot": robot.name}
+        | {f"{form}.{name}": k for form in ("scored", "own") for name in ("one", "two")}
+        | {"scored.sum": k}
+        for person in ("S1", "S2")
+        for k, robot in enumerate(plan.robots)
+    ]
+    text = markdown(human_table(rows, ratings, asked, {}))
+    assert [text.count(f"| {title} (0 to 10) |") for title in ("both", "One?", "Two?")] == [1, 1, 1]
 
 
 @pytest.fixture(scope="module")
@@ -225,6 +243,9 @@ def test_wrong_calls_are_one_line(study, tmp_path, capsys):
     assert main([*call, str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.startswith(f"copolicy-eval: {tmp_path}: expected a folder of recordings, found ")
     assert not (tmp_path / "out").exists()
+    (tmp_path / "file").touch()
+    assert main([*call, str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err.startswith(f"copolicy-eval: {tmp_path / 'file'}: expected a folder for the tables")
     (tmp_path / "table.md").write_text("mine", encoding="utf-8")
     assert main([*call, str(tmp_path)]) == 2
     assert "nothing was overwritten" in capsys.readouterr().err

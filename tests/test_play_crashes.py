@@ -94,8 +94,8 @@ def _expect_no_room(output: str, errors: str, program: subprocess.Popen) -> None
     assert program.returncode == 1
     last = errors.strip().splitlines()[-1]
     assert last.startswith("copolicy-collect: ")
-    assert "expected space for a recording, found: " in last
-    assert "finished episodes are complete, this one is kept as .part" in last
+    assert "expected space for recordings and answers, found: " in last
+    assert "finished episodes and saved answers are complete, an unfinished episode is kept as .part" in last
 
 
 def test_a_file_that_cannot_grow_ends_the_session_with_a_message(tmp_path):

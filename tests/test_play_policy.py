@@ -13,7 +13,7 @@ from untrained_policy import save_untrained_policy
 from copolicy.collect.agents import PolicyAgent, load_policy
 from copolicy.collect.cli import main
 from copolicy.collect.rollout import EpisodeStart
-from copolicy.dataset.exceptions import FileFormatError
+from copolicy.dataset.exceptions import FileFormatError, RunError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import EpisodeEvent, PlayerInput
 from copolicy.dataset.recording.reader import read_episode
@@ -179,6 +179,10 @@ def test_a_slow_plan_lets_go_and_is_taken_up_where_it_is_due(agent, counter):
     assert _run(agent, world, 1).tolist() == [[0.0, 0.0]]
     assert len(agent.latencies) == 2
     assert agent.latencies[1] > 0
+    begin(agent)
+    agent.wait(10)
+    _run(agent, TableWorld(MAP), 1)
+    assert len(agent.latencies) == 1  # of this episode only
 
 
 def test_the_age_of_a_plan_is_recorded(agent):
@@ -257,3 +261,23 @@ def test_a_policy_and_a_recording_carry_the_table_in_real_time(checkpoint, tmp_p
     inputs = [PlayerInput.FromString(m.data) for _, channel, m in messages if channel.topic == "/player/0/input"]
     assert len(inputs) == len(episode.actions)
     assert max(sample.age_ns for sample in inputs) > 10**7
+
+
+def test_an_error_of_the_policy_ends_the_loop(counter, monkeypatch):
+    """Whether it is raised at the start of an episode or by a chunk; without it, a robot would act from no seed."""
+    for name in ("reset", "predict_action_chunk"):
+        with monkeypatch.context() as patch:
+
+            def fail(*_: object, name: str = name) -> None:
+                raise RunError(f"{name} failed")
+
+            patch.setattr(counter, name, fail)
+            agent = PolicyAgent(counter, real_time=True)
+            begin(agent)
+            world = TableWorld(MAP)
+            limit = time.monotonic() + 10
+            while agent._pending is not None and not agent._pending.done() and time.monotonic() < limit:
+                time.sleep(0.01)
+            with pytest.raises(RunError, match=f"{name} failed"):
+                agent.act(world.observation[None], ONE)
+            agent.close()

@@ -11,12 +11,14 @@ from own_questionnaire import OWN
 from play_session import settings
 from virtual_joystick import VirtualJoystick
 
+from copolicy.collect.play.answer_sheet import AnswerSheet
 from copolicy.collect.play.interludes import Interlude
 from copolicy.collect.play.phase import NextPhase, before_next_episode
 from copolicy.collect.play.questions import Questions
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec, PlaySettings
 from copolicy.collect.questionnaire import AnswerFile, Questionnaire, read_questionnaire
+from copolicy.collect.screen.text import fitted_lines, wrapped
 from copolicy.collect.sdl import pygame
 
 pytestmark = pytest.mark.usefixtures("own_joysticks")
@@ -93,7 +95,7 @@ def test_a_gamepad_answers_and_each_answer_is_on_the_disk_at_once(tmp_path):
         hands.press(A, gamepad)
         assert saved(tmp_path) == {"one": 4.0, "two": 0.0}
         hands.press(A, gamepad)
-        assert open_phase(hands).item is None  # the button
+        assert open_phase(hands).sheet.item is None  # the button
         hands.press(A, gamepad)
         assert hands.phase == "Break"
         lines = [
@@ -102,7 +104,6 @@ def test_a_gamepad_answers_and_each_answer_is_on_the_disk_at_once(tmp_path):
         assert {(line["study"], line["participant"], line["block"], line["source"]) for line in lines} == {
             ("abcd", "P01", 1, "human")
         }
-        assert lines[0]["seconds"] >= 0
 
 
 def test_the_break_lasts_and_then_waits_for_the_person(tmp_path, monkeypatch):
@@ -164,7 +165,7 @@ def test_keys_answer_by_digit_and_the_session_goes_on_with_the_open_question(tmp
         key(pygame.K_RETURN)
         hands.ticks(32)
         assert hands.phase == "Questions"
-        assert (open_phase(hands).page, open_phase(hands).row) == (0, 3)
+        assert (open_phase(hands).sheet.page, open_phase(hands).sheet.row) == (0, 3)
         assert hands.screen().get_size() == (1200, 760)
 
 
@@ -200,3 +201,68 @@ def test_a_session_without_people_answers_at_random_and_says_so(tmp_path):
             values.append(hands.game.interludes.answers.values(1, "own"))
     assert values[0] == values[1]
     assert values[0] != values[2]
+
+
+class Seconds:
+    """A clock that the test sets, s."""
+
+    now = 100.0
+
+    def __call__(self):
+        return round(self.now * 1e9)
+
+
+def test_an_answer_has_the_seconds_from_the_selection_of_its_item_to_the_last_move_of_its_mark():
+    clock = Seconds()
+    sheet = AnswerSheet(FORM, {}, clock)
+    clock.now += 4
+    sheet.move(1)
+    clock.now += 2.5
+    sheet.move(1)
+    clock.now += 7  # resting on the mark is no time of thought
+    sheet.accept()
+    assert list(sheet.changed()) == [("one", 6.0, 6.5)]
+    clock.now += 3
+    sheet.place(0)
+    assert list(sheet.changed()) == [("two", 0.0, 3.0)]
+    sheet.select(0)
+    clock.now += 1.25
+    sheet.move(-1)
+    assert list(sheet.changed()) == [("one", 4.0, 1.25)]
+    assert list(sheet.changed()) == []
+
+
+def test_a_sheet_leads_through_its_pages_and_an_answer_that_was_not_written_stays_unsaved():
+    form = replace(read_questionnaire("fluency"), name="own")
+    names = [item.name for item in form.items]
+    sheet = AnswerSheet(form, dict.fromkeys(names[:6], 3.0), Seconds())
+    assert (sheet.page, sheet.row, sheet.item) == (1, 0, form.items[6])
+    sheet.select(6)
+    assert sheet.accept() == "6 answers are missing"
+    assert sheet.row == 0
+    for _ in range(6):
+        assert sheet.accept() == "move the mark to the left or right"
+        sheet.place(2)
+        assert sheet.accept() == ""
+    assert (sheet.item, sheet.on_last_page) == (None, False)
+    assert sheet.accept() == ""
+    assert (sheet.page, sheet.row, sheet.on_last_page, sheet.position) == (
+        2, 0, True, "page 3 of 3, 12 of 18 answered"
+    )  # fmt: skip
+    sheet.select(-1)  # back over the edge of the page
+    assert (sheet.page, sheet.item) == (1, form.items[11])
+    for name, _, _ in sheet.changed():
+        if name == names[8]:
+            break  # the disk is full
+    assert [name for name, _, _ in sheet.changed()] == names[8:12]
+
+
+def test_a_long_question_is_drawn_whole_in_a_smaller_font():
+    text = " ".join(f"word{number}" for number in range(35))
+    assert 230 < len(text) <= 240
+    for most, largest in ((3, 27), (2, 24)):
+        size, lines = fitted_lines(text, largest, 540, most)
+        assert " ".join(lines) == text
+        assert len(wrapped(text, largest, 540)) > most, "the test needs a text that is too long"
+        assert size * len(lines) <= largest * most
+    assert fitted_lines("short", 27, 540, 3) == (27, ["short"])

@@ -41,7 +41,23 @@ def test_reversed_statements_are_mirrored():
     [
         ({"scale": {**OWN["scale"], "step": 3}}, "expected a scale of whole steps, at most 101 marks, found Scale("),
         ({"scale": {**OWN["scale"], "high": 0}}, "expected a scale with low < high and step > 0, found Scale("),
+        ({"scale": {**OWN["scale"], "high": float("inf")}}, "expected a scale of finite numbers, found Scale("),
+        ({"scale": {**OWN["scale"], "step": 0}}, "expected a scale of finite numbers, found Scale("),
+        ({"scale": {**OWN["scale"], "step": 1e-320}}, "expected a scale of finite numbers, found Scale("),
+        ({"scale": {**OWN["scale"], "step": -2}}, "expected a scale with low < high and step > 0, found Scale("),
         ({"items": []}, "expected at least one item, found none"),
+        (
+            {"items": [{"name": "one", "text": "word " * 50}]},
+            "expected at most 240 characters in the text of one, found 250",
+        ),
+        (
+            {"instruction": "word " * 61},
+            "expected at most 300 characters in the instruction of the questionnaire, found 305",
+        ),
+        (
+            {"items": [{"name": "one", "text": "One?", "labels": ["no", "y" * 41]}]},
+            "expected at most 40 characters in the label of one, found 41",
+        ),
         ({"items": OWN["items"][:1] * 2}, "expected items and scores of different names, found one"),
         ({"items": [{"name": "One", "text": "?"}]}, "expected names of a-z, 0-9, '_' and '-' that begin with a letter"),
         ({"items": [{"name": "one", "text": " "}]}, "expected a text for one, found  "),

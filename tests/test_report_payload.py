@@ -12,6 +12,7 @@ import pytest
 from copolicy.cards.cli import main
 from copolicy.cards.episode_frames import read_frames
 from copolicy.cards.facts import DatasetFacts
+from copolicy.cards.report.figures_section import figures_section
 from copolicy.cards.report.payload import FRAME_SCALES, build_payload
 from copolicy.dataset.exceptions import FileFormatError
 
@@ -123,6 +124,14 @@ def test_figures_are_embedded_as_they_are(report_set, tmp_path, visit):
     assert base64.b64decode(bitmap) == PNG
     assert all(images.nth(index).evaluate("image => image.naturalWidth > 0") for index in range(2))
     assert page.locator("#contents a[href='#figures']").inner_text() == "Figures"
+
+
+def test_a_figure_of_which_the_document_names_one_file_is_shown_once(tmp_path):
+    folder = figures_folder(tmp_path / "figures", files=["visitation.svg"])
+    (folder / "notes.png").mkdir()
+    section = figures_section(folder, "table")
+    assert (section.count("<img"), section.count("image/svg+xml")) == (1, 1)
+    assert "not described" not in section
 
 
 def test_a_page_without_figures_has_no_section_for_them(report):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 from policy_runs import save_run
 from slurm_cluster import stand_in_cluster
 
+from copolicy.dataset.distributed.executors import _slurm
+from copolicy.dataset.distributed.flags import Distribution, SlurmOptions
+from copolicy.dataset.distributed.job import Job, Step
 from copolicy.evaluate.cli import main
 
 
@@ -55,6 +59,24 @@ def test_an_address_without_a_cluster_is_one_line(ray, run, tmp_path, capsys, ad
     assert sweep(run, tmp_path / "out", "--executor", "ray", "--address", address) == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith(f"copolicy-eval: --address: {message}")
     assert not (tmp_path / "out").exists()
+
+
+class Nothing(Step):
+    def run(self, data=None, rank: int = 0, world_size: int = 1) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        pass
+
+
+def test_paths_and_variables_with_spaces_reach_a_job_whole(tmp_path, monkeypatch):
+    environment = tmp_path / "our environment"
+    (environment / "bin").mkdir(parents=True)
+    (environment / "bin" / "activate").write_text("ACTIVE='yes, it is'", encoding="utf-8")
+    monkeypatch.setattr(sys, "prefix", str(environment))
+    job = Job(Nothing(None), 1, tmp_path, tmp_path / "logs", "tasks", lambda: 0, environment={"OUR_FLAGS": "-a b; c"})
+    setup = _slurm(job, Distribution("slurm", slurm=SlurmOptions(partition="cpu"))).env_command
+    told = subprocess.run(
+        ["bash", "-c", f'{setup}; echo "$ACTIVE, $OUR_FLAGS"'], capture_output=True, text=True, check=True
+    )
+    assert (told.stdout, told.stderr) == ("yes, it is, -a b; c\n", "")
 
 
 def test_slurm_jobs_run_the_tasks_and_make_the_table(run, digest, tmp_path, monkeypatch, warm_python, capsys):

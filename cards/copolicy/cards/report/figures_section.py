@@ -26,12 +26,13 @@ def figures_section(folder: Path, task: str) -> str:
     document = read_json(folder / FIGURES_FILE, FiguresDocument, _EXPECTED)
     if document["task"] != task:
         raise FileFormatError(folder / FIGURES_FILE, f"figures of the task {task}", document["task"])
-    parts, listed = [], set()
+    parts: list[str] = []
+    listed: set[str] = set()
     for figure in document["figures"].values():
         files = [folder / Path(name).name for name in figure["files"]]
-        listed.update(files)
+        listed.update(path.stem for path in files)
         parts.append(_figure(_best(folder, files), figure["title"], figure["definition"]))
-    others = sorted({path.stem for path in folder.iterdir() if path.suffix in _TYPES and path not in listed})
+    others = sorted({path.stem for path in folder.iterdir() if path.suffix in _TYPES and path.is_file()} - listed)
     for stem in others:
         files = [path for suffix in _TYPES if (path := folder / f"{stem}{suffix}").is_file()]
         parts.append(_figure(_best(folder, files), stem, f"not described in {FIGURES_FILE}"))

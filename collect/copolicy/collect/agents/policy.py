@@ -9,13 +9,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from copolicy.dataset.arrays import Array
-from copolicy.dataset.clock import frame_actions, stride
 from copolicy.dataset.exceptions import InvalidValueError
-from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.messages.copolicy_pb2 import PlayerInput
 from copolicy.dataset.task import PairTask, get_task
 
 from ..rollout import Agent, EpisodeStart
+from .frame_history import FrameHistory
 
 
 class Policy(Protocol):
@@ -75,7 +74,7 @@ class PolicyAgent(Agent):
 
     Attributes:
         task: of the worlds.
-        latencies: inference time of each chunk, s.
+        latencies: inference time of each chunk since the episodes began, s.
         chunks: `(worlds,)` number of chunks of each world.
     """
 
@@ -109,6 +108,7 @@ class PolicyAgent(Agent):
             raise InvalidValueError(policy.name, expected, policy.task)
         self._fps, self._seed, self._clock = fps, seed, clock
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="policy") if real_time else None
+        self._reset: Future[None]
         self._pending: Future[_Chunk] | None = None
         self._chunk: _Chunk | None = None
 
@@ -117,24 +117,13 @@ class PolicyAgent(Agent):
         if self._pending is not None:
             self._pending.cancel()
         self._pending, self._chunk = None, None
+        self.latencies = []
         # The policy may have been replaced since the last episode, so its rate is read here.
         self._seat, spec = seat, self.task.spec
-        self._rate = self._fps or self._policy.fps
-        self._stride = stride(self._rate, spec.record_hz)
-        self._exchange = self.task.exchange if seat == 1 else None
-        count, frames, size = len(starts), self._policy.n_obs_steps, len(spec.action)
-        self._size = size
-        scenarios, states = [start.scenario for start in starts], np.array([start.state for start in starts])
-        if self._exchange is not None:
-            scenarios = [self._exchange.scenario(scenario) for scenario in scenarios]
-            states = self._exchange.states(states)
-        self._scenarios = np.array([self.task.scenario_vector(scenario) for scenario in scenarios])
-        # The first observation is repeated before the start, like the padding in training.
-        self._states = np.repeat(states[:, None], frames, axis=1)  # (worlds, n_obs_steps, n)
-        self._partner_actions = np.zeros((count, frames, size))
-        self._step_actions: list[Array] = []  # joint actions (worlds, 2 m) of the steps of this frame
+        count, self._size = len(starts), len(spec.action)
+        self._history = FrameHistory(self.task, seat, starts, self._policy.n_obs_steps, self._fps or self._policy.fps)
         self._bounds = spec.joint_action.bounds
-        self._joint = np.zeros((count, 2 * size))  # of the present frame
+        self._joint = np.zeros((count, 2 * self._size))  # of the present frame
         self._observed_ns = 0  # of the present chunk; 0 without one
         self.chunks: Array = np.zeros(count, int)
         self._step = 0
@@ -142,15 +131,15 @@ class PolicyAgent(Agent):
         if self._worker is None:
             self._policy.reset(seed)
         else:
-            self._worker.submit(self._policy.reset, seed)  # after the inference that still runs
+            self._reset = self._worker.submit(self._policy.reset, seed)  # after the inference that still runs
             self._request_chunk(0, np.arange(count))
 
     def act(self, states: Array, worlds: Array) -> Array:
         """Its half of the joint actions of the present frame."""
-        frame, step_in_frame = divmod(self._step, self._stride)
+        frame, step_in_frame = divmod(self._step, self._history.stride)
         if step_in_frame == 0:
             if frame > 0:
-                self._observe(states, worlds)
+                self._history.observe(states, worlds)
             self._next_action(frame, worlds)
         elif self._accept_pending(frame):
             self._execute(frame)
@@ -166,9 +155,7 @@ class PolicyAgent(Agent):
 
     def acted(self, actions: Array, worlds: Array) -> None:
         """Adds the joint actions to the history."""
-        joint = np.zeros_like(self._joint)
-        joint[worlds] = actions
-        self._step_actions.append(joint)
+        self._history.acted(actions, worlds)
         self._step += 1
 
     def human_half(self) -> Agent:
@@ -178,9 +165,9 @@ class PolicyAgent(Agent):
     def branch(self, count: int) -> "PolicyAgent":
         """A copy of this agent of one world for `count` copies of that world; it predicts a new chunk in each."""
         branch = copy.copy(self)
-        for name in ("_scenarios", "_states", "_partner_actions", "_joint", "chunks"):
+        branch._history = self._history.repeated(count)
+        for name in ("_joint", "chunks"):
             setattr(branch, name, np.repeat(getattr(self, name), count, axis=0))
-        branch._step_actions = [np.repeat(actions, count, axis=0) for actions in self._step_actions]
         branch._chunk = None
         return branch
 
@@ -200,16 +187,6 @@ class PolicyAgent(Agent):
         if self._worker is not None:
             self._worker.shutdown(cancel_futures=True)
 
-    def _observe(self, states: Array, worlds: Array) -> None:
-        steps = np.array(self._step_actions)  # (stride, worlds, 2 m)
-        joint = frame_actions(steps.reshape(len(steps), -1), self._rate, record_hz=self.task.spec.record_hz)[0]
-        mean = joint.reshape(steps.shape[1:])[worlds]
-        self._step_actions = []
-        if self._exchange is not None:
-            states, mean = self._exchange.states(states), self._exchange.actions(mean)
-        for history, newest in ((self._states, states), (self._partner_actions, mean[:, self._size :])):
-            history[worlds] = np.concatenate((history[worlds, 1:], newest[:, None]), axis=1)
-
     def _next_action(self, frame: int, worlds: Array) -> None:
         self._accept_pending(frame)
         ahead = int(self._worker is not None)
@@ -222,7 +199,10 @@ class PolicyAgent(Agent):
 
     def _accept_pending(self, frame: int) -> bool:
         """Takes the requested chunk if it is ready and its first action is due; returns whether it did."""
-        if self._pending is None or not self._pending.done() or self._pending.result().frame > frame:
+        if self._pending is None or not self._pending.done():
+            return False
+        self._reset.result()  # done before the chunk; raises its error
+        if self._pending.result().frame > frame:
             return False
         self._accept_chunk(self._pending.result())
         return True
@@ -233,19 +213,15 @@ class PolicyAgent(Agent):
         if chunk is None or frame - chunk.frame >= chunk.actions.shape[1]:
             self._joint, self._observed_ns = np.zeros_like(self._joint), 0
             return
+        exchange = self._history.exchange
         joint = np.clip(chunk.actions[:, frame - chunk.frame], *self._bounds)
-        self._joint = joint if self._exchange is None else self._exchange.actions(joint)
+        self._joint = joint if exchange is None else exchange.actions(joint)
         self._observed_ns = chunk.observed_ns
 
     def _request_chunk(self, frame: int, worlds: Array) -> None:
         if self._policy.keeps_history:
-            worlds = np.arange(len(self._states))
-        observations = {
-            STATE: self._states[worlds],
-            ENVIRONMENT_STATE: np.repeat(self._scenarios[worlds, None], self._states.shape[1], axis=1),
-            HUMAN_ACTION: self._partner_actions[worlds],
-        }
-        request = (frame, worlds, observations, self._clock())
+            worlds = np.arange(len(self._history))
+        request = (frame, worlds, self._history.observations(worlds), self._clock())
         if self._worker is None:
             self._accept_chunk(self._predict(*request))
         else:
@@ -255,7 +231,7 @@ class PolicyAgent(Agent):
         started = time.perf_counter()
         predicted = self._policy.predict_action_chunk(observations)
         seconds = time.perf_counter() - started
-        actions = np.zeros((len(self._states), *predicted.shape[1:]))
+        actions = np.zeros((len(self._history), *predicted.shape[1:]))
         actions[worlds] = predicted
         return _Chunk(frame, worlds, actions, observed_ns, seconds)
 

@@ -66,7 +66,8 @@ def assemble(
         questions = Interludes(path, settings.interludes()).open_questionnaire(settings.episodes)
         return questions is not None and bool(settings.answered_by())
 
-    folder = loading.run("earlier episodes", lambda: SessionFolder(*keys, settings.task, has_open_questions))
+    opened = (settings.task, has_open_questions, settings.once)
+    folder = loading.run("earlier episodes", lambda: SessionFolder(*keys, *opened))
     sounds = Sounds(settings.mute or settings.headless)
     stack.callback(sounds.close)
     game = Game(settings, Roster(players, gamepads, store, folder.journal, clock), folder, sounds, clock)

@@ -170,7 +170,9 @@ class Game:
         else:
             trial.interrupt("operator_discard", reason)
         self._count_trial(trial, verdict, reason)
-        self._redo = (trial.scenario, trial.seating ^ self.swapped) if verdict == "redo" else None
+        # A fixed order leads to the same episode again, and after an undo to the one before.
+        again = verdict == "redo" and not self.schedule.in_order
+        self._redo = (trial.scenario, trial.seating ^ self.swapped) if again else None
 
     def end_trial(self, reason: str) -> None:
         """Completes the recording of the current episode when the session ends; keeps it if it has an outcome.
@@ -210,10 +212,10 @@ class Game:
         self.show_message(f"undone: {undone.path.name}; {repeated}" if undone else "nothing to undo")
 
     def storage_error(self) -> RunError:
-        """Returns the error for a recording that could not be written."""
+        """Returns the error for a recording or an answer that could not be written."""
         return RunError(
-            f"{self.folder.path}: expected space for a recording, found: {self.problem}; "
-            "finished episodes are complete, this one is kept as .part"
+            f"{self.folder.path}: expected space for recordings and answers, found: {self.problem}; "
+            "finished episodes and saved answers are complete, an unfinished episode is kept as .part"
         )
 
     def _count_trial(self, trial: Trial, verdict: str, reason: str) -> None:

@@ -6,19 +6,17 @@ from typing import ClassVar
 import numpy as np
 
 from ..inputs import Command, Gamepad, Press
-from ..questionnaire import Answer, Item
+from ..questionnaire import Answer
 from ..screen import Canvas
 from ..screen.dialogs import Line, draw_dialog
 from ..screen.palette import YELLOW
 from ..screen.questions_view import QuestionRow, QuestionsView, draw_questions
 from ..sdl import pygame
 from ..ticker import Tick
+from .answer_sheet import AnswerSheet
 from .game import Game
 from .menu import Menu
 from .phase import NextPhase, Phase, before_next_episode
-
-ROWS = 6
-"""Items on one page."""
 
 _IGNORED_TICKS = 12  # a button pressed this early was still meant for the episode
 _HELD_TICKS, _REPEAT_TICKS = 12, 2  # a held stick moves the mark again after the first, then after each second
@@ -42,42 +40,23 @@ class Questions(Phase):
         assert due is not None, "the phase needs a questionnaire"
         self.interlude, self.form = due
         self._source = game.settings.answered_by()
-        scale, saved = self.form.scale, game.interludes.answers.values(self.interlude.block, self.form.name)
-        self._marks: dict[str, int | None] = {
-            item.name: scale.mark(saved[item.name]) if item.name in saved else None for item in self.form.items
-        }
-        self._saved = dict(self._marks)
-        items = list(self.form.items)
-        self._pages = [items[k : k + ROWS] for k in range(0, len(items), ROWS)]
-        self.page = next(k for k, page in enumerate(self._pages) if self._open(page))
-        self.row = self._pages[self.page].index(self._open(self._pages[self.page])[0])
-        self._selected_ns = game.clock()
+        saved = game.interludes.answers.values(self.interlude.block, self.form.name)
+        self.sheet = AnswerSheet(self.form, saved, game.clock)
         self._ticks = self._still_ticks = self._held_ticks = 0
         self._released = False  # a stick that is held from the episode on does not move a mark
         self._quit_menu: Menu | None = None
-        self._done = False
 
     def enter(self) -> None:
         """Writes an entry to the journal."""
         self.game.folder.journal("questions", block=self.interlude.block, questionnaire=self.form.name)
 
-    @property
-    def items(self) -> list[Item]:
-        """The items of the page."""
-        return self._pages[self.page]
-
-    @property
-    def item(self) -> Item | None:
-        """The selected item; None if the button below the items is selected."""
-        return self.items[self.row] if self.row < len(self.items) else None
-
     def consume(self, event: pygame.event.Event) -> bool:
         """Takes a digit as the answer where the scale's marks are digits."""
         scale, number = self.form.scale, _DIGITS.get(event.key) if event.type == pygame.KEYDOWN else None
-        if number is None or self.item is None or self._quit_menu or scale.marks > 10 or scale.high > 9:
+        if number is None or self.sheet.item is None or self._quit_menu or scale.marks > 10 or scale.high > 9:
             return False
         if (mark := scale.mark(number)) is not None:
-            self._place(mark)
+            self._moved(self.sheet.place(mark))
         return True
 
     def handle(self, press: Press) -> None:
@@ -87,15 +66,13 @@ class Questions(Phase):
         if self._quit_menu is not None:
             self._answer_quit_menu(press)
         elif press.command in self.directions:
-            self._move(self.directions[press.command])
-        elif press.command == Command.UP:
-            self._select(self.row - 1)
+            self._moved(self.sheet.move(self.directions[press.command]))
+        elif press.command in (Command.UP, Command.BACK):
+            self._select(self.sheet.row - 1)
         elif press.command == Command.DOWN:
-            self._select(min(self.row + 1, len(self.items)))
+            self._select(self.sheet.row + 1)
         elif press.command == Command.ACCEPT:
             self._accept()
-        elif press.command == Command.BACK:
-            self._select(self.row - 1)
         elif press.command == Command.PAUSE:
             self._quit_menu = Menu("Stop here?", [("go on", "stay"), ("quit for now", "quit")])
 
@@ -109,14 +86,14 @@ class Questions(Phase):
             elif self._quit_menu is None:
                 self._repeat_held()
             self._still_ticks += 1
-            if self._still_ticks >= _SAVE_TICKS or self._done or game.stop:
+            if self._still_ticks >= _SAVE_TICKS or self.sheet.done or game.stop:
                 self._save()
         except OSError as error:
             game.problem = error.strerror or str(error)
             return NextPhase.FAILURE
         if game.stop:
             return NextPhase.END
-        return before_next_episode(game) if self._done else NextPhase.STAY
+        return before_next_episode(game) if self.sheet.done else NextPhase.STAY
 
     def leave(self) -> None:
         """Saves a mark that still moved when the session was ended.
@@ -126,46 +103,19 @@ class Questions(Phase):
         """
         self._save()
 
-    def _open(self, items: list[Item]) -> list[Item]:
-        return [item for item in items if self._marks[item.name] is None]
-
-    def _move(self, direction: int) -> None:
-        item = self.item
-        if item is None:
-            return
-        mark, marks = self._marks[item.name], self.form.scale.marks
-        middle = (marks - 1) // 2
-        self._place(middle if mark is None else min(marks - 1, max(0, mark + direction)))
-
-    def _place(self, mark: int) -> None:
-        item = self.item
-        if item is not None and self._marks[item.name] != mark:
-            self._marks[item.name] = mark
+    def _moved(self, moved: bool) -> None:
+        if moved:
             self._still_ticks = 0
             self.game.sounds.play("choose")
 
     def _select(self, row: int) -> None:
         self._still_ticks = _SAVE_TICKS  # saved in this tick
-        if row < 0 and self.page > 0:
-            self.page -= 1
-            row = len(self.items) - 1
-        self.row = max(0, row)
-        self._selected_ns = self.game.clock()
+        self.sheet.select(row)
 
     def _accept(self) -> None:
-        game, item, left = self.game, self.item, self._open(self.items)
-        if item is not None and self._marks[item.name] is None:
-            game.show_message("move the mark to the left or right")
-        elif item is not None:
-            self._select(self.row + 1)
-        elif left:
-            self._select(self.items.index(left[0]))
-            game.show_message("one answer is missing" if len(left) == 1 else f"{len(left)} answers are missing")
-        elif self.page + 1 < len(self._pages):
-            self.page += 1
-            self._select(0)
-        else:
-            self._done = True
+        self._still_ticks = _SAVE_TICKS
+        if missing := self.sheet.accept():
+            self.game.show_message(missing)
 
     def _answer_quit_menu(self, press: Press) -> None:
         assert self._quit_menu is not None
@@ -180,7 +130,7 @@ class Questions(Phase):
         self._released = self._released or not direction
         self._held_ticks = self._held_ticks + 1 if direction and self._released else 0
         if self._held_ticks > _HELD_TICKS and self._held_ticks % _REPEAT_TICKS == 0:
-            self._move(direction)
+            self._moved(self.sheet.move(direction))
 
     def _held_direction(self) -> int:
         """-1 or 1 while a person holds a stick, a d-pad or a key to the left or right."""
@@ -199,15 +149,14 @@ class Questions(Phase):
 
     def _answer_by_itself(self) -> None:
         """Gives random answers, the same for the same seed, participant, block and item."""
-        headless, scale = self.game.settings.headless, self.form.scale
-        while not self._done and (headless or self._ticks % _UNATTENDED_TICKS == 0):
-            if (item := self.item) is not None and self._marks[item.name] is None:
-                settings = self.game.settings
-                key = f"{settings.pair} {self.interlude.block} {self.form.name} {item.name}"
+        sheet, settings = self.sheet, self.game.settings
+        while not sheet.done and (settings.headless or self._ticks % _UNATTENDED_TICKS == 0):
+            if sheet.item is not None and sheet.mark(sheet.item) is None:
+                key = f"{settings.pair} {self.interlude.block} {self.form.name} {sheet.item.name}"
                 rng = np.random.default_rng([settings.seed, zlib.crc32(key.encode())])
-                self._place(int(rng.integers(scale.marks)))
+                self._moved(sheet.place(int(rng.integers(self.form.scale.marks))))
             self._accept()
-            if not headless:
+            if not settings.headless:
                 return
 
     def _save(self) -> None:
@@ -219,33 +168,27 @@ class Questions(Phase):
         settings = self.game.settings
         study = str(settings.session_settings().get("study_plan", ""))
         consent = ",".join(player.consent for player in self.game.players if player.consent)
-        seconds = round((self.game.clock() - self._selected_ns) / 1e9, 3)
-        for name, mark in self._marks.items():
-            if mark is not None and mark != self._saved[name]:
-                value = self.form.scale.value(mark)
-                block, form = self.interlude.block, self.form.name
-                answer = Answer(study, settings.pair, block, form, name, value, seconds, self._source, consent)
-                self.game.interludes.answers.add(answer)
-                self._saved[name] = mark
+        block, form = self.interlude.block, self.form.name
+        for item, value, seconds in self.sheet.changed():
+            answer = Answer(study, settings.pair, block, form, item, value, seconds, self._source, consent)
+            self.game.interludes.answers.add(answer)
 
     def draw(self, canvas: Canvas, fraction: float) -> None:
         """Draws the page."""
+        sheet, scale = self.sheet, self.form.scale
         rows = [
-            QuestionRow(item.title, item.text, item.labels, self._marks[item.name], number == self.row)
-            for number, item in enumerate(self.items)
+            QuestionRow(item.title, item.text, item.labels, sheet.mark(item), number == sheet.row)
+            for number, item in enumerate(sheet.items)
         ]
-        answered = sum(mark is not None for mark in self._marks.values())
-        last = self.page + 1 == len(self._pages)
         view = QuestionsView(
             title=self.form.title,
             instruction=self.form.instruction,
             rows=rows,
-            marks=self.form.scale.marks,
-            first_number=self.form.scale.low if self.form.scale.step == 1 and self.form.scale.marks <= 11 else None,
-            button="done" if last else "next page",
-            button_selected=self.item is None,
-            position=f"part {self.interlude.block} of {self.game.interludes.blocks}, "
-            f"page {self.page + 1} of {len(self._pages)}, {answered} of {len(self._marks)} answered",
+            marks=scale.marks,
+            first_number=scale.low if scale.step == 1 and scale.marks <= 11 else None,
+            button="done" if sheet.on_last_page else "next page",
+            button_selected=sheet.item is None,
+            position=f"part {self.interlude.block} of {self.game.interludes.blocks}, {sheet.position}",
             hint=self.game.roster.hint(("a", "Enter or E", "next"), ("b", "Backspace or Q", "back")),
         )
         draw_questions(canvas, view)

@@ -29,7 +29,7 @@ class ResultPhase(NotesPhase):
         assert game.trial is not None, "the phase needs an episode"
         items = [("keep", "keep"), ("redo now", "redo"), ("discard, repeat later", "discard")]
         items += [("add a note", "note"), ("keep, and quit for now", "quit")]
-        if game.folder.kept_recordings:
+        if game.folder.kept_recordings and not game.schedule.in_order:
             items.insert(4, ("undo the previous keep", "undo"))
         title = outcome_text(game.trial.outcome.reason)
         super().__init__(game, title[:1].upper() + title[1:], _PRACTICE if game.trial.practice else items)

@@ -77,6 +77,7 @@ class PlaySettings:
         countdown_s: seconds before each episode.
         task: its name.
         may_exchange_seats: the players may exchange seats by hand.
+        once: a finished session is not followed by another one, other than by `new_session`.
     """
 
     pair: str
@@ -100,6 +101,7 @@ class PlaySettings:
     countdown_s: float = 3.0
     task: str = TABLE
     may_exchange_seats: bool = True
+    once: bool = False
 
     def __post_init__(self) -> None:
         ids = {"pair": self.pair, **{f"consent-{k}": text for k, text in enumerate(self.consents) if text}}

@@ -193,7 +193,8 @@ class Trial:
     def resume(self) -> None:
         """Records the end of a pause, whose duration the loop's timing excludes."""
         self.loop.pause()
-        self._paused_ns += self.clock() - self._pause_began_ns
+        if self._first_step_ns is not None:  # a pause before the first step is no part of the wall time
+            self._paused_ns += self.clock() - self._pause_began_ns
         self.event("resume")
 
     def note(self, text: str) -> None:

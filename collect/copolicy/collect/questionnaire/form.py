@@ -16,6 +16,8 @@ FORMS = ("nasa-tlx", "fluency")
 _EXPECTED = "a questionnaire"
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 _MOST_MARKS = 101
+_LONGEST = {"text": 240, "instruction": 300, "title": 60, "label": 40}
+"""Characters that the window shows in a legible size, by what they are."""
 
 
 class _Scale(TypedDict):
@@ -178,8 +180,9 @@ def read_questionnaire(name: str | Path) -> Questionnaire:
 
 def _questionnaire(form: _Form, path: Path | str) -> Questionnaire:
     scale = Scale(*(float(form["scale"][end]) for end in ("low", "high", "step")))
+    steps = (scale.high - scale.low) / (scale.step or math.nan)
+    _require(path, math.isfinite(steps), "a scale of finite numbers", scale)
     _require(path, scale.step > 0 and scale.high > scale.low, "a scale with low < high and step > 0", scale)
-    steps = (scale.high - scale.low) / scale.step
     even = math.isclose(steps, round(steps), abs_tol=1e-9) and round(steps) < _MOST_MARKS
     _require(path, even, f"a scale of whole steps, at most {_MOST_MARKS} marks", scale)
     names = [form["name"], *(item["name"] for item in form["items"]), *(s["name"] for s in form.get("scores", []))]
@@ -188,6 +191,8 @@ def _questionnaire(form: _Form, path: Path | str) -> Questionnaire:
     twice = next((name for name in names[1:] if names[1:].count(name) > 1), "")
     _require(path, not twice, "items and scores of different names", twice)
     _require(path, bool(form["items"]), "at least one item", "none")
+    _require_length(path, "instruction", form["instruction"], "the questionnaire")
+    _require_length(path, "title", form["title"], "the questionnaire")
     items = tuple(_item(path, item, form["scale"]["labels"]) for item in form["items"])
     scores = tuple(Score(score["name"], score["title"], tuple(score["items"])) for score in form.get("scores", []))
     for score in scores:
@@ -200,7 +205,15 @@ def _item(path: Path | str, item: _Item, default: list[str]) -> Item:
     labels = item.get("labels", default)
     _require(path, len(labels) == 2, f"two labels for {item['name']}, of the low and the high end", labels)
     _require(path, bool(item["text"].strip()), f"a text for {item['name']}", item["text"])
-    return Item(item["name"], item.get("title", ""), item["text"], (labels[0], labels[1]), item.get("reversed", False))
+    title = item.get("title", "")
+    for kind, text in (("text", item["text"]), ("title", title), *(("label", label) for label in labels)):
+        _require_length(path, kind, text, item["name"])
+    return Item(item["name"], title, item["text"], (labels[0], labels[1]), item.get("reversed", False))
+
+
+def _require_length(path: Path | str, kind: str, text: str, owner: str) -> None:
+    most = _LONGEST[kind]
+    _require(path, len(text) <= most, f"at most {most} characters in the {kind} of {owner}", f"{len(text)}")
 
 
 def _require(path: Path | str, condition: bool, expected: str, found: Any) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from .canvas import SIZE, Canvas
 from .palette import GREEN, INK, MUTED, PANEL, PANEL_EDGE, SKY, SURROUND, TEXT, YELLOW, mix
-from .text import wrapped
+from .text import fitted_lines
 
 _TOP, _ROW, _GAP = 116, 90, 4
 _TEXT_X, _TEXT_WIDTH = 44, 540
@@ -56,8 +56,9 @@ class QuestionsView:
 def draw_questions(canvas: Canvas, view: QuestionsView) -> None:
     """Draws a page with at most six items."""
     canvas.text(view.title, (_TEXT_X, 40), 48, TEXT, "midleft", 600)
-    for number, line in enumerate(wrapped(view.instruction, 28 * canvas.scale, 1112 * canvas.scale)[:2]):
-        canvas.text(line, (_TEXT_X, 76 + 27 * number), 28, SKY)
+    size, lines = fitted_lines(view.instruction, 28, 1112, 2, canvas.scale)
+    for number, line in enumerate(lines):
+        canvas.text(line, (_TEXT_X, 76 + size * number), size, SKY)
     for number, row in enumerate(view.rows):
         _draw_row(canvas, row, view, _TOP + number * (_ROW + _GAP))
     y = _TOP + len(view.rows) * (_ROW + _GAP) + 6
@@ -79,8 +80,8 @@ def draw_questions(canvas: Canvas, view: QuestionsView) -> None:
 def _draw_row(canvas: Canvas, row: QuestionRow, view: QuestionsView, y: float) -> None:
     fill = mix(PANEL, SKY, 0.16) if row.selected else PANEL
     canvas.box(24, y, SIZE[0] - 48, _ROW, fill, SKY if row.selected else PANEL_EDGE)
-    size, most, heading = (24, 2, _HEADING) if row.title else (27, 3, 0)
-    lines = wrapped(row.text, size * canvas.scale, _TEXT_WIDTH * canvas.scale)[:most]
+    largest, most, heading = (24, 2, _HEADING) if row.title else (27, 3, 0)
+    size, lines = fitted_lines(row.text, largest, _TEXT_WIDTH, most, canvas.scale)
     top = y + (_ROW - size * len(lines) - heading) / 2
     if row.title:
         canvas.text(row.title, (_TEXT_X, top + 11), 29, TEXT, "midleft", _TEXT_WIDTH)

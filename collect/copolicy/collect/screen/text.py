@@ -50,6 +50,25 @@ def wrapped(text: str, size: float, width: float) -> list[str]:
     return lines
 
 
+def fitted_lines(text: str, size: float, width: float, lines: int, scale: float = 1.0) -> tuple[float, list[str]]:
+    """The largest size up to `size` at which a text has no more lines than fit, and its lines; nothing is left out.
+
+    A smaller font has room for more lines: as many as have the height of `lines` lines of the given size.
+
+    Args:
+        size: height of the font.
+        width: of the lines.
+        lines: number of lines of the given size.
+        scale: px per unit of `size` and `width`.
+    """
+    height, smallest = size * lines, size / 2
+    while True:
+        found = wrapped(text, size * scale, width * scale)
+        if size * len(found) <= height or size - 1 < smallest:
+            return size, found
+        size -= 1
+
+
 @functools.lru_cache(maxsize=512)
 def _fitted(text: str, size: int, colour: Colour, max_width: int | None) -> pygame.Surface:
     if max_width is not None:

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, RunError
 from copolicy.dataset.files.lock import FolderLock
 from copolicy.dataset.files.staging import replace_json, sync_folder
 from copolicy.dataset.task import TABLE
@@ -56,6 +56,7 @@ class SessionFolder:
         new_session: bool = False,
         task: str = TABLE,
         is_open: Callable[[Path], bool] = lambda path: False,
+        once: bool = False,
     ):
         """Continues the pair's last session if it is unfinished, else begins a new one.
 
@@ -67,9 +68,11 @@ class SessionFolder:
             new_session: begin a new session in any case.
             task: name of the task whose recordings count.
             is_open: whether a session whose episodes were all kept is unfinished nevertheless, by its folder.
+            once: no session follows a finished one, other than by `new_session`.
 
         Raises:
             InvalidValueError: the unfinished session has other settings.
+            RunError: the pair's session is finished, with `once`.
             FileFormatError: its `session.json` is damaged.
             OSError: the folder cannot be written to.
         """
@@ -88,6 +91,9 @@ class SessionFolder:
                         dict(settings),
                     )  # fmt: skip
                 self.continued = True
+            elif once:
+                expected = f"a session of {pair} with episodes to play, or --new-session"
+                raise RunError(f"{self.path}: expected {expected}, found all {episodes} episodes kept")
         if not self.continued:
             self._begin(out, pair, number + 1, settings)
             self._count(summaries)

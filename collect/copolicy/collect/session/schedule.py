@@ -41,9 +41,11 @@ class BalancedSchedule:
 
     Attributes:
         planned: what the plan of a study says of the episode that was chosen last, for its recording; empty without.
+        in_order: the number of kept episodes alone says which one is next, so that only the last one may be undone.
     """
 
     planned = ""
+    in_order = False
 
     def __init__(
         self,

@@ -70,7 +70,7 @@ class TableStudies(Studies):
     def front(self, scenario: MapConfig) -> str:
         """Whose end of the table points to the goal, within 45 degrees; empty if the table lies across."""
         ahead = _robot_ahead(scenario)
-        if abs(ahead) < math.cos(math.pi / 4):
+        if abs(ahead) < math.cos(math.pi / 4) - 1e-9:  # at 45 degrees, rounding must not decide
             return ""
         return "robot_front" if ahead > 0 else "human_front"
 

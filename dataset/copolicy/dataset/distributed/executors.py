@@ -1,6 +1,7 @@
 """Runs the tasks of a job in local processes, on Ray, or as SLURM jobs, each finished task once."""
 
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -72,8 +73,8 @@ def _slurm(
     extra_arguments: Mapping[str, str] | None = None,
 ) -> SlurmPipelineExecutor:  # fmt: skip
     options, activate = distribution.slurm, Path(sys.prefix) / "bin" / "activate"
-    setup = options.setup or (f"source {activate}" if activate.is_file() else "")
-    exports = [f"export {name}={value}" for name, value in job.environment.items()]
+    setup = options.setup or (f"source {shlex.quote(str(activate))}" if activate.is_file() else "")
+    exports = [f"export {name}={shlex.quote(value)}" for name, value in job.environment.items()]
     return SlurmPipelineExecutor(
         [job.step],
         job.tasks,

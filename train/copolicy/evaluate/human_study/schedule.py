@@ -85,6 +85,8 @@ class BlindPolicy:
 class StudySchedule(BalancedSchedule):
     """A participant's trials in order; a discarded trial is repeated at once, and seats are never swapped."""
 
+    in_order = True
+
     def __init__(self, plan: StudyPlan, participant: str, policy: BlindPolicy, agent: PolicyAgent):
         self._plan = plan
         self._participant = participant
@@ -117,7 +119,6 @@ class StudySchedule(BalancedSchedule):
         plan, scenario = self._plan, self._plan.configurations[configuration]
         self._policy.choose(robot)
         self._agent.name = f"{CODE_PREFIX}:{plan.plan_id}:{self._participant}:{code}"
-        self._agent.latencies.clear()  # a recording has the latencies of its own episode only
         # The front follows from the start, also in a plan whose starts are not dealt by set-up.
         front = plan.task.studies.front(scenario) if plan.task.studies.fronts else ""
         self.planned = json.dumps(

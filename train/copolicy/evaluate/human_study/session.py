@@ -56,6 +56,7 @@ def run_session(
         seed=plan.seed,
         swap_seats=False,
         may_exchange_seats=False,
+        once=True,
         plan=plan,
         task=plan.task_name,
         **play,

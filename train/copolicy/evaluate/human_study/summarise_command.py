@@ -1,8 +1,9 @@
 """`copolicy-eval human summarise`."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from copolicy.dataset.command_line.commands import Commands, add_command
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
@@ -11,6 +12,9 @@ from copolicy.dataset.files.listing import visible_files
 from copolicy.dataset.files.staging import replace_json, require_new
 
 from ..study_flags import task_entry
+
+if TYPE_CHECKING:
+    from .plan import StudyPlan
 
 
 def add_summarise(steps: Commands) -> None:
@@ -25,41 +29,70 @@ def add_summarise(steps: Commands) -> None:
     )
     command.add_argument("recordings", type=Path, help="folder of sessions; answers in their folders are read too")
     command.add_argument("--plan", type=Path, help="study plan (default: robots are named as in the recordings)")
+    add_ratings_flag(command)
+    command.add_argument("--out", type=Path, help="write the summary and all episodes as JSON")
+    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
+
+
+class RecordedStudy(NamedTuple):
+    """A study as far as it was recorded.
+
+    Attributes:
+        plan: None if robots are named as in the recordings.
+        rows: of the counted episodes, see `study_rows`.
+        left_out: number of further recordings by the reason for which they are left out.
+        ratings: of the blocks, see `study_ratings`.
+    """
+
+    plan: "StudyPlan | None"
+    rows: list[dict[str, Any]]
+    left_out: dict[str, int]
+    ratings: list[dict[str, Any]]
+
+
+def add_ratings_flag(command: argparse.ArgumentParser) -> None:
+    """Adds `--ratings`."""
     command.add_argument(
         "--ratings",
         type=Path,
         metavar="FILE",
         help="CSV or JSON with participant, block and one column per question, beside the answers given in the window",
     )
-    command.add_argument("--out", type=Path, help="write the summary and all episodes as JSON")
-    command.add_argument("--overwrite", action="store_true", help="replace an existing result")
 
 
-def require_recordings(folder: Path) -> None:
-    """
+def read_study(folders: Sequence[Path], plan_file: Path | None, ratings_file: Path | None) -> RecordedStudy:
+    """Reads a study; a wrong plan or file of ratings is reported before the recordings are read.
+
+    Args:
+        folders: of recordings.
+
     Raises:
-        FileFormatError: the folder has no recordings.
+        InvalidValueError: ratings without a plan.
+        FileFormatError: a file is damaged or contradicts the plan, or a folder has no recordings.
+        RunError: no episode counts, or answers and recordings have different sources.
     """
-    if not folder.is_dir() or not visible_files(folder, "*.mcap"):
-        raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
-
-
-def _summarise(arguments: argparse.Namespace) -> dict[str, Any]:
     from .plan import StudyPlan
     from .ratings import read_ratings, study_ratings
     from .recordings import study_rows
+
+    if ratings_file and not plan_file:
+        raise InvalidValueError("--ratings", "--plan too, which names the robot of each block", "none")
+    for folder in folders:
+        if not folder.is_dir() or not visible_files(folder, "*.mcap"):
+            raise FileFormatError(folder, "a folder of recordings", describe_path(folder))
+    plan = StudyPlan.read(plan_file) if plan_file else None
+    rated = read_ratings(ratings_file, plan) if plan and ratings_file else []
+    rows, left_out = study_rows(folders, plan)
+    ratings = study_ratings(folders, plan, rated, ratings_file, rows[0]["source"]) if plan else []
+    return RecordedStudy(plan, rows, left_out, ratings)
+
+
+def _summarise(arguments: argparse.Namespace) -> dict[str, Any]:
     from .summary import summarise_study
 
     if arguments.out:
         require_new(arguments.out, overwrite=arguments.overwrite)
-    if arguments.ratings and not arguments.plan:
-        raise InvalidValueError("--ratings", "--plan too, which names the robot of each block", "none")
-    require_recordings(arguments.recordings)
-    plan = StudyPlan.read(arguments.plan) if arguments.plan else None
-    if plan and arguments.ratings:
-        read_ratings(arguments.ratings, plan)  # a wrong file is reported before the recordings are read
-    rows, left_out = study_rows([arguments.recordings], plan)
-    ratings = study_ratings([arguments.recordings], plan, arguments.ratings, rows[0]["source"])
+    plan, rows, left_out, ratings = read_study([arguments.recordings], arguments.plan, arguments.ratings)
     summary = summarise_study(rows, ratings)
     planned = sum(len(trials) for trials in plan.trials.values()) if plan else None
     counts = {"episodes": len(rows), "planned": planned, "left_out": left_out}
@@ -114,8 +147,7 @@ def _report(summary: dict) -> dict[str, Any]:
 
 
 def _value(measure: dict, scale: float, digits: int, unit: str) -> str:
-    if measure["mean"] is None:
-        return "none"
-    error = measure["standard_error"]
-    spread = "" if error is None else f" ± {scale * error:.{digits}f}"
-    return f"{scale * measure['mean']:.{digits}f}{spread}{unit} (of {measure['participants']} people)"
+    from .summary import mean_text
+
+    people = "" if measure["mean"] is None else f" (of {measure['participants']} people)"
+    return mean_text(measure, scale, digits, unit) + people

@@ -141,6 +141,20 @@ def _ratings(ratings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return results
 
 
+def mean_text(cell: Mapping[str, Any], scale: float, digits: int, unit: str = "") -> str:
+    """A mean of `summarise_study` with its standard error, such as "75.0 ± 11.2 %"; "none" without a value.
+
+    Args:
+        scale: factor of both numbers.
+        digits: after the decimal point.
+    """
+    if cell["mean"] is None:
+        return "none"
+    error = cell["standard_error"]
+    spread = "" if error is None else f" ± {scale * error:.{digits}f}"
+    return f"{scale * cell['mean']:.{digits}f}{spread}{unit}"
+
+
 def _between(values: Sequence[float]) -> dict[str, Any]:
     spread, known = between_runs(values), [value for value in values if np.isfinite(value)]
     return {

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from copolicy.dataset.command_line.commands import Commands, add_command
-from copolicy.dataset.exceptions import OutputExistsError
+from copolicy.dataset.exceptions import FileFormatError, OutputExistsError
+from copolicy.dataset.files.file_kinds import describe_path
 from copolicy.dataset.files.json_file import read_optional_json
 from copolicy.dataset.files.staging import replace_json, replace_text
 
-STUDY = "human table"
-"""Name of the study in `table.json`."""
+from ..human_study.summarise_command import add_ratings_flag, read_study
 
 _NAME, _FILES = "table", (".json", ".md", ".csv")
 
@@ -34,31 +34,18 @@ def add_human_table_command(steps: Commands) -> None:
         help="folders of sessions of one plan, with the answers given in the window",
     )
     command.add_argument("--plan", required=True, type=Path, help="plan of the study, which names the robots")
-    command.add_argument(
-        "--ratings",
-        type=Path,
-        metavar="FILE",
-        help="CSV or JSON with participant, block and one column per question, beside the answers given in the window",
-    )
+    add_ratings_flag(command)
     command.add_argument("--out", required=True, type=Path, metavar="FOLDER", help="folder for table.md, .csv, .json")
 
 
 def _human(arguments: argparse.Namespace) -> dict[str, Any]:
-    from ..human_study.plan import StudyPlan
-    from ..human_study.ratings import read_ratings, study_ratings
-    from ..human_study.recordings import study_rows
-    from ..human_study.summarise_command import require_recordings
-    from .tables import human_table
+    from ..human_study.summary import mean_text
+    from .tables import STUDY, human_table
     from .text import csv_text, markdown
 
-    _require_own_folder(arguments.out)
-    for folder in arguments.recordings:
-        require_recordings(folder)
-    plan = StudyPlan.read(arguments.plan)
-    if arguments.ratings:
-        read_ratings(arguments.ratings, plan)  # a wrong file is reported before the recordings are read
-    rows, left_out = study_rows(arguments.recordings, plan)
-    ratings = study_ratings(arguments.recordings, plan, arguments.ratings, rows[0]["source"])
+    _require_own_folder(arguments.out, STUDY)
+    plan, rows, left_out, ratings = read_study(arguments.recordings, arguments.plan, arguments.ratings)
+    assert plan is not None, "the flag is required"
     table = human_table(rows, ratings, plan, left_out)
     table |= {"rows": rows, "answers": ratings}
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -70,22 +57,17 @@ def _human(arguments: argparse.Namespace) -> dict[str, Any]:
         "unit_of_analysis": table["unit_of_analysis"],
         "episodes": f"{len(rows)} of {table['planned']} planned",
         "left_out": left_out,
-        "success": {row["robot"]: _percent(row["success"]) for row in table["robots"]},
+        "success": {row["robot"]: mean_text(row["success"], 100, 1, " %") for row in table["robots"]},
         "table": str(arguments.out / f"{_NAME}.md"),
     }
 
 
-def _percent(cell: dict[str, Any]) -> str:
-    if cell["mean"] is None:
-        return "none"
-    error = cell["standard_error"]
-    return f"{100 * cell['mean']:.1f}" + ("" if error is None else f" ± {100 * error:.1f}") + " %"
-
-
-def _require_own_folder(out: Path) -> None:
-    """Refuses a folder with files of these names that are not an earlier table, which is written anew."""
+def _require_own_folder(out: Path, study: str) -> None:
+    """Refuses a file, and a folder with files of these names that are not an earlier table, which is written anew."""
+    if out.exists() and not out.is_dir():
+        raise FileFormatError(out, "a folder for the tables", describe_path(out))
     earlier = read_optional_json(out / f"{_NAME}.json", dict[str, Any], "an earlier table") or {}
     for suffix in _FILES:
         path = out / f"{_NAME}{suffix}"
-        if path.exists() and earlier.get("study") != STUDY:
+        if path.exists() and earlier.get("study") != study:
             raise OutputExistsError(path)

@@ -11,6 +11,9 @@ from copolicy.dataset.task import PublishedMethod
 from ..human_study.plan import StudyPlan
 from ..human_study.summary import summarise_study
 
+STUDY = "human table"
+"""Name of the study in `table.json`."""
+
 MEASURES = ("success", "time_s", "wall_time_s", "interaction_mean", "planning_ms")
 """Columns of the tables."""
 
@@ -45,7 +48,7 @@ def human_table(
     missing = [robot.name for robot in plan.robots if robot.name not in summary["robots"]]
     starts = {row["map_id"] for row in rows}
     return {
-        "study": "human table",
+        "study": STUDY,
         "label": summary["label"],
         "source": summary["source"],
         "unit_of_analysis": _UNIT,

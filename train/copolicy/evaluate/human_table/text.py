@@ -5,7 +5,9 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..human_study.summary import mean_text
 from ..markdown_table import markdown_table
+from .tables import MEASURES
 
 _P_SMALLEST = 1e-4
 _NAMES = {"time_s": "simulated time", "interaction_mean": "interaction force"}
@@ -57,10 +59,10 @@ def _robots(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
                 str(row["success"]["participants"]),
                 str(row["episodes"]),
                 _with_deviation(row["success"]),
-                _mean(row["time_s"], 1, 1),
-                _mean(row["wall_time_s"], 1, 1),
-                _mean(row["interaction_mean"], 1, 3),
-                _mean(row["planning_ms"], 1, 2),
+                mean_text(row["time_s"], 1, 1),
+                mean_text(row["wall_time_s"], 1, 1),
+                mean_text(row["interaction_mean"], 1, 3),
+                mean_text(row["planning_ms"], 1, 2),
                 *(_published_results(row) if published else []),
             ]
         )
@@ -84,8 +86,8 @@ def _fronts(rows: Sequence[Mapping[str, Any]], missing: Mapping[str, str]) -> st
                 str(success["participants"]),
                 str(row["episodes"]),
                 *(_number(success[name], 100, 1) for name in ("mean", "sd", "standard_error")),
-                _mean(row["time_s"], 1, 1),
-                _mean(row["interaction_mean"], 1, 3),
+                mean_text(row["time_s"], 1, 1),
+                mean_text(row["interaction_mean"], 1, 3),
                 *(_published_spread(paper) if published else []),
             ]
         )
@@ -107,22 +109,28 @@ def _published_spread(paper: Mapping[str, Any]) -> list[str]:
 
 def _questionnaires(rows: Sequence[Mapping[str, Any]]) -> str:
     robots = list(rows[0]["robots"])
+    scored = {_form(row) for row in rows if row["kind"] == "score"}
     lines = []
     for row in rows:
-        if row["kind"] == "item" and any(other["kind"] == "score" for other in rows):
-            continue  # items are in the CSV and the JSON
+        if row["kind"] == "item" and _form(row) in scored:
+            continue  # its items are in the CSV and the JSON
         scale = "" if row["scale"] is None else f" ({row['scale'][0]:g} to {row['scale'][1]:g})"
         alpha = row.get("alpha")
         test = row["test"]
         lines.append(
             [
                 f"{row['title']}{scale}",
-                *(_mean(row["robots"][name] or {"mean": None}, 1, 2) for name in robots),
+                *(mean_text(row["robots"][name] or {"mean": None}, 1, 2) for name in robots),
                 "" if alpha is None else f"{alpha:.2f}",
                 "" if test is None else f"{test['test']}, p {_p(test['p'])}",
             ]
         )
     return markdown_table(["question, mean ± SE", *robots, "Cronbach's alpha", "differences"], lines)
+
+
+def _form(row: Mapping[str, Any]) -> str:
+    """The name of a question's questionnaire."""
+    return row["question"].partition(".")[0]
 
 
 def _tests(tests: Mapping[str, Any]) -> str:
@@ -163,7 +171,7 @@ def csv_text(table: Mapping[str, Any]) -> str:
     label = table["source"] if table["source"] == "human" else "simulated, no person took part"
     for name, rows in (("robots", table["robots"]), ("fronts", table["fronts"])):
         for row in rows:
-            for measure in ("success", "time_s", "wall_time_s", "interaction_mean", "planning_ms"):
+            for measure in MEASURES:
                 paper = row["published"]
                 values = {
                     "table": name, "label": label, "robot": row["robot"], "front": row.get("front", ""),
@@ -193,15 +201,8 @@ def _without(heads: list[str], lines: list[list[str]], head: str) -> str:
 
 
 def _with_deviation(cell: Mapping[str, Any]) -> str:
-    text = _mean(cell, 100, 1)
+    text = mean_text(cell, 100, 1)
     return text if cell["sd"] is None else f"{text} ({100 * cell['sd']:.1f})"
-
-
-def _mean(cell: Mapping[str, Any], scale: float, digits: int) -> str:
-    if cell["mean"] is None:
-        return "none"
-    error = cell["standard_error"]
-    return f"{scale * cell['mean']:.{digits}f}" + ("" if error is None else f" ± {scale * error:.{digits}f}")
 
 
 def _number(value: float | None, scale: float, digits: int) -> str:
