@@ -27,7 +27,7 @@ from copolicy.evaluate.human_study.design import make_plan, williams_square
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan
 from copolicy.evaluate.human_study.ratings import read_ratings, study_ratings
 from copolicy.evaluate.human_study.schedule import BlindPolicy, StudySchedule
-from copolicy.evaluate.human_study.session import run_session
+from copolicy.evaluate.human_study.session import require_planned_weights, run_session
 from copolicy.evaluate.human_study.summary import summarise_study
 from copolicy.evaluate.partner_study.configurations import front_configurations, study_configurations
 from copolicy.tasks.table.map_config import MapConfig
@@ -429,6 +429,21 @@ def test_other_weights_than_the_plans_are_refused(study, tmp_path):
     robot = Robot("first", str(path), "0" * 64)
     plan = make_plan((robot, ROBOTS[1]), "custom", SHORT, 1, 1, 0)
     with pytest.raises(FileFormatError, match=f"{path}: expected the plan's weights {'0' * 12}, found weights "):
+        run_session(plan, "P01", PlayerSpec("scripted", "S01"), tmp_path / "out", headless=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_processors_than_the_plans_are_refused(study, tmp_path):
+    path = tmp_path / "policy"
+    save_untrained_policy(path)
+    plan = make_plan((Robot.from_checkpoint("first", str(path)), ROBOTS[1]), "custom", SHORT, 1, 1, 0)
+    assert len(plan.to_json()["robots"][0]["processors_sha256"]) == 64
+    require_planned_weights(replace(plan, robots=plan.robots[:1]))
+    changed = path / "policy_preprocessor.json"
+    changed.write_text(changed.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    with pytest.raises(
+        FileFormatError, match=f"{path}: expected the plan's processors [0-9a-f]{{12}} .* found processors"
+    ):
         run_session(plan, "P01", PlayerSpec("scripted", "S01"), tmp_path / "out", headless=True)
     assert not (tmp_path / "out").exists()
 

@@ -15,6 +15,7 @@ from copolicy.dataset.exceptions import FileFormatError, InvalidValueError, Unkn
 from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.scenarios import ScenarioName
 from copolicy.dataset.task import TABLE, PairTask, get_task
+from copolicy.train.processor_files import processors_sha256
 
 from ..study_flags import default_settings
 
@@ -31,12 +32,14 @@ class Robot:
         checkpoint: path of the checkpoint, or `pretrained`.
         weights_sha256: sha256 of its weights when the plan was made.
         method: name of the published method that it implements; empty if it is none.
+        processors_sha256: sha256 of the files of its processors when the plan was made; empty in older plans.
     """
 
     name: str
     checkpoint: str
     weights_sha256: str
     method: str = ""
+    processors_sha256: str = ""
 
     @classmethod
     def from_checkpoint(cls, name: str, checkpoint: str) -> "Robot":
@@ -48,7 +51,7 @@ class Robot:
         config = read_json(folder / "config.json", dict[str, Any], "the configuration of a policy")
         published = get_task(training_conditions(folder).task).studies.published
         method = next((method.name for method in published if method.is_of(config)), "")
-        return cls(name, checkpoint, weights_digest(checkpoint), method)
+        return cls(name, checkpoint, weights_digest(checkpoint), method, processors_sha256(folder))
 
 
 @dataclass(frozen=True)
@@ -210,9 +213,8 @@ def _content(plan: StudyPlan, configurations: Sequence[Mapping[str, Any]]) -> di
     # Plans made before these fields existed keep their digest.
     if not plan.questionnaires:
         del content["questionnaires"]
-    for entry, name in [(robot, "method") for robot in content["robots"]] + [
-        (trial, "front") for trials in content["trials"].values() for trial in trials
-    ]:
+    robots = [(robot, name) for robot in content["robots"] for name in ("method", "processors_sha256")]
+    for entry, name in robots + [(trial, "front") for trials in content["trials"].values() for trial in trials]:
         if not entry[name]:
             del entry[name]
     if (task := content.pop("task_name")) != TABLE:

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from copolicy.collect.agents import Policy, PolicyAgent, PolicyProcess
+from copolicy.collect.agents.checkpoint_folder import checkpoint_folder
 from copolicy.collect.play.session_run import prepared, stopped_by_signals
 from copolicy.collect.play.settings import PlayerSpec
 from copolicy.collect.rollout import EpisodeStart
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.task import get_task
+from copolicy.train.processor_files import processors_sha256
 
 from .plan import Robot, StudyPlan, weights_digest
 from .schedule import BlindPolicy, StudySchedule, StudySettings
@@ -88,16 +90,23 @@ def run_session(
 
 
 def require_planned_weights(plan: StudyPlan) -> None:
-    """Compares the weights of the robots with those of the plan.
+    """Compares the weights and processors of the robots with those of the plan.
 
     Raises:
-        FileFormatError: a checkpoint is missing, or has other weights.
+        FileFormatError: a checkpoint is missing, or has other weights or processors.
     """
     for robot in plan.robots:
         digest = weights_digest(robot.checkpoint)
         if digest != robot.weights_sha256:
             raise FileFormatError(
                 robot.checkpoint, f"the plan's weights {robot.weights_sha256[:12]}", f"weights {digest[:12]}"
+            )
+        processors = processors_sha256(checkpoint_folder(robot.checkpoint))
+        if robot.processors_sha256 not in ("", processors):
+            raise FileFormatError(
+                robot.checkpoint,
+                f"the plan's processors {robot.processors_sha256[:12]} (policy_*processor* files)",
+                f"processors {processors[:12]}",
             )
 
 
