@@ -11,6 +11,7 @@ from copolicy.dataset.files.json_file import read_json
 from copolicy.dataset.files.meta_files import INFO_FILE
 from copolicy.dataset.task import PairTask
 
+from .file_names import split_name
 from .stored_settings import differences
 from .trajectories import SUFFIX, Trajectories, Trajectory, demonstrations, read_trajectories
 
@@ -135,9 +136,7 @@ def _some_maps(source: Source) -> str:
 
 def _parsed(text: str) -> tuple[str, Path, str]:
     """Name, path and robot of `[NAME=]SOURCE[#ROBOT]`; the name is that of the file if there is none."""
-    name, sign, rest = text.partition("=")
-    if not sign or "/" in name or Path(text).exists():
-        name, rest = "", text
+    name, rest = split_name(text)
     robot = ""
     if not Path(rest).exists() and "#" in rest:
         rest, _, robot = rest.rpartition("#")

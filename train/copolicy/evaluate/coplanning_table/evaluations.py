@@ -4,7 +4,6 @@ import argparse
 import json
 import logging
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from copolicy.dataset.scenarios import ScenarioSet
 
 from ..coplan.rollouts import coplan
 from ..coplan.study import coplan_settings, write_coplan_result
+from ..file_names import file_name
 from ..study_flags import Protocol, study_policy
 from .result_files import CHECKPOINTS, json_files, read_result
 from .training_runs import TrainedMethod, TrainingRun
@@ -80,7 +80,7 @@ class Evaluator:
         return weights
 
     def _files(self, method: TrainedMethod) -> list[Path]:
-        folders = [method.source, self._out / "results" / _file_name(method.name)]
+        folders = [method.source, self._out / "results" / file_name(method.name)]
         files = {path.resolve(): path for folder in folders if folder.is_dir() for path in json_files(folder)}
         if any(run.folder == method.source for run in method.runs):  # beside the run
             files |= {path.resolve(): path for path in method.source.resolve().parent.glob("*.json")}
@@ -142,8 +142,8 @@ class Evaluator:
         if (run.folder / CHECKPOINTS).is_dir():
             folder, stem = run.folder / RESULTS, ""
         else:
-            folder, stem = self._out / "results" / _file_name(method.name), f"{run.weights[:8]}_"
-        stem += _file_name(settings["maps"])
+            folder, stem = self._out / "results" / file_name(method.name), f"{run.weights[:8]}_"
+        stem += file_name(settings["maps"])
         paths = (folder / f"{stem}{number}.json" for number in ("", *(f"_{k}" for k in range(2, 10_000))))
         return next(path for path in paths if not os.path.lexists(path))
 
@@ -164,7 +164,3 @@ def _differences(
         for name in names
         if expected.get(name) != found.get(name) and not (both and not (name in expected and name in found))
     ]
-
-
-def _file_name(text: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", text)

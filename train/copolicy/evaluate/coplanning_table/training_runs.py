@@ -16,6 +16,7 @@ from copolicy.dataset.policies.training_run import find_policy_folder
 from copolicy.dataset.task import PublishedMethod, Studies
 from copolicy.train.recipe import RECIPE_FILE, TRAINING_FILE, reached_training
 
+from ..file_names import split_name
 from .result_files import json_files, read_result
 
 _SECONDS = "seconds.json"
@@ -134,9 +135,7 @@ def read_trained_methods(texts: Sequence[str]) -> list[TrainedMethod]:
 
 
 def _method(text: str) -> TrainedMethod:
-    name, mark, path = text.partition("=")
-    if not mark or Path(text).exists():
-        name, path = "", text
+    name, path = split_name(text)
     source = pretrained_folder() if path == PRETRAINED else Path(path)
     folders = list(_run_folders(source, set())) if source.is_dir() else []
     if not folders:

@@ -15,6 +15,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.files.staging import replace_json, require_new
 from copolicy.dataset.task import PairTask
 
+from ..file_names import split_name
 from ..partner_study.configurations import DEFAULT_MAPS, front_configurations, study_configurations
 from ..study_flags import add_protocol_flags, policy_settings, recorded_settings, study_protocol, unseen_entry
 
@@ -68,7 +69,6 @@ def add_plan(steps: Commands) -> None:
 
 
 def _plan(arguments: argparse.Namespace) -> dict[str, Any]:
-    from ..partner_study.robots import split_name
     from .design import make_plan, williams_square
     from .plan import Robot
 

@@ -7,7 +7,6 @@ nothing, random, ...                         a scripted robot
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.features import HUMAN_ACTION
 from copolicy.dataset.task import PairTask, Player, get_task
 
+from ..file_names import split_name
 from ..study_flags import study_policy
 
 if TYPE_CHECKING:
@@ -148,9 +148,3 @@ def split_robot(text: str) -> tuple[str, str, bool]:
     """Splits `NAME=PATH,past_human_action=zero` into name (empty without one), path, and whether it has the option."""
     hides = text.endswith(_HIDE)
     return (*split_name(text.removesuffix(_HIDE)), hides)
-
-
-def split_name(text: str) -> tuple[str, str]:
-    """Splits `NAME=PATH`; the name is empty if there is none (a path may contain `=` after a slash)."""
-    name, sign, path = text.partition("=")
-    return (name, path) if sign and "/" not in name and not Path(text).exists() else ("", text)
