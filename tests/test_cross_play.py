@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from policy_runs import save_run
 from untrained_policy import save_untrained_policy
 
 from copolicy.collect.agents.checkpoint_folder import pretrained_folder
@@ -18,6 +19,7 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.cross_play import cells
 from copolicy.evaluate.cross_play.measures import MEASURES, own_kind_of_start, summary
+from copolicy.evaluate.cross_play.methods import method_result
 from copolicy.evaluate.cross_play.score import counts, in_time, partner_scores, references
 from copolicy.evaluate.partner_study.clearance import smallest_distance
 from copolicy.evaluate.partner_study.study import run_with_partners
@@ -103,6 +105,33 @@ def test_a_robot_with_the_own_kinds_times_is_first_with_certainty():
     assert found["same"]["by_partner"]["q"]["mean"] == 1.0
 
 
+def test_a_method_has_the_mean_and_the_standard_error_of_its_training_seeds():
+    own = {"p": [row("a", 10.0), row("b", 10.0), row("c", 10.0), row("d", 10.0)]}
+
+    def carries(successes: str):
+        return {"p": [row(name, 10.0, name in successes) for name in "abcd"]}
+
+    # Scores of the seeds: 1 and 1/2 of one method, 1/2 and 1/4 of the other.
+    rows = {"A-0": carries("abcd"), "A-1": carries("ab"), "B-0": carries("ab"), "B-1": carries("a"), "no": carries("")}
+    scores = partner_scores(rows, own, list(rows), ["no"])
+    times = own_kind_of_start(own["p"])
+    summaries = {robot: {"p": {"measures": summary(cell["p"], times)}} for robot, cell in rows.items()}
+    methods = {"A": ["A-0", "A-1"], "B": ["B-0", "B-1"]}
+    found = method_result(methods, summaries, scores, rows, own, ["no"])
+    assert found["A"]["score"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
+    assert found["B"]["score"] == {"mean": 0.375, "standard_error": pytest.approx(0.125), "n": 2}
+    assert found["A"]["measures"]["success"]["mean"] == 0.75
+    assert found["A"]["measures"]["time_s"] == {"mean": 10.0, "standard_error": pytest.approx(0.0), "n": 2}
+    assert found["A"]["differences"].keys() == {"no"}
+    assert found["B"]["differences"].keys() == {"A", "no"}
+    against = found["B"]["differences"]["A"]
+    assert against["mean"] == pytest.approx(-0.375)
+    # B minus A on each map, both seeds pooled; the bootstrap draws four of them.
+    by_map = np.array([1 - 1, 0.5 - 1, 0 - 0.5, 0 - 0.5])
+    assert against["standard_error"] == pytest.approx(by_map.std() / 2, rel=0.03)
+    assert method_result({}, summaries, scores, rows, own, ["no"]) == {}
+
+
 def test_the_distance_to_an_obstacle_is_that_of_the_outlines():
     config = MAPS[0]
     (x, y), size = config.squares[0]
@@ -130,6 +159,31 @@ def run(checkpoint, out, *flags):
     limits = ("--configurations", "4", "--step-limit", "30", "--maps", "unseen")
     partners = () if "--partners" in flags else ("--partners", "stubborn")
     return main(["cross-play", "--robots", f"ours={checkpoint}", *partners, "--out", str(out), *limits, *flags])
+
+
+def test_a_folder_with_training_seeds_is_a_method(tmp_path, capsys):
+    for seed in (0, 1):
+        save_run(tmp_path / "runs" / f"seed_{seed}" / "training", seed=seed)
+    assert run(f"{tmp_path / 'runs'}", tmp_path / "out", "--no-floors") == 0
+    result = json.loads((tmp_path / "out" / "matrix.json").read_text(encoding="utf-8"))
+    assert list(result["robots"]) == ["ours-0", "ours-1"]
+    weights = {robot["weights_sha256"] for robot in result["robots"].values()}
+    assert len(weights) == 2
+    method = result["methods"]["ours"]
+    assert method["robots"] == ["ours-0", "ours-1"]
+    assert (method["score"], method["differences"]) == (None, {})  # in 30 steps the own kind does not succeed
+    forces = [result["cells"][robot]["stubborn"]["measures"]["interaction_force"]["mean"] for robot in method["robots"]]
+    assert method["measures"]["interaction_force"] == {
+        "mean": pytest.approx(np.mean(forces)),
+        "standard_error": pytest.approx(abs(forces[0] - forces[1]) / 2),
+        "n": 2,
+    }
+    assert "relative_force" not in result["not_measured"]
+    assert "| ours | 2 | " in (tmp_path / "out" / "matrix.md").read_text(encoding="utf-8")
+    shutil.copytree(tmp_path / "runs" / "seed_1", tmp_path / "runs" / "seed_2")
+    capsys.readouterr()
+    assert run(f"{tmp_path / 'runs'}", tmp_path / "out", "--no-floors") == 2
+    assert "expected another training than" in capsys.readouterr().err
 
 
 def test_each_partner_has_its_own_kind_at_the_robots_seat():

@@ -47,7 +47,8 @@ def add_cross_play_command(commands: Commands) -> None:
         required=True,
         nargs="+",
         metavar="[NAME=]CKPT",
-        help=f"robots: {POLICY_HELP}, with a name in the result; or {', '.join(_NAMES)}. {HIDDEN_HELP}",
+        help=f"robots: {POLICY_HELP}, or a folder with runs of several training seeds, with a name in the result; or "
+        f"{', '.join(_NAMES)}. {HIDDEN_HELP}",
     )
     command.add_argument("--partners", required=True, nargs="+", metavar="PARTNER", help=PARTNERS_HELP)
     floors = "do not add the floors nothing (zero force), random, and the task's first scripted robot"
@@ -77,6 +78,9 @@ def add_cross_play_command(commands: Commands) -> None:
 def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.out.exists() and not arguments.out.is_dir():
         raise InvalidValueError("--out", "a folder", str(arguments.out))
+    from .methods import with_seeds
+
+    arguments.robots, methods = with_seeds(arguments.robots, _NAMES)
     task = _task(arguments)
     named = parse_partners(arguments.partners, task)
     chosen = task.scenario_set(map_set_name(task, arguments.maps, DEFAULT_MAPS))
@@ -125,7 +129,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     with FolderLock(arguments.out / _LOCK, refusal):
         cells = _run(arguments, play, robots, partners)
         floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-        result = matrix_result(task, settings, robots, partners, cells, floor_names)
+        result = matrix_result(task, settings, robots, partners, cells, floor_names, methods)
         result = {"study": "cross-play", "label": partners_label(named, task), **result}
         if overlap:
             result["overlap"] = overlap

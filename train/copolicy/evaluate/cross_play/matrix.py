@@ -1,6 +1,6 @@
 """The result of a cross-play from its cells: measures, scores, what is missing and why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from copolicy.dataset.task import PairTask
@@ -9,6 +9,7 @@ from ..partner_study.robots import StudyRobot
 from ..partners.partner import StudyPartner
 from .cells import OWN_KIND
 from .measures import definitions, not_measured, own_kind_of_start, summary
+from .methods import method_result
 from .score import FACTOR, partner_scores
 
 
@@ -19,6 +20,7 @@ def matrix_result(
     partners: Sequence[StudyPartner],
     cells: dict[str, dict[str, Any]],
     floors: Sequence[str],
+    methods: Mapping[str, Sequence[str]],
 ) -> dict[str, Any]:
     """The entries of `matrix.json` other than study, label and overlap.
 
@@ -26,6 +28,7 @@ def matrix_result(
         settings: the `settings` entry.
         cells: documents of the cells by robot and partner, with the row `own-kind`.
         floors: names of the robots from which the others are to be told apart.
+        methods: names of the robots of each method that has several training seeds.
     """
     own = cells[OWN_KIND]
     times = {partner.name: own_kind_of_start(own[partner.name]["episodes"] if partner.name in own else None)
@@ -72,6 +75,7 @@ def matrix_result(
         "partners": {partner.name: partner.describe() for partner in partners},
         "floors": list(floors),
         "scores": scores,
+        "methods": method_result(methods, summaries, scores, rows, own_rows, floors),
         "cells": summaries,
         "definitions": {"score": score_text, **definitions(task)},
         "not_measured": not_measured(task, summaries),

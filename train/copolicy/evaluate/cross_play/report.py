@@ -16,12 +16,13 @@ _COLUMNS = ("mean", "standard_error", "n")
 
 
 def markdown(result: Mapping[str, Any]) -> str:
-    """Scores and their parts, separation from floors, a table of robots and partners for each measure, definitions."""
+    """Scores of methods and robots, separation from floors, a table of robots and partners for each measure, notes."""
     settings, scores = result["settings"], result["scores"]
     text = [
         f"**Cross-play, {settings['maps']} maps**: {settings['episodes_per_cell']} episodes per cell on "
         f"{settings['configurations']} starts, {settings['actions_per_plan']} action(s) per chunk, at most "
         f"{settings['step_limit']} steps. {result['label']}.",
+        *_methods(result),
         _scores(result),
     ]
     if separation := scores.get("separation"):
@@ -70,6 +71,36 @@ def _scores(result: Mapping[str, Any]) -> str:
         *(label(name, result["settings"]["length_unit"]) for name in shown),
     ]
     return "Scores and their parts, means over partners:\n\n" + markdown_table(head, rows)
+
+
+def _methods(result: Mapping[str, Any]) -> list[str]:
+    """Methods in the order of their scores with standard errors over training seeds, and differences of scores."""
+    methods = result.get("methods", {})
+    if not methods:
+        return []
+    shown = [name for name in MEASURES if name not in result["not_measured"]]
+    units = [label(name, result["settings"]["length_unit"]) for name in shown]
+    rows = [
+        [
+            name,
+            str(len(method["robots"])),
+            estimate_text(method["score"], 100, 1),
+            estimate_text(method["in_time"], 100, 1),
+            *(estimate_text(method["measures"][each], MEASURES[each].scale, MEASURES[each].digits) for each in shown),
+        ]
+        for name, method in sorted(methods.items(), key=lambda item: -(item[1]["score"] or {"mean": 0.0})["mean"])
+    ]
+    head = ["method", "seeds", "partner score, %", "success in time, %", *units]
+    differences = [
+        [name, other, estimate_text(difference, 100, 1), _ratio(difference["standard_errors"])]
+        for name, method in methods.items()
+        for other, difference in method["differences"].items()
+    ]
+    text = ["Methods, mean ± standard error over training seeds:\n\n" + markdown_table(head, rows)]
+    if differences:
+        head = ["method", "against", "difference of scores, points (bootstrap over maps)", "in standard errors"]
+        text.append(markdown_table(head, differences))
+    return text
 
 
 def _over_partners(row: Mapping[str, Any], name: str) -> str:

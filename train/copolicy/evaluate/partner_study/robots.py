@@ -30,8 +30,9 @@ NOTHING = "nothing"
 """Another name of `PASSIVE`."""
 
 _RANDOM_HOLD_S = 0.1
-_HIDE = ",past_human_action=zero"
-HIDDEN_HELP = f"CKPT{_HIDE} is shown zeros as the partner's past action"
+HIDDEN_OPTION = ",past_human_action=zero"
+"""After a checkpoint: the policy is shown zeros as its partner's past action."""
+HIDDEN_HELP = f"CKPT{HIDDEN_OPTION} is shown zeros as the partner's past action"
 
 
 @dataclass(frozen=True)
@@ -140,11 +141,11 @@ def make_robot(text: str, arguments: argparse.Namespace, scripted: Mapping[str, 
     name, path, hides = split_robot(text)
     policy = study_policy(path, arguments)
     if hides:
-        return hidden_partner_robot(name or policy.name + _HIDE, policy)
+        return hidden_partner_robot(name or policy.name + HIDDEN_OPTION, policy)
     return policy_robot(name or policy.name, policy)
 
 
 def split_robot(text: str) -> tuple[str, str, bool]:
     """Splits `NAME=PATH,past_human_action=zero` into name (empty without one), path, and whether it has the option."""
-    hides = text.endswith(_HIDE)
-    return (*split_name(text.removesuffix(_HIDE)), hides)
+    hides = text.endswith(HIDDEN_OPTION)
+    return (*split_name(text.removesuffix(HIDDEN_OPTION)), hides)

@@ -1,0 +1,108 @@
+"""Scores of methods of which a cross-play has several training seeds."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.policies.training_run import find_policy_folder
+
+from ..coplanning_table.training_runs import read_trained_methods
+from ..partner_study.robots import HIDDEN_OPTION, split_robot
+from .measures import MEASURES, Row, mean_and_error
+from .score import Cells, partner_scores
+
+
+def with_seeds(texts: Sequence[str], scripted: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
+    """Replaces each folder that has several training runs by these runs, as robots `NAME-SEED`.
+
+    Args:
+        texts: values of `--robots`.
+        scripted: values that are no checkpoints.
+
+    Returns:
+        The robots, and of each method the names of its robots.
+
+    Raises:
+        FileFormatError: runs of one folder are of different methods, or the same training twice.
+    """
+    robots: list[str] = []
+    methods: dict[str, list[str]] = {}
+    for text in texts:
+        name, path, hides = ("", "", False) if text in scripted else split_robot(text)
+        if not path or not Path(path).is_dir() or find_policy_folder(Path(path)) is not None:
+            robots.append(text)
+            continue
+        (method,) = read_trained_methods([f"{name}={path}" if name else path])
+        option = HIDDEN_OPTION if hides else ""
+        named = {f"{method.name}-{_label(run.seed, index)}": run.folder for index, run in enumerate(method.runs)}
+        robots += [f"{robot}={folder}{option}" for robot, folder in named.items()]
+        methods[method.name] = list(named)
+    return robots, methods
+
+
+def _label(seed: int | None, index: int) -> str:
+    return f"run{index}" if seed is None else str(seed)
+
+
+def method_result(
+    methods: Mapping[str, Sequence[str]],
+    summaries: Mapping[str, Mapping[str, Any]],
+    scores: Mapping[str, Any],
+    rows: Cells,
+    own_rows: Mapping[str, Sequence[Row]],
+    floors: Sequence[str],
+) -> dict[str, Any]:
+    """The entry `methods` of a result.
+
+    Args:
+        methods: robots of each method, one per training seed.
+        summaries: measures of the cells by robot and partner.
+        scores: result of `partner_scores` for the robots.
+        rows: rows by robot and partner.
+        own_rows: rows of each partner's own kind.
+        floors: robots from which methods are to be told apart.
+
+    Returns:
+        For each method its robots, mean and standard error over training seeds of the score, of success in time and of
+        each measure (of a seed: the mean over partners), and `differences`: its score minus that of the first method
+        and of the floors, with all seeds of a method pooled and a bootstrap over maps.
+    """
+    if not methods:
+        return {}
+    by_robot = scores.get("robots", {})
+    first = next(iter(methods))
+    pooled = {name: _pooled([rows[robot] for robot in robots]) for name, robots in methods.items()}
+    references = [*(() if len(methods) == 1 else (first,)), *floors]
+    cells = {**pooled, **{floor: rows[floor] for floor in floors}}
+    separation: dict[str, dict[str, Any]] = {}
+    if by_robot and references:
+        separation = partner_scores(cells, own_rows, list(methods), floors).get("separation", {})
+        against = partner_scores(cells, own_rows, list(methods), [first]).get("separation", {})
+        separation = {name: {**against.get(name, {}), **separation[name]} for name in methods}
+    result = {}
+    for name, robots in methods.items():
+        seeds = [by_robot[robot] for robot in robots if robot in by_robot]
+        result[name] = {
+            "robots": list(robots),
+            "score": mean_and_error([score["mean"] for score in seeds]),
+            "in_time": mean_and_error([score["in_time"] for score in seeds]),
+            "measures": {
+                measure: mean_and_error(list(_over_partners(summaries, robots, measure))) for measure in MEASURES
+            },
+            "differences": separation.get(name, {}),
+        }
+    return result
+
+
+def _pooled(robots: Sequence[Mapping[str, Sequence[Row]]]) -> dict[str, list[Row]]:
+    """Rows of all seeds of a method by partner."""
+    return {partner: [row for robot in robots for row in robot[partner]] for partner in robots[0]}
+
+
+def _over_partners(summaries: Mapping[str, Mapping[str, Any]], robots: Sequence[str], measure: str) -> Iterator[float]:
+    """The mean over partners of each robot that has the measure."""
+    for robot in robots:
+        found = [cell["measures"][measure] for cell in summaries[robot].values()]
+        values = [each["mean"] for each in found if each is not None]
+        if values:
+            yield sum(values) / len(values)
