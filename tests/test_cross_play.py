@@ -204,6 +204,25 @@ def test_a_human_like_player_reacts_as_late_as_people():
     assert len(delays) > 1
 
 
+def test_robots_without_a_policy_do_not_depend_on_the_rate_of_the_first_policy(checkpoint, tmp_path, monkeypatch):
+    out, faster = tmp_path / "out", save_run(tmp_path / "run", fps=30.0)
+    assert run(checkpoint, out) == 0
+    ran = []
+    original = cells.run_with_partners
+    monkeypatch.setattr(
+        cells,
+        "run_with_partners",
+        lambda robot, *rest, **more: ran.append((robot.name, more["fps"])) or original(robot, *rest, **more),
+    )
+    assert run(faster, out, "--overwrite") == 0
+    assert ran == [("own-kind", 30), ("ours", 30), ("nothing", 30), ("never-yields", 30), ("random", 30)]
+    ran.clear()
+    limits = ("--configurations", "4", "--step-limit", "30", "--maps", "unseen", "--partners", "stubborn")
+    robots = (f"slower={checkpoint}", f"ours={faster}")
+    assert main(["cross-play", "--robots", *robots, "--out", str(out), *limits]) == 0
+    assert ran == [("slower", 10)]
+
+
 def test_the_matrix_continues_and_notices_other_settings(checkpoint, tmp_path, capsys, monkeypatch):
     out = tmp_path / "crossplay"
     flags = ("--partners", "stubborn", f"still=proxy:{checkpoint},delay=0.1,noise=0.2,commit=0.2", "--json")

@@ -119,7 +119,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
         task,
         scenarios,
         protocol.settings,
-        lambda robot: protocol.fps if arguments.fps or robot.policy is None else robot.policy.fps,
+        lambda robot: _rate(robot, arguments.fps, task),
         arguments.repeats,
         arguments.seed,
         arguments.partner_seed,
@@ -146,6 +146,13 @@ def _task(arguments: argparse.Namespace) -> PairTask:
             named = parse_partners([text], get_task())[0]
             return checkpoint_task(named.detail)
     return get_task()
+
+
+def _rate(robot: "StudyRobot", fps: int | None, task: PairTask) -> int:
+    """Actions per second of a robot: the given ones or those of a policy's training data; others act at every step."""
+    if robot.policy is None:
+        return task.spec.record_hz
+    return robot.policy.fps if fps is None else fps
 
 
 def _given(floor: str, robots: Sequence[str]) -> bool:
