@@ -64,9 +64,8 @@ def test_losses_of_a_resumed_training_are_not_counted_twice(tmp_path):
 
 
 def test_curves_are_of_the_checkpoints_along_a_training(tmp_path):
-    arguments = SimpleNamespace(
-        out=tmp_path, checkpoints=2, scale=0.5, limit=None, rows=["codp-h"], data=[f"10={tmp_path}"]
-    )
+    (tmp_path / "data" / "pairs-sim-376").mkdir(parents=True)
+    arguments = SimpleNamespace(out=tmp_path, checkpoints=2, scale=0.5, limit=None, rows=["codp-h"], data=None)
     study = rivals.Study(arguments)
     assert study.row("codp-h").steps == 3000
     for step, success in (("001500", 0.25), ("003000", 0.75)):
@@ -86,4 +85,12 @@ def test_curves_are_of_the_checkpoints_along_a_training(tmp_path):
 def test_every_row_names_its_budget():
     table = rivals.budgets(rivals.ROWS)
     assert table.count("\n") == len(rivals.ROWS) + 1
-    assert "| bc-scan-10hz | bc_lstm_gmm, scan | 10 | 6,000 | 100 |" in table
+    assert "| bc-scan-10hz | bc_lstm_gmm, scan | pairs-sim-376 | 10 | 6,000 | 100 |" in table
+
+
+def test_rows_that_read_the_obstacles_as_a_list_learn_from_every_order():
+    order_free = {name for name, row in rivals.ROWS.items() if row.recipe == "pairs-sim-376"}
+    assert order_free == {
+        "codp-h", "codp", "bc-scan", "bc-scan-10hz", "cnn-small", "vrnn-scan", "cogail-scan",
+    }  # fmt: skip
+    assert {row.recipe for name, row in rivals.ROWS.items() if name not in order_free} == {"pairs-sim-376-orders"}
