@@ -126,6 +126,12 @@ def mean_and_error(values: Sequence[float]) -> dict[str, Any] | None:
     return {"mean": float(np.mean(values)), "standard_error": error, "n": n}
 
 
+def over_partners(cells: Mapping[str, Any], name: str) -> float | None:
+    """Mean over partners of a measure of a robot, of its cells by partner; None if no cell has it."""
+    values = [found["mean"] for cell in cells.values() if (found := cell["measures"][name]) is not None]
+    return sum(values) / len(values) if values else None
+
+
 def map_of(row: Row) -> str:
     """The map of an episode without its start orientation, the unit of the bootstrap."""
     return base_name(row["map_id"])

@@ -1,6 +1,6 @@
 """Scores of methods of which a cross-play has several training seeds."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +8,7 @@ from copolicy.dataset.policies.training_run import find_policy_folder
 
 from ..coplanning_table.training_runs import read_trained_methods
 from ..partner_study.robots import HIDDEN_OPTION, split_robot
-from .measures import MEASURES, Row, mean_and_error
+from .measures import MEASURES, Row, mean_and_error, over_partners
 from .score import Cells, partner_scores
 
 
@@ -72,13 +72,12 @@ def method_result(
     by_robot = scores.get("robots", {})
     first = next(iter(methods))
     pooled = {name: _pooled([rows[robot] for robot in robots]) for name, robots in methods.items()}
-    references = [*(() if len(methods) == 1 else (first,)), *floors]
     cells = {**pooled, **{floor: rows[floor] for floor in floors}}
-    separation: dict[str, dict[str, Any]] = {}
-    if by_robot and references:
-        separation = partner_scores(cells, own_rows, list(methods), floors).get("separation", {})
-        against = partner_scores(cells, own_rows, list(methods), [first]).get("separation", {})
-        separation = {name: {**against.get(name, {}), **separation[name]} for name in methods}
+    differences: dict[str, dict[str, Any]] = {name: {} for name in methods}
+    for others in ([first], floors):
+        found = partner_scores(cells, own_rows, list(methods), others)
+        for name, separation in found.get("separation", {}).items():
+            differences[name] |= separation
     result = {}
     for name, robots in methods.items():
         seeds = [by_robot[robot] for robot in robots if robot in by_robot]
@@ -87,9 +86,16 @@ def method_result(
             "score": mean_and_error([score["mean"] for score in seeds]),
             "in_time": mean_and_error([score["in_time"] for score in seeds]),
             "measures": {
-                measure: mean_and_error(list(_over_partners(summaries, robots, measure))) for measure in MEASURES
+                measure: mean_and_error(
+                    [
+                        mean
+                        for mean in (over_partners(summaries[robot], measure) for robot in robots)
+                        if mean is not None
+                    ]
+                )
+                for measure in MEASURES
             },
-            "differences": separation.get(name, {}),
+            "differences": differences[name],
         }
     return result
 
@@ -97,12 +103,3 @@ def method_result(
 def _pooled(robots: Sequence[Mapping[str, Sequence[Row]]]) -> dict[str, list[Row]]:
     """Rows of all seeds of a method by partner."""
     return {partner: [row for robot in robots for row in robot[partner]] for partner in robots[0]}
-
-
-def _over_partners(summaries: Mapping[str, Mapping[str, Any]], robots: Sequence[str], measure: str) -> Iterator[float]:
-    """The mean over partners of each robot that has the measure."""
-    for robot in robots:
-        found = [cell["measures"][measure] for cell in summaries[robot].values()]
-        values = [each["mean"] for each in found if each is not None]
-        if values:
-            yield sum(values) / len(values)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..markdown_table import estimate_text, markdown_table
 from .cells import OWN_KIND
-from .measures import MEASURES, label
+from .measures import MEASURES, label, over_partners
 from .score import FACTOR
 
 SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
@@ -104,9 +104,8 @@ def _methods(result: Mapping[str, Any]) -> list[str]:
 
 
 def _over_partners(row: Mapping[str, Any], name: str) -> str:
-    measure = MEASURES[name]
-    values = [found["mean"] for cell in row.values() if (found := cell["measures"][name]) is not None]
-    return f"{measure.scale * sum(values) / len(values):.{measure.digits}f}" if values else "none"
+    measure, mean = MEASURES[name], over_partners(row, name)
+    return "none" if mean is None else f"{measure.scale * mean:.{measure.digits}f}"
 
 
 def _cell(cell: Mapping[str, Any] | None, name: str) -> str:
