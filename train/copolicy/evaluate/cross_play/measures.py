@@ -79,6 +79,8 @@ MEASURES: dict[str, Measure] = {
 }
 """By name in results, in the order of tables."""
 
+_PROPORTIONS = ("success", "near_misses")  # an episode counts 0 or 1
+
 
 def label(name: str, length_unit: str) -> str:
     """Label of a measure with its unit."""
@@ -108,21 +110,21 @@ def summary(rows: Sequence[Row], own: Callable[[Row], OwnKind | None]) -> dict[s
     result: dict[str, dict[str, Any] | None] = {}
     for name, measure in MEASURES.items():
         values = [measure.value(row, own(row)) for row in rows]
-        result[name] = mean_and_error([value for value in values if value is not None and math.isfinite(value)])
+        known = [value for value in values if value is not None and math.isfinite(value)]
+        result[name] = mean_and_error(known, proportion=name in _PROPORTIONS)
     return result
 
 
-def mean_and_error(values: Sequence[float]) -> dict[str, Any] | None:
+def mean_and_error(values: Sequence[float], proportion: bool = False) -> dict[str, Any] | None:
     """Mean, standard error of the mean (None for one value) and number of values; None without values.
 
-    Of zeros and ones the error is that of a proportion, sqrt(p (1 - p) / n), as in all results; else it is the sample
-    standard deviation (divisor n - 1) over sqrt(n).
+    The error is the sample standard deviation (divisor n - 1) over sqrt(n); of a proportion of zeros and ones it is
+    sqrt(p (1 - p) / n), as in all results.
     """
     if not values:
         return None
     n = len(values)
-    lost = 0 if set(values) <= {0.0, 1.0} else 1
-    error = float(np.std(values, ddof=lost) / math.sqrt(n)) if n > 1 else None
+    error = float(np.std(values, ddof=0 if proportion else 1) / math.sqrt(n)) if n > 1 else None
     return {"mean": float(np.mean(values)), "standard_error": error, "n": n}
 
 
