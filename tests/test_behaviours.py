@@ -17,11 +17,11 @@ from copolicy.evaluate.behaviours import adaptation, forces, leadership, pivot
 from copolicy.evaluate.behaviours.command import _markdown
 from copolicy.evaluate.behaviours.counts import count
 from copolicy.evaluate.behaviours.definitions import behaviours_of
-from copolicy.evaluate.behaviours.motion import Motion, least_frames
+from copolicy.evaluate.behaviours.motion import Motion, common_rate, least_frames
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.file_names import file_names
 from copolicy.evaluate.trajectories import Trajectory
-from copolicy.evaluate.trajectory_sources import common_rate, read_sources
+from copolicy.evaluate.trajectory_sources import read_sources
 from copolicy.tasks.table.agents.route_forces import route_forces
 from copolicy.tasks.table.map_config import MapConfig
 
@@ -56,6 +56,13 @@ def test_who_gives_way_is_who_changes_the_route():
     # The mean over half a second delays each change by up to half of it.
     assert abs(event.first) <= 2
     assert adaptation.adaptations(_motion((states, actions)), None) == [event]
+
+
+def test_the_adaptations_in_which_the_robot_gave_way_are_counted_by_episode():
+    states = _states(np.full(40, 420.0), 300.0)
+    endings = (("LR", "RR"), ("LR", "LL"), ("LR", "LR"), ("RL", "LL"))
+    episodes = [(states, np.concatenate((_along(a, states[:20]), _along(b, states[20:])))) for a, b in endings]
+    assert adaptation.robot_gave_way(_motion(*episodes)).tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 
 
 def test_a_disagreement_that_lasts_is_no_adaptation():
@@ -284,7 +291,7 @@ def test_who_gave_way_is_named_as_the_players_are():
 def test_sources_are_methods_of_one_name_each(study):
     _, sources = read_sources([f"p={study}"])
     assert [source.name for source in sources] == ["p: never-yields", "p: passive"]
-    assert common_rate(sources, 10) == 10
-    assert common_rate(sources, 20) == 15
+    assert common_rate([30, 20]) == 10
+    assert common_rate([30], 20) == 15
     with pytest.raises(CopolicyError, match="expected different names"):
         read_sources([str(study), str(study)])

@@ -96,7 +96,7 @@ def test_cross_play_leaves_out_what_the_task_lacks(runs, tmp_path, capsys):
     # The peg has no exchange of seats: a scripted partner cannot sit at the robot's.
     assert result["no_own_kind"]["helper,noise=0.2"] == "left out: the task 'peg' has no exchange of seats"
     assert set(result["cells"]["own-kind"]) == {"P", "replay:set"}
-    missing = ["interaction_force", "relative_force", "deadlock", "smallest_distance", "near_misses"]
+    missing = ["interaction_force", "relative_force", "deadlock", "smallest_distance", "near_misses", "gave_way"]
     assert list(result["not_measured"]) == missing
     assert result["not_measured"]["interaction_force"] == REASON
     measures = result["cells"]["A"]["helper,noise=0.2"]["measures"]

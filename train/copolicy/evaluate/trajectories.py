@@ -64,6 +64,20 @@ class Trajectories(NamedTuple):
     episodes: Sequence[Trajectory]
 
 
+def trajectory_of(robot: str, episode: "EpisodeResult") -> Trajectory:
+    """The trajectory of a finished episode, with the rounding of a file.
+
+    Args:
+        robot: name of the robot.
+    """
+    assert episode.states is not None
+    assert episode.actions is not None
+    states = np.asarray(episode.states, np.float32)
+    columns = {"robot": robot, **episode.to_json()}
+    actions = np.asarray(episode.actions, np.float32)
+    return Trajectory(states[:-1], actions, states[-1], episode.task.spec.record_hz, episode.scenario, columns)
+
+
 def add_trajectories_flag(command: argparse.ArgumentParser, where: str) -> None:
     """Adds `--trajectories`.
 
@@ -119,14 +133,13 @@ def _write(path: Path, task: PairTask, label: str, episodes: Iterable[NamedEpiso
 
     columns: dict[str, list[Any]] = {name: [] for name in ("episode", "state", "action")}
     rows = []
-    for index, (robot, episode) in enumerate(episodes):
-        assert episode.states is not None
-        assert episode.actions is not None
-        columns["episode"].append(np.full(len(episode.states), index, np.int32))
-        columns["state"].append(np.asarray(episode.states, np.float32))
+    for index, named in enumerate(episodes):
+        each = trajectory_of(*named)
+        columns["episode"].append(np.full(len(each.every_state), index, np.int32))
+        columns["state"].append(each.every_state)
         # The final state has no action.
-        columns["action"].append(np.pad(np.asarray(episode.actions, np.float32), ((0, 1), (0, 0))))
-        rows.append({"scenario": episode.scenario.to_json(), "columns": {"robot": robot, **episode.to_json()}})
+        columns["action"].append(np.pad(each.actions, ((0, 1), (0, 0))))
+        rows.append({"scenario": each.scenario.to_json(), "columns": each.columns})
     arrays = {name: np.concatenate(parts) for name, parts in columns.items()}
     table = pa.table(
         {

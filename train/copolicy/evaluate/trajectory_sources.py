@@ -124,12 +124,6 @@ def require_map(task: PairTask, sources: Sequence[Source], map_id: str) -> list[
     return on_map
 
 
-def common_rate(sources: Sequence[Source], largest: int) -> int:
-    """The largest rate up to `largest` that divides those of all episodes, frames per second."""
-    rates = {rate for source in sources for rate in source.fps}
-    return next(rate for rate in range(largest, 0, -1) if all(each % rate == 0 for each in rates))
-
-
 def _some_maps(source: Source) -> str:
     return ", ".join(sorted({str(episode.columns["map_id"]) for episode in source.episodes})[:3])
 

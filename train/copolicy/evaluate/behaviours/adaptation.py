@@ -92,3 +92,12 @@ def disagreements(motion: Motion, order: Array | None) -> list[Event]:
 def adaptations(motion: Motion, order: Array | None) -> list[Event]:
     """Disagreements after which the players agree."""
     return [event for event in disagreements(motion, order) if event.details["common"]]
+
+
+def robot_gave_way(motion: Motion) -> Array:
+    """`(E, 2)` number of adaptations of each episode, and of those in which the robot gave way, alone or as well."""
+    robot = motion.task.spec.players[0]
+    counts = np.zeros((len(motion.frames.rows), 2), int)
+    for event in adaptations(motion, None):
+        counts[event.episode] += (1, event.details[robot] != event.details["common"])
+    return counts

@@ -14,14 +14,13 @@ from copolicy.dataset.files.staging import replace_json, replace_text, require_n
 
 from ..file_names import file_names
 from ..markdown_table import markdown_table
-from ..trajectory_sources import SOURCE_HELP, common_rate, read_sources
+from ..trajectory_sources import SOURCE_HELP, read_sources
 
 if TYPE_CHECKING:
     from .definitions import Behaviour
     from .motion import Event, Motion
 
 _FILES = ("behaviours.json", "behaviours.md", "behaviours.csv")
-_LARGEST_RATE = 10  # frames a second: leadership and preferences are defined over tenths of a second
 
 
 def add_behaviours_command(commands: Commands) -> None:
@@ -49,10 +48,10 @@ def _behaviours(arguments: argparse.Namespace) -> dict[str, Any]:
     from .clips import write_clip  # pygame
     from .counts import INTERVALS, count, rate_text
     from .definitions import behaviours_of
-    from .motion import Motion
+    from .motion import Motion, common_rate
 
     task, sources = read_sources(arguments.sources)
-    fps = common_rate(sources, _LARGEST_RATE)
+    fps = common_rate(rate for source in sources for rate in source.fps)
     chosen = behaviours_of(task)
     counted = [behaviour for behaviour in chosen if not behaviour.missing]
     result: dict[str, Any] = {

@@ -42,13 +42,18 @@ class Behaviour(NamedTuple):
     missing: str = ""
 
 
+def without_strategies(task: PairTask) -> str:
+    """The part that a task lacks for disagreement and adaptation; empty if it lacks none."""
+    undefined = type(task.studies).strategy_actions is Studies.strategy_actions
+    return "actions of each strategy (`studies.strategy_actions`)" if undefined else ""
+
+
 def behaviours_of(task: PairTask) -> list[Behaviour]:
     """All behaviours, in the order of tables; those that the task does not define have a `missing` part."""
     robot, human = task.spec.players
     figures = task.studies.figures
     levels = figures.thresholds if figures is not None and task.offers("interaction") else ()
-    undefined = type(task.studies).strategy_actions is Studies.strategy_actions
-    no_strategy = "actions of each strategy (`studies.strategy_actions`)" if undefined else ""
+    no_strategy = without_strategies(task)
     prefer = (
         f"A player prefers the strategy that its action (mean over {adaptation.SMOOTHING_S:g} s) follows by "
         f"{adaptation.MARGIN:g} of a full action more than any other within reach."

@@ -1,7 +1,7 @@
 """The episodes of one method at a common rate, with what the detectors of behaviours need of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -32,6 +32,16 @@ class Event(NamedTuple):
     end: int
     score: float
     details: dict[str, str]
+
+
+LARGEST_RATE = 10
+"""Largest common rate, frames per second: leadership and preferences are defined over tenths of a second."""
+
+
+def common_rate(rates: Iterable[int], largest: int = LARGEST_RATE) -> int:
+    """The largest rate up to `largest` that divides all `rates`, frames per second."""
+    distinct = set(rates)
+    return next(rate for rate in range(largest, 0, -1) if all(each % rate == 0 for each in distinct))
 
 
 def least_frames(seconds: float, fps: float) -> int:

@@ -20,7 +20,7 @@ from ..partners.partner import StudyPartner
 from ..stored_settings import require_same_settings, without_run
 from ..trajectories import trajectories_beside, write_result
 from ..trajectory_sources import CELLS
-from .measures import Row, episode_row
+from .measures import episode_rows
 
 OWN_KIND = "own-kind"
 """Row of the matrix in which each partner meets its own kind."""
@@ -95,7 +95,9 @@ def run_cell(
     if path.exists() and not overwrite:
         stored = read_json(path, CellDocument, "a cell of a cross-play")
         require_same_settings(path, stored["settings"], settings)
-        if not trajectories or trajectories_beside(path).exists():
+        # A cell of an earlier version, which did not count adaptations, is run again.
+        complete = all("adaptations" in row for row in stored["episodes"])
+        if complete and (not trajectories or trajectories_beside(path).exists()):
             return stored
     already = 0 if robot.policy is None else len(robot.policy.inference_seconds)
     started = perf_counter()
@@ -112,7 +114,6 @@ def run_cell(
     )
     wall_s = perf_counter() - started
     inference = [] if robot.policy is None else robot.policy.inference_seconds[already:]
-    rows: list[Row] = [episode_row(episode) for episode in episodes]
     cell: CellDocument = {
         "study": "cross-play cell",
         "robot": robot.name,
@@ -120,7 +121,7 @@ def run_cell(
         "settings": settings,
         "wall_s": wall_s,
         "planning_ms_per_call": 1e3 * float(np.median(inference)) if inference else None,
-        "episodes": rows,
+        "episodes": episode_rows(play.task, robot.name, episodes),
     }
     label = f"{robot.name} with {partner.name}, no person took part in the study"
     named = ((robot.name, episode) for episode in episodes)

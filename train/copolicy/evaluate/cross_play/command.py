@@ -223,7 +223,9 @@ def _write(out: Path, result: dict[str, Any]) -> dict[str, Any]:
     return {
         "label": result["label"],
         "partner_score": {
-            robot: _percent(score) + (f", first in {100 * score['first']:.0f} %" if "first" in score else "")
+            robot: _percent(score)
+            + (f", first in {100 * score['first']:.0f} %" if "first" in score else "")
+            + _yielding(result["gave_way"].get("robots", {}).get(robot))
             for robot, score in sorted(scores.items(), key=lambda item: -item[1]["mean"])
         },
         "result": str(files[".json"]),
@@ -232,6 +234,10 @@ def _write(out: Path, result: dict[str, Any]) -> dict[str, Any]:
         **({"not_measured": result["not_measured"]} if result["not_measured"] else {}),
         **({"no_own_kind": result["no_own_kind"]} if result["no_own_kind"] else {}),
     }
+
+
+def _yielding(found: dict[str, Any] | None) -> str:
+    return "" if found is None else f", gave way in {_percent(found)} of {found['adaptations']} adaptations"
 
 
 def _percent(score: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ from ..partners.partner import StudyPartner
 from .cells import OWN_KIND
 from .measures import definitions, not_measured, own_kind_of_start, summary
 from .methods import method_result
-from .score import FACTOR, partner_scores
+from .score import FACTOR, gave_way, partner_scores
 
 
 def matrix_result(
@@ -75,6 +75,7 @@ def matrix_result(
         "partners": {partner.name: partner.describe() for partner in partners},
         "floors": list(floors),
         "scores": scores,
+        "gave_way": gave_way(rows, [robot.name for robot in robots], floors),
         "methods": method_result(methods, summaries, scores, rows, own_rows, floors),
         "cells": summaries,
         "definitions": {"score": score_text, **definitions(task)},

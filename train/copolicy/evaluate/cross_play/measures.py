@@ -9,7 +9,11 @@ import numpy as np
 from copolicy.dataset.scenarios import base_name
 from copolicy.dataset.task import PairTask
 
+from ..behaviours.adaptation import SHORTEST_S, WITHIN_S, robot_gave_way
+from ..behaviours.definitions import without_strategies
+from ..behaviours.motion import Motion, common_rate
 from ..partner_study.episode_result import DEADLOCK_S, PartnerEpisodeResult
+from ..trajectories import trajectory_of
 
 Row = dict[str, Any]
 """Row of an episode in the file of a cell."""
@@ -66,6 +70,10 @@ def _near_miss(row: Row, own: OwnKind | None) -> float | None:
     return None if row["near_miss"] is None else float(row["near_miss"])
 
 
+def _gave_way(row: Row, own: OwnKind | None) -> float | None:
+    return row["robot_gave_way"] / row["adaptations"] if row["adaptations"] else None
+
+
 MEASURES: dict[str, Measure] = {
     "success": Measure("success, %", 1, 100, False, lambda row, own: float(row["success"])),
     "time_s": Measure("time of successes, s", 1, 1, True, _time),
@@ -76,6 +84,7 @@ MEASURES: dict[str, Measure] = {
     "deadlock": Measure("time in deadlock, %", 1, 100, True, _deadlock),
     "smallest_distance": Measure("smallest distance", 1, 1, False, lambda row, own: row["smallest_distance"]),
     "near_misses": Measure("near misses, %", 1, 100, True, _near_miss),
+    "gave_way": Measure("robot gave way, %", 1, 100, None, _gave_way),
 }
 """By name in results, in the order of tables."""
 
@@ -88,11 +97,24 @@ def label(name: str, length_unit: str) -> str:
     return f"{text}, {length_unit}" if name == "smallest_distance" and length_unit else text
 
 
-def episode_row(episode: PartnerEpisodeResult) -> Row:
-    """The row of an episode: that of the partner study, with the smallest distance to an obstacle."""
-    distance, limit = episode.smallest_distance, episode.task.studies.near_miss
-    near = None if distance is None or limit is None else distance < limit
-    return {**episode.to_json(), "smallest_distance": distance, "near_miss": near}
+def episode_rows(task: PairTask, robot: str, episodes: Sequence[PartnerEpisodeResult]) -> list[Row]:
+    """Rows of episodes: those of the partner study, with the smallest distance to an obstacle, and who gave way.
+
+    Args:
+        robot: name of the robot.
+    """
+    rows = []
+    counted: Sequence[Sequence[int | None]] = [(None, None)] * len(episodes)
+    if not without_strategies(task):
+        trajectories = [trajectory_of(robot, episode) for episode in episodes]
+        counted = robot_gave_way(Motion(task, trajectories, common_rate([task.spec.record_hz]))).tolist()
+    limit = task.studies.near_miss
+    for episode, (adaptations, gave_way) in zip(episodes, counted, strict=True):
+        distance = episode.smallest_distance
+        near = None if distance is None or limit is None else distance < limit
+        own = {"smallest_distance": distance, "near_miss": near}
+        rows.append({**episode.to_json(), **own, "adaptations": adaptations, "robot_gave_way": gave_way})
+    return rows
 
 
 def own_kind_of_start(rows: Sequence[Row] | None) -> Callable[[Row], OwnKind | None]:
@@ -159,6 +181,9 @@ def definitions(task: PairTask) -> dict[str, str]:
         "smallest_distance": f"smallest distance of the outlines of body and obstacles in an episode, {unit}",
         **({} if limit is None else {"near_misses": f"episodes with a smallest distance below {limit:g} {unit}, of all "
                                                     "episodes, collisions included"}),
+        "gave_way": "proportion of the adaptations of an episode in which the robot gave way, alone or as well as the "
+        f"partner; only of episodes with one: the players preferred different strategies for {SHORTEST_S:g} s or more "
+        f"and, within {WITHIN_S:g} s, the same",
         "wall_s": "wall time of the simulation of the cell, with inference",
     }  # fmt: skip
 
@@ -172,10 +197,11 @@ def not_measured(task: PairTask, cells: Mapping[str, Mapping[str, Any]]) -> dict
         "deadlock": "measure of standing still (`studies.at_rest`)",
         "smallest_distance": "obstacles in its outline",
         "near_misses": "obstacles in its outline, or no distance of a near miss (`studies.near_miss`)",
+        "gave_way": without_strategies(task),
     }
     null = [
         name for name in parts if all(cell["measures"][name] is None for row in cells.values() for cell in row.values())
     ]
     if "interaction_force" not in null and "relative_force" in null:
         null.remove("relative_force")  # an own kind without success is the reason, which `no_own_kind` names
-    return {name: task.missing(parts[name]) for name in null}
+    return {name: task.missing(parts[name]) if parts[name] else "no adaptation in any episode" for name in null}

@@ -9,7 +9,7 @@ from copolicy.dataset.policies.training_run import find_policy_folder
 from ..coplanning_table.training_runs import read_trained_methods
 from ..partner_study.robots import HIDDEN_OPTION, split_robot
 from .measures import MEASURES, Row, mean_and_error, over_partners
-from .score import Cells, partner_scores
+from .score import Cells, gave_way, partner_scores
 
 
 def with_seeds(texts: Sequence[str], scripted: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
@@ -64,8 +64,9 @@ def method_result(
 
     Returns:
         For each method its robots, mean and standard error over training seeds of the score, of success in time and of
-        each measure (of a seed: the mean over partners), and `differences`: its score minus that of the first method
-        and of the floors, with all seeds of a method pooled and a bootstrap over maps.
+        each measure (of a seed: the mean over partners), and `differences` and `gave_way_differences`: its score and
+        the proportion of `gave_way` minus those of the first method and of the floors, with all seeds of a method
+        pooled and a bootstrap over maps.
     """
     if not methods:
         return {}
@@ -74,10 +75,13 @@ def method_result(
     pooled = {name: _pooled([rows[robot] for robot in robots]) for name, robots in methods.items()}
     cells = {**pooled, **{floor: rows[floor] for floor in floors}}
     differences: dict[str, dict[str, Any]] = {name: {} for name in methods}
+    yielding: dict[str, dict[str, Any]] = {name: {} for name in methods}
     for others in ([first], floors):
         found = partner_scores(cells, own_rows, list(methods), others)
         for name, separation in found.get("separation", {}).items():
             differences[name] |= separation
+        for name, separation in gave_way(cells, list(methods), others).get("separation", {}).items():
+            yielding[name] |= separation
     result = {}
     for name, robots in methods.items():
         seeds = [by_robot[robot] for robot in robots if robot in by_robot]
@@ -96,6 +100,7 @@ def method_result(
                 for measure in MEASURES
             },
             "differences": differences[name],
+            "gave_way_differences": yielding[name],
         }
     return result
 

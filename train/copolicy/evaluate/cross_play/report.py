@@ -12,12 +12,19 @@ from .score import FACTOR
 
 SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
 
+_DIFFERENCES = (
+    "difference of scores, points",
+    "in standard errors",
+    "difference in how often the robot gave way, points",
+    "in standard errors",
+)
 _COLUMNS = ("mean", "standard_error", "n")
 
 
 def markdown(result: Mapping[str, Any]) -> str:
     """Scores of methods and robots, separation from floors, a table of robots and partners for each measure, notes."""
     settings, scores = result["settings"], result["scores"]
+    yielding = result["gave_way"].get("separation", {})
     text = [
         f"**Cross-play, {settings['maps']} maps**: {settings['episodes_per_cell']} episodes per cell on "
         f"{settings['configurations']} starts, {settings['actions_per_plan']} action(s) per chunk, at most "
@@ -27,11 +34,11 @@ def markdown(result: Mapping[str, Any]) -> str:
     ]
     if separation := scores.get("separation"):
         rows = [
-            [robot, floor, estimate_text(difference, 100, 1), _ratio(difference["standard_errors"])]
+            [robot, floor, *_difference(difference), *_difference(yielding.get(robot, {}).get(floor))]
             for robot, floors in separation.items()
             for floor, difference in floors.items()
         ]
-        text.append(markdown_table(["robot", "floor", "difference of scores, points", "in standard errors"], rows))
+        text.append(markdown_table(["robot", "floor", *_DIFFERENCES], rows))
     partners = list(result["partners"])
     if scores:
         rows = [
@@ -92,14 +99,14 @@ def _methods(result: Mapping[str, Any]) -> list[str]:
     ]
     head = ["method", "seeds", "partner score, %", "success in time, %", *units]
     differences = [
-        [name, other, estimate_text(difference, 100, 1), _ratio(difference["standard_errors"])]
+        [name, other, *_difference(difference), *_difference(method["gave_way_differences"].get(other))]
         for name, method in methods.items()
         for other, difference in method["differences"].items()
     ]
     text = ["Methods, mean ± standard error over training seeds:\n\n" + markdown_table(head, rows)]
     if differences:
-        head = ["method", "against", "difference of scores, points (bootstrap over maps)", "in standard errors"]
-        text.append(markdown_table(head, differences))
+        head = ["method", "against", *_DIFFERENCES]
+        text.append("With a bootstrap over maps:\n\n" + markdown_table(head, differences))
     return text
 
 
@@ -113,8 +120,12 @@ def _cell(cell: Mapping[str, Any] | None, name: str) -> str:
     return "none" if cell is None else estimate_text(cell["measures"][name], measure.scale, measure.digits)
 
 
-def _ratio(value: float | None) -> str:
-    return "unknown" if value is None else f"{value:.1f}"
+def _difference(difference: Mapping[str, Any] | None) -> tuple[str, str]:
+    """A difference in points, and in standard errors; None if one of both has no value."""
+    if difference is None:
+        return "none", "none"
+    ratio = difference["standard_errors"]
+    return estimate_text(difference, 100, 1), "unknown" if ratio is None else f"{ratio:.1f}"
 
 
 def csv_text(result: Mapping[str, Any]) -> str:

@@ -17,7 +17,8 @@ import numpy as np
 from copolicy.dataset.arrays import Array
 
 from ..comparison.paired import REPLICATES
-from .measures import OwnKind, Row, map_of
+from .map_bootstrap import MapBootstrap
+from .measures import MEASURES, OwnKind, Row, map_of
 
 FACTOR = 1.5
 """Factor on the own kind's median time and force within which an episode counts."""
@@ -74,63 +75,64 @@ def partner_scores(
     by_partner_maps = {name: found for name, rows in own_rows.items() if (found := references(rows)) is not None}
     if not by_partner_maps:
         return {}
-    rng = np.random.default_rng(seed)
-    weights: dict[tuple[str, ...], Array] = {}
-    means: dict[str, dict[str, float]] = {robot: {} for robot in cells}
-    replicates: dict[str, dict[str, Array]] = {robot: {} for robot in cells}
+    values: dict[str, dict[str, list[tuple[str, float]]]] = {robot: {} for robot in cells}
     timely: dict[str, list[float]] = {robot: [] for robot in cells}
     for partner, reference in by_partner_maps.items():
-        maps = tuple(reference)
-        if maps not in weights:
-            uniform = np.full(len(maps), 1 / len(maps))
-            weights[maps] = rng.multinomial(len(maps), uniform, size=REPLICATES).astype(float)
-        index = {name: position for position, name in enumerate(maps)}
         for robot, by_partner in cells.items():
             rows = by_partner[partner]
-            positions = [index[map_of(row)] for row in rows]
-            counted = [counts(row, reference[map_of(row)]) for row in rows]
+            values[robot][partner] = [(map_of(row), counts(row, reference[map_of(row)])) for row in rows]
             timely[robot].append(float(np.mean([in_time(row, reference[map_of(row)]) for row in rows])))
-            sums = np.bincount(positions, counted, minlength=len(maps))
-            episodes = np.bincount(positions, minlength=len(maps))
-            means[robot][partner] = float(sums.sum() / episodes.sum())
-            replicates[robot][partner] = (weights[maps] @ sums) / (weights[maps] @ episodes)
-    totals = {robot: np.mean(list(by_partner.values()), axis=0) for robot, by_partner in replicates.items()}
-    first = _first({robot: totals[robot] for robot in ranked})
-    # With one map every replicate is the same, which is no uncertainty of zero.
-    known = all(len(maps) > 1 for maps in weights)
+    bootstrap = MapBootstrap.of(values, {partner: list(maps) for partner, maps in by_partner_maps.items()}, seed)
+    first = _first({robot: bootstrap.totals(robot) for robot in ranked})
     robots = {
         robot: {
-            **_estimate(float(np.mean(list(means[robot].values()))), totals[robot], known),
+            **bootstrap.estimate(robot),
             "in_time": float(np.mean(timely[robot])),
-            "by_partner": {
-                partner: _estimate(mean, replicates[robot][partner], known) for partner, mean in means[robot].items()
-            },
+            "by_partner": {partner: bootstrap.estimate(robot, partner) for partner in by_partner_maps},
             **({"first": first[robot]} if robot in first else {}),
         }
         for robot in cells
     }
-    separation = {
-        robot: {
-            floor: _difference(robots[robot]["mean"] - robots[floor]["mean"], totals[robot] - totals[floor], known)
-            for floor in floors
-        }
-        for robot in ranked
-        if robot not in floors
+    return {
+        "robots": robots,
+        "separation": bootstrap.differences(ranked, floors),
+        "maps": bootstrap.maps,
+        "replicates": REPLICATES,
     }
-    return {"robots": robots, "separation": separation, "maps": max(map(len, weights)), "replicates": REPLICATES}
 
 
-def _estimate(mean: float, values: Array, known: bool) -> dict[str, Any]:
-    if not known:
-        return {"mean": mean, "standard_error": None, "bootstrap_95": None}
-    low, high = np.quantile(values, (0.025, 0.975))
-    return {"mean": mean, "standard_error": float(values.std()), "bootstrap_95": [float(low), float(high)]}
+def gave_way(cells: Cells, ranked: Sequence[str], floors: Sequence[str], seed: int = 0) -> dict[str, Any]:
+    """Who gives way, as the score does not see it: proportion of adaptations in which the robot did, over partners.
 
+    Args:
+        ranked, floors: see `partner_scores`; robots without an adaptation are left out.
 
-def _difference(mean: float, values: Array, known: bool) -> dict[str, Any]:
-    estimate = _estimate(mean, values, known)
-    error = estimate["standard_error"]
-    return {**estimate, "standard_errors": mean / error if error else None}
+    Returns:
+        `robots` with mean, standard error, interval and number of adaptations; `separation` of robots from floors;
+        empty if there is no adaptation.
+    """
+    measure = MEASURES["gave_way"].value
+    values: dict[str, dict[str, list[tuple[str, float]]]] = {}
+    numbers: dict[str, int] = {}
+    for robot, by_partner in cells.items():
+        found = {
+            partner: [(map_of(row), value) for row in rows if (value := measure(row, None)) is not None]
+            for partner, rows in by_partner.items()
+        }
+        if any(found.values()):
+            values[robot] = found
+            numbers[robot] = sum(row["adaptations"] for rows in by_partner.values() for row in rows)
+    if not values:
+        return {}
+    every = next(iter(cells.values()))
+    maps = {partner: list(dict.fromkeys(map(map_of, rows))) for partner, rows in every.items()}
+    bootstrap = MapBootstrap.of(values, maps, seed)
+    return {
+        "robots": {robot: {**bootstrap.estimate(robot), "adaptations": number} for robot, number in numbers.items()},
+        "separation": bootstrap.differences(
+            [robot for robot in ranked if robot in values], [floor for floor in floors if floor in values]
+        ),
+    }
 
 
 def _first(totals: Mapping[str, Array]) -> dict[str, float]:

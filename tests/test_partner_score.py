@@ -1,0 +1,162 @@
+"""The partner score: what counts, its uncertainty over maps, methods of several training seeds, and who gave way."""
+
+import numpy as np
+import pytest
+
+from copolicy.dataset.task import get_task
+from copolicy.evaluate.cross_play.measures import own_kind_of_start, summary
+from copolicy.evaluate.cross_play.methods import method_result
+from copolicy.evaluate.cross_play.score import counts, gave_way, in_time, partner_scores, references
+from copolicy.evaluate.partner_study.clearance import smallest_distance
+from copolicy.tasks.table.maps import MAP_SETS
+
+TABLE = get_task("table")
+MAPS = MAP_SETS["training"]
+
+
+def row(map_id, time_s, success=True, start=0):
+    names = ("interaction_mean", "robot_share", "deadlock_s", "smallest_distance", "near_miss", "adaptations")
+    values = dict.fromkeys(names)
+    return {"map_index": start, "map_id": map_id, "time_s": time_s, "success": success, **values}
+
+
+def test_a_success_counts_within_one_and_a_half_times_the_own_kinds_median_on_the_map():
+    own = [row("a", 10.0), row("a", 20.0), row("b", 40.0, False), row("a-90deg", 90.0, False)]
+    found = references(own)
+    assert found is not None
+    assert {name: found[name].time_s for name in ("a", "b")} == {"a": 15.0, "b": 15.0}  # no success on b: over all maps
+    rows = [row("a", 22.5), row("a", 22.6), row("b", 22.0), row("a", 5.0, False)]
+    assert [counts(each, found[each["map_id"]]) for each in rows] == [True, False, True, False]
+    assert references([row("a", 1.0, False)]) is None
+
+
+def test_a_success_against_the_partner_is_in_time_but_does_not_count():
+    own = [{**row("a", 10.0), "interaction_mean": 0.1}, {**row("a", 10.0), "interaction_mean": 0.3}]
+    found = references(own)
+    assert found is not None
+    assert found["a"].force == 0.2
+    for force, expected in ((0.3, True), (0.31, False)):
+        episode = {**row("a", 10.0), "interaction_mean": force}
+        assert in_time(episode, found["a"])
+        assert counts(episode, found["a"]) is expected
+
+
+def test_times_relate_to_the_own_kind_on_the_same_start():
+    times = own_kind_of_start([row("a", 10.0, start=0), row("a", 20.0, start=0), row("a", 50.0, False, start=1)])
+    measured = summary([row("a", 30.0, start=0), row("a", 30.0, start=1), row("a", 60.0, False, start=0)], times)
+    assert measured["relative_time"] == {"mean": 2.0, "standard_error": None, "n": 1}
+    assert measured["time_s"] == {"mean": 30.0, "standard_error": 0.0, "n": 2}
+    assert measured["success"] == {"mean": 2 / 3, "standard_error": pytest.approx((2 / 27) ** 0.5), "n": 3}
+    assert measured["interaction_force"] is measured["relative_force"] is None
+    spread = summary([row("a", 20.0), row("a", 40.0)], times)["time_s"]
+    assert spread == {"mean": 30.0, "standard_error": pytest.approx(10.0), "n": 2}
+    own = own_kind_of_start([{**row("a", 10.0), "interaction_mean": 0.2}])
+    found = summary([{**row("a", 20.0, False), "interaction_mean": 0.5}], own)["relative_force"]
+    assert found == {"mean": 2.5, "standard_error": None, "n": 1}
+
+
+def test_scores_and_the_uncertainty_of_their_ranking_come_from_the_maps():
+    names = [f"m{index}" for index in range(20)]
+    own = {"p": [row(name, 10.0) for name in names]}
+    good = {"p": [row(name, 10.0 if index < 14 else 90.0) for index, name in enumerate(names)]}
+    near = {"p": [row(name, 10.0 if index >= 7 else 90.0) for index, name in enumerate(names)]}
+    bad = {"p": [row(name, 90.0) for name in names]}
+    found = partner_scores({"good": good, "near": near, "bad": bad}, own, ["good", "near", "bad"], ["bad"])
+    robots = found["robots"]
+    assert [robots[name]["mean"] for name in ("good", "near", "bad")] == [0.7, 0.65, 0.0]
+    # A proportion of 20 independent maps.
+    assert robots["good"]["standard_error"] == pytest.approx((0.7 * 0.3 / 20) ** 0.5, rel=0.03)
+    assert robots["good"]["first"] > robots["near"]["first"] > 0.25
+    assert robots["bad"]["first"] == 0
+    assert sum(robots[name]["first"] for name in robots) == pytest.approx(1)
+    assert set(found["separation"]) == {"good", "near"}
+    apart = found["separation"]["good"]["bad"]
+    assert apart["standard_errors"] == pytest.approx(0.7 / robots["good"]["standard_error"], rel=1e-6)
+    assert partner_scores({"good": good}, {"p": [row("a", 1.0, False)]}, ["good"], []) == {}
+
+
+def test_a_robot_with_the_own_kinds_times_is_first_with_certainty():
+    own = {"p": [row("a", 10.0), row("b", 12.0)], "q": [row("a", 30.0), row("b", 30.0)]}
+    bad = {"p": [row("a", 99.0), row("b", 99.0)], "q": [row("a", 99.0), row("b", 99.0)]}
+    found = partner_scores({"same": own, "bad": bad}, own, ["same", "bad"], ["bad"])["robots"]
+    assert (found["same"]["mean"], found["same"]["first"]) == (1.0, 1.0)
+    assert found["same"]["by_partner"]["q"]["mean"] == 1.0
+
+
+def test_a_method_has_the_mean_and_the_standard_error_of_its_training_seeds():
+    own = {"p": [row("a", 10.0), row("b", 10.0), row("c", 10.0), row("d", 10.0)]}
+
+    def carries(successes: str):
+        return {"p": [row(name, 10.0, name in successes) for name in "abcd"]}
+
+    # Scores of the seeds: 1 and 1/2 of one method, 1/2 and 1/4 of the other.
+    rows = {"A-0": carries("abcd"), "A-1": carries("ab"), "B-0": carries("ab"), "B-1": carries("a"), "no": carries("")}
+    scores = partner_scores(rows, own, list(rows), ["no"])
+    times = own_kind_of_start(own["p"])
+    summaries = {robot: {"p": {"measures": summary(cell["p"], times)}} for robot, cell in rows.items()}
+    methods = {"A": ["A-0", "A-1"], "B": ["B-0", "B-1"]}
+    found = method_result(methods, summaries, scores, rows, own, ["no"])
+    assert found["A"]["score"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
+    assert found["B"]["score"] == {"mean": 0.375, "standard_error": pytest.approx(0.125), "n": 2}
+    assert found["A"]["measures"]["success"]["mean"] == 0.75
+    assert found["A"]["measures"]["time_s"] == {"mean": 10.0, "standard_error": pytest.approx(0.0), "n": 2}
+    assert found["A"]["differences"].keys() == {"no"}
+    assert found["B"]["differences"].keys() == {"A", "no"}
+    against = found["B"]["differences"]["A"]
+    assert against["mean"] == pytest.approx(-0.375)
+    # B minus A on each map, both seeds pooled; the bootstrap draws four of them.
+    by_map = np.array([1 - 1, 0.5 - 1, 0 - 0.5, 0 - 0.5])
+    assert against["standard_error"] == pytest.approx(by_map.std() / 2, rel=0.03)
+    assert method_result({}, summaries, scores, rows, own, ["no"]) == {}
+
+
+def test_the_distance_to_an_obstacle_is_that_of_the_outlines():
+    config = MAPS[0]
+    (x, y), size = config.squares[0]
+
+    def distance(*pose):
+        return smallest_distance(TABLE, config, TABLE.states_of(np.array([[*pose, 0.0, 0.0, 0.0]])))
+
+    # The board's right half beside the obstacle: the triangle's tip reaches to 95.5 px.
+    assert distance(x - size / 2 - 95.5 - 12.0, y - 17.5, 0.0) == pytest.approx(12.0, abs=0.1)
+    # The board's long side above it, which is 29.5 px from the centre.
+    assert distance(x, y - size / 2 - 29.5 - 7.0, 0.0) == pytest.approx(7.0, abs=0.1)
+    assert distance(x, y, 0.3) == 0.0
+    path = np.array([[x - 400, y, 0.0], [x, y - size / 2 - 29.5 - 7.0, 0.0], [x, y - 300.0, 0.0]])
+    states = TABLE.states_of(np.column_stack((path, np.zeros((3, 3)))))
+    assert smallest_distance(TABLE, config, states) == pytest.approx(7.0, abs=0.1)
+
+
+def adapted(map_id, robot, both, start=0):
+    """An episode with `both` adaptations, in `robot` of which the robot gave way."""
+    return {**row(map_id, 10.0, start=start), "adaptations": both, "robot_gave_way": robot}
+
+
+def test_who_gave_way_is_a_mean_over_partners_of_the_episodes_with_an_adaptation():
+    names = [f"m{index}" for index in range(20)]
+    even = {
+        "p": [adapted(name, index % 2, 1) for index, name in enumerate(names)],
+        "q": [adapted(name, 1, 2) if index < 4 else adapted(name, 0, 0) for index, name in enumerate(names)],
+    }
+    never = {partner: [adapted(name, 0, 1) for name in names] for partner in "pq"}
+    rests = {partner: [adapted(name, 0, 0) for name in names] for partner in "pq"}
+    found = gave_way({"even": even, "rests": rests, "never": never}, ["even", "rests", "never"], ["rests", "never"])
+    assert found["robots"].keys() == {"even", "never"}  # one that rests prefers no strategy
+    assert (found["robots"]["even"]["mean"], found["robots"]["even"]["adaptations"]) == (0.5, 28)
+    assert found["robots"]["never"]["mean"] == found["robots"]["never"]["standard_error"] == 0
+    apart = found["separation"]["even"]["never"]
+    assert found["separation"].keys() == {"even"}
+    # Of partner p a proportion of 20 maps, half of the mean; of q each episode with one is a half.
+    assert apart["standard_error"] == pytest.approx((0.25 / 20) ** 0.5 / 2, rel=0.05)
+    assert apart["standard_errors"] == pytest.approx(0.5 / apart["standard_error"])
+    assert gave_way({"rests": rests}, ["rests"], []) == {}
+
+
+def test_a_partner_without_an_adaptation_has_no_part_in_who_gave_way():
+    names = [f"m{index}" for index in range(12)]
+    cell = {"p": [adapted(name, 1, 1) for name in names], "q": [adapted(name, 0, 0) for name in names]}
+    estimate = gave_way({"a": cell}, ["a"], [])["robots"]["a"]
+    assert (estimate["mean"], estimate["standard_error"], estimate["bootstrap_95"]) == (1.0, 0.0, [1.0, 1.0])
+    measured = summary(cell["q"], own_kind_of_start(None))
+    assert measured["gave_way"] is None
+    assert summary([adapted("a", 1, 2), adapted("b", 1, 1)], own_kind_of_start(None))["gave_way"]["mean"] == 0.75
