@@ -248,6 +248,9 @@ def test_who_gave_way_is_counted_as_in_the_behaviours_of_the_trajectories(tmp_pa
     assert f"gave way in 0.0 ± 0.0 % of {numbers['never-yields']} adaptations" in told["never-yields"]
     text = (tmp_path / "out" / "matrix.md").read_text(encoding="utf-8")
     assert "**robot gave way, %**" in text
+    assert [line for line in text.splitlines() if line.startswith("| robot | 0 | 1.571 | 3.142 | 4.712 |")]
+    scores = [each["robots"]["scripted"]["mean"] for each in result["by_factor"]["start_theta"].values()]
+    assert np.mean(scores) == pytest.approx(result["scores"]["robots"]["scripted"]["mean"])
 
 
 def test_trajectories_alone_are_not_removed_unless_told(checkpoint, tmp_path, capsys):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from copolicy.dataset.task import get_task
+from copolicy.evaluate.cross_play.factors import by_factor
 from copolicy.evaluate.cross_play.measures import own_kind_of_start, summary
-from copolicy.evaluate.cross_play.methods import method_result
+from copolicy.evaluate.cross_play.methods import method_measures, method_scores
 from copolicy.evaluate.cross_play.score import counts, gave_way, in_time, partner_scores, references
 from copolicy.evaluate.partner_study.clearance import smallest_distance
 from copolicy.tasks.table.maps import MAP_SETS
@@ -95,11 +96,12 @@ def test_a_method_has_the_mean_and_the_standard_error_of_its_training_seeds():
     times = own_kind_of_start(own["p"])
     summaries = {robot: {"p": {"measures": summary(cell["p"], times)}} for robot, cell in rows.items()}
     methods = {"A": ["A-0", "A-1"], "B": ["B-0", "B-1"]}
-    found = method_result(methods, summaries, scores, rows, own, ["no"])
+    found = method_scores(methods, scores, rows, own, ["no"])
+    measured = method_measures(methods, summaries)["A"]
     assert found["A"]["score"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
     assert found["B"]["score"] == {"mean": 0.375, "standard_error": pytest.approx(0.125), "n": 2}
-    assert found["A"]["measures"]["success"]["mean"] == 0.75
-    assert found["A"]["measures"]["time_s"] == {"mean": 10.0, "standard_error": pytest.approx(0.0), "n": 2}
+    assert measured["success"]["mean"] == 0.75
+    assert measured["time_s"] == {"mean": 10.0, "standard_error": pytest.approx(0.0), "n": 2}
     assert found["A"]["differences"].keys() == {"no"}
     assert found["B"]["differences"].keys() == {"A", "no"}
     against = found["B"]["differences"]["A"]
@@ -107,7 +109,7 @@ def test_a_method_has_the_mean_and_the_standard_error_of_its_training_seeds():
     # B minus A on each map, both seeds pooled; the bootstrap draws four of them.
     by_map = np.array([1 - 1, 0.5 - 1, 0 - 0.5, 0 - 0.5])
     assert against["standard_error"] == pytest.approx(by_map.std() / 2, rel=0.03)
-    assert method_result({}, summaries, scores, rows, own, ["no"]) == {}
+    assert method_scores({}, scores, rows, own, ["no"]) == {}
 
 
 def test_the_distance_to_an_obstacle_is_that_of_the_outlines():
@@ -159,4 +161,39 @@ def test_a_partner_without_an_adaptation_has_no_part_in_who_gave_way():
     assert (estimate["mean"], estimate["standard_error"], estimate["bootstrap_95"]) == (1.0, 0.0, [1.0, 1.0])
     measured = summary(cell["q"], own_kind_of_start(None))
     assert measured["gave_way"] is None
-    assert summary([adapted("a", 1, 2), adapted("b", 1, 1)], own_kind_of_start(None))["gave_way"]["mean"] == 0.75
+    measured = summary([adapted("a", 1, 2), adapted("b", 1, 1)], own_kind_of_start(None))
+    assert measured["gave_way"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
+
+
+def test_scores_are_given_for_each_value_of_a_factor_of_the_starts():
+    """Good in one orientation alone: the mean over both would hide it."""
+    turns = (0.0, 3.14159265)
+
+    def cell(times):
+        return [
+            {**adapted(f"m{index}-{turn:.0f}deg", 0, 0), "time_s": time, "start_theta": turn, "obstacles": 1}
+            for turn, time in zip(turns, times, strict=True)
+            for index in range(10)
+        ]
+
+    own = {"p": cell((10.0, 10.0))}
+    rows = {"A-0": {"p": cell((99.0, 10.0))}, "A-1": {"p": cell((99.0, 10.0))}, "B-0": {"p": cell((10.0, 10.0))}}
+    methods = {"A": ["A-0", "A-1"], "B": ["B-0"]}
+    found = by_factor(["start_theta", "obstacles"], rows, own, list(rows), [], methods)
+    assert found.keys() == {"start_theta"}  # all have one obstacle
+    assert list(found["start_theta"]) == ["0", "3.142"]
+    means = {value: each["robots"]["A-0"]["mean"] for value, each in found["start_theta"].items()}
+    assert means == {"0": 0.0, "3.142": 1.0}
+    differences = [each["methods"]["B"]["differences"]["A"]["mean"] for each in found["start_theta"].values()]
+    assert differences == [1.0, 0.0]
+    elsewhere = [{**row, "start_theta": 1.0} for row in own["p"]]
+    rows = {robot: {**by_partner, "replayed": elsewhere} for robot, by_partner in rows.items()}
+    found = by_factor(["start_theta"], rows, {**own, "replayed": elsewhere}, list(rows), [], methods)
+    assert found["start_theta"]["0"]["robots"]["B-0"]["by_partner"].keys() == {"p"}
+    assert found["start_theta"]["1"]["robots"]["B-0"]["by_partner"].keys() == {"replayed"}
+    # A value that some maps lack: only the others are drawn.
+    halves = {"B-0": {"p": [{**row, "obstacles": int(row["map_id"][1]) % 2} for row in own["p"]]}}
+    one = by_factor(["obstacles"], halves, own, ["B-0"], [], {})["obstacles"]["1"]
+    assert (one["maps"], one["robots"]["B-0"]["mean"], one["robots"]["B-0"]["standard_error"]) == (5, 1.0, 0.0)
+    many = {"B-0": {"p": [{**row, "start_theta": k / 100} for k, row in enumerate(own["p"])]}}
+    assert by_factor(["start_theta"], many, own, ["B-0"], [], {}) == {}

@@ -37,6 +37,8 @@ class Point:
 
 _ORDERS = "pairs-sim-376-orders"
 """Data of rows that read the obstacles as a list; the scan sees no order. See train/docs/results.md."""
+_ORIENTATIONS = "pairs-sim-376-orientations"
+"""Data with the four start orientations of a cross-play; all others have one."""
 _PAPER_INPUTS = {"observation_features": "absolute", "mirror": False, "permute_obstacles": False}
 _PAPER_SETTINGS = {
     **_PAPER_INPUTS, "prediction_type": "epsilon", "sampler": "ddpm", "num_inference_steps": 100,
@@ -62,10 +64,10 @@ def _recipe(preset: str) -> str:
     return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
 
 
-def _bc(preset: str, fps: int) -> Row:
+def _bc(preset: str, fps: int, recipe: str | None = None) -> Row:
     """robomimic's batch; `_BC_RATE` on a short budget."""
     settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": 6_000, "batch": 100}
-    return Row(_BC_RATE, preset, _recipe(preset), bf16=False, **settings)
+    return Row(_BC_RATE, preset, recipe or _recipe(preset), bf16=False, **settings)
 
 
 def _vrnn(preset: str) -> Row:
@@ -88,6 +90,7 @@ def _lerobot(policy: str, *flags: str) -> Row:
 
 ROWS: Mapping[str, Row] = {
     "codp-h": Row(),
+    "codp-h-orientations": Row(recipe=_ORIENTATIONS),
     "codp": Row(policy_flags(past_human_action=False)),
     "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
@@ -97,6 +100,7 @@ ROWS: Mapping[str, Row] = {
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-scan": _bc("scan", _RIVALS_HZ),
     "bc-scan-10hz": _bc("scan", 10),
+    "bc-scan-10hz-orientations": _bc("scan", 10, _ORIENTATIONS),
     "cnn": _cnn("cnn"),
     "cnn-inpainting": _cnn("cnn-inpainting"),
     "cnn-small": _cnn("cnn-small", 800),

@@ -129,7 +129,9 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     with FolderLock(arguments.out / _LOCK, refusal):
         cells = _run(arguments, play, robots, partners)
         floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-        result = matrix_result(task, settings, robots, partners, cells, floor_names, methods)
+        result = matrix_result(
+            task, settings, robots, partners, cells, floor_names, methods, list(task.studies.factors(scenarios[0]))
+        )
         result = {"study": "cross-play", "label": partners_label(named, task), **result}
         if overlap:
             result["overlap"] = overlap

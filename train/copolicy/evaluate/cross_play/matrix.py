@@ -8,8 +8,9 @@ from copolicy.dataset.task import PairTask
 from ..partner_study.robots import StudyRobot
 from ..partners.partner import StudyPartner
 from .cells import OWN_KIND
+from .factors import by_factor
 from .measures import definitions, not_measured, own_kind_of_start, summary
-from .methods import method_result
+from .methods import method_measures, method_scores
 from .score import FACTOR, gave_way, partner_scores
 
 
@@ -21,6 +22,7 @@ def matrix_result(
     cells: dict[str, dict[str, Any]],
     floors: Sequence[str],
     methods: Mapping[str, Sequence[str]],
+    factors: Sequence[str],
 ) -> dict[str, Any]:
     """The entries of `matrix.json` other than study, label and overlap.
 
@@ -29,6 +31,7 @@ def matrix_result(
         cells: documents of the cells by robot and partner, with the row `own-kind`.
         floors: names of the robots from which the others are to be told apart.
         methods: names of the robots of each method that has several training seeds.
+        factors: of the task's scenarios, see `Studies.factors`.
     """
     own = cells[OWN_KIND]
     times = {partner.name: own_kind_of_start(own[partner.name]["episodes"] if partner.name in own else None)
@@ -51,7 +54,9 @@ def matrix_result(
         robot: row for robot, row in rows.items() if robot != OWN_KIND or set(row) == {each.name for each in partners}
     }
     own_rows = {name: cell["episodes"] for name, cell in own.items()}
-    scores = partner_scores(scored, own_rows, [robot.name for robot in robots], floors)
+    names = [robot.name for robot in robots]
+    scores = partner_scores(scored, own_rows, names, floors)
+    of_methods, measured = method_scores(methods, scores, rows, own_rows, floors), method_measures(methods, summaries)
     missing = {each.name: each.no_own_kind for each in partners if each.own_kind is None}
     missing |= {
         name: "left out of the score: its own kind never succeeded"
@@ -75,8 +80,9 @@ def matrix_result(
         "partners": {partner.name: partner.describe() for partner in partners},
         "floors": list(floors),
         "scores": scores,
-        "gave_way": gave_way(rows, [robot.name for robot in robots], floors),
-        "methods": method_result(methods, summaries, scores, rows, own_rows, floors),
+        "gave_way": gave_way(rows, names, floors),
+        "methods": {name: {**entry, "measures": measured[name]} for name, entry in of_methods.items()},
+        "by_factor": by_factor(factors, scored, own_rows, names, floors, methods),
         "cells": summaries,
         "definitions": {"score": score_text, **definitions(task)},
         "not_measured": not_measured(task, summaries),

@@ -44,29 +44,26 @@ def _label(seed: int | None, index: int) -> str:
     return f"run{index}" if seed is None else str(seed)
 
 
-def method_result(
+def method_scores(
     methods: Mapping[str, Sequence[str]],
-    summaries: Mapping[str, Mapping[str, Any]],
     scores: Mapping[str, Any],
     rows: Cells,
     own_rows: Mapping[str, Sequence[Row]],
     floors: Sequence[str],
-) -> dict[str, Any]:
-    """The entry `methods` of a result.
+) -> dict[str, dict[str, Any]]:
+    """Scores of methods and their differences.
 
     Args:
         methods: robots of each method, one per training seed.
-        summaries: measures of the cells by robot and partner.
         scores: result of `partner_scores` for the robots.
         rows: rows by robot and partner.
         own_rows: rows of each partner's own kind.
         floors: robots from which methods are to be told apart.
 
     Returns:
-        For each method its robots, mean and standard error over training seeds of the score, of success in time and of
-        each measure (of a seed: the mean over partners), and `differences` and `gave_way_differences`: its score and
-        the proportion of `gave_way` minus those of the first method and of the floors, with all seeds of a method
-        pooled and a bootstrap over maps.
+        For each method its robots, mean and standard error over training seeds of the score and of success in time,
+        and `differences` and `gave_way_differences`: its score and the proportion of `gave_way` minus those of the
+        first method and of the floors, with all seeds of a method pooled and a bootstrap over maps.
     """
     if not methods:
         return {}
@@ -89,20 +86,29 @@ def method_result(
             "robots": list(robots),
             "score": mean_and_error([score["mean"] for score in seeds]),
             "in_time": mean_and_error([score["in_time"] for score in seeds]),
-            "measures": {
-                measure: mean_and_error(
-                    [
-                        mean
-                        for mean in (over_partners(summaries[robot], measure) for robot in robots)
-                        if mean is not None
-                    ]
-                )
-                for measure in MEASURES
-            },
             "differences": differences[name],
             "gave_way_differences": yielding[name],
         }
     return result
+
+
+def method_measures(
+    methods: Mapping[str, Sequence[str]], summaries: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Of each method, mean and standard error over training seeds of each measure (of a seed: mean over partners).
+
+    Args:
+        summaries: measures of the cells by robot and partner.
+    """
+    return {
+        name: {
+            measure: mean_and_error(
+                [mean for mean in (over_partners(summaries[robot], measure) for robot in robots) if mean is not None]
+            )
+            for measure in MEASURES
+        }
+        for name, robots in methods.items()
+    }
 
 
 def _pooled(robots: Sequence[Mapping[str, Sequence[Row]]]) -> dict[str, list[Row]]:

@@ -31,6 +31,7 @@ def markdown(result: Mapping[str, Any]) -> str:
         f"{settings['step_limit']} steps. {result['label']}.",
         *_methods(result),
         _scores(result),
+        *_factors(result),
     ]
     if separation := scores.get("separation"):
         rows = [
@@ -107,6 +108,23 @@ def _methods(result: Mapping[str, Any]) -> list[str]:
     if differences:
         head = ["method", "against", *_DIFFERENCES]
         text.append("With a bootstrap over maps:\n\n" + markdown_table(head, differences))
+    return text
+
+
+def _factors(result: Mapping[str, Any]) -> list[str]:
+    """Of each factor of the starts, scores of methods and robots by its values."""
+    text = []
+    for name, found in result["by_factor"].items():
+        robots = [robot for robot in result["cells"] if any(robot in each.get("robots", {}) for each in found.values())]
+        rows = [
+            [method, *(estimate_text(each["methods"][method]["score"], 100, 1) for each in found.values())]
+            for method in result["methods"]
+        ] + [
+            [robot, *(estimate_text(each.get("robots", {}).get(robot), 100, 1) for each in found.values())]
+            for robot in robots
+        ]
+        if rows:
+            text.append(f"Partner score by {name}, %:\n\n" + markdown_table(["robot", *found], rows))
     return text
 
 

@@ -82,7 +82,7 @@ def partner_scores(
             rows = by_partner[partner]
             values[robot][partner] = [(map_of(row), counts(row, reference[map_of(row)])) for row in rows]
             timely[robot].append(float(np.mean([in_time(row, reference[map_of(row)]) for row in rows])))
-    bootstrap = MapBootstrap.of(values, {partner: list(maps) for partner, maps in by_partner_maps.items()}, seed)
+    bootstrap = MapBootstrap.of(values, {partner: _maps(cells, partner) for partner in by_partner_maps}, seed)
     first = _first({robot: bootstrap.totals(robot) for robot in ranked})
     robots = {
         robot: {
@@ -124,15 +124,20 @@ def gave_way(cells: Cells, ranked: Sequence[str], floors: Sequence[str], seed: i
             numbers[robot] = sum(row["adaptations"] for rows in by_partner.values() for row in rows)
     if not values:
         return {}
-    every = next(iter(cells.values()))
-    maps = {partner: list(dict.fromkeys(map(map_of, rows))) for partner, rows in every.items()}
-    bootstrap = MapBootstrap.of(values, maps, seed)
+    bootstrap = MapBootstrap.of(
+        values, {partner: _maps(cells, partner) for partner in next(iter(cells.values()))}, seed
+    )
     return {
         "robots": {robot: {**bootstrap.estimate(robot), "adaptations": number} for robot, number in numbers.items()},
         "separation": bootstrap.differences(
             [robot for robot in ranked if robot in values], [floor for floor in floors if floor in values]
         ),
     }
+
+
+def _maps(cells: Cells, partner: str) -> list[str]:
+    """Maps of the episodes with a partner, the same for all robots."""
+    return list(dict.fromkeys(map_of(row) for by_partner in cells.values() for row in by_partner[partner]))
 
 
 def _first(totals: Mapping[str, Array]) -> dict[str, float]:
