@@ -70,18 +70,34 @@ def test_frame_by_frame_it_says_the_same(network, windows):
     torch.testing.assert_close(torch.cat(means, dim=1), whole.means)
 
 
-def test_frame_by_frame_gives_the_mixtures_of_a_window():
+def test_an_action_of_a_frame_is_the_mean_of_a_mode_of_the_windows_mixture():
     network = RecurrentMixtureNetwork(18, 4, width=8)
     inputs = torch.rand(3, 6, 18, generator=torch.Generator().manual_seed(0))
-    whole, last = network(inputs)
-    state, frames = None, []
     with torch.no_grad():
+        whole, (hidden, cell) = network(inputs)
+        states = None
         for frame in range(6):
-            mixture, state = network(inputs[:, frame : frame + 1], state)
-            frames.append(mixture)
-    for name in ("logits", "means", "deviations"):
-        values = torch.cat([getattr(mixture, name) for mixture in frames], dim=1)
-        torch.testing.assert_close(values, getattr(whole, name).detach(), rtol=1e-5, atol=1e-6)
-    assert state is not None
-    for one, other in zip(state, last, strict=True):
-        torch.testing.assert_close(one, other.detach(), rtol=1e-5, atol=1e-6)
+            drawn, states = network.sample(inputs[:, frame], states, 0.0)
+            distances = (whole.means[:, frame] - drawn[:, None]).abs().amax(dim=-1)  # (B, modes)
+            assert (distances.amin(dim=1) < 1e-6).all()
+    assert states is not None
+    for layer, (own_hidden, own_cell) in enumerate(states):
+        torch.testing.assert_close(own_hidden, hidden[layer], rtol=1e-5, atol=1e-6)
+        torch.testing.assert_close(own_cell, cell[layer], rtol=1e-5, atol=1e-6)
+
+
+def test_modes_are_drawn_by_their_weights_with_one_deviation_for_all():
+    network = RecurrentMixtureNetwork(3, 2, width=8, n_layers=1, n_modes=3)
+    with torch.no_grad():
+        network.logits.bias.add_(torch.tensor([0.0, 1.0, 2.0]))
+        network.mean.weight.zero_()
+        network.mean.bias.copy_(torch.tensor([-1.0, -1.0, 0.0, 0.0, 1.0, 1.0]))
+        inputs = torch.ones(1, 3)
+        mixture, _ = network(inputs[:, None])
+        torch.manual_seed(0)
+        drawn, _ = network.sample(inputs.expand(20_000, 3), None, 0.05)
+    mode = (drawn[:, :1] / torch.tanh(torch.tensor(1.0))).round().long()[:, 0] + 1
+    shares = torch.bincount(mode, minlength=3) / len(drawn)
+    torch.testing.assert_close(shares, torch.softmax(mixture.logits[0, 0], dim=-1), rtol=0, atol=0.015)
+    residuals = drawn - mixture.means[0, 0][mode]
+    assert residuals.std().item() == pytest.approx(0.05, rel=0.03)

@@ -10,7 +10,7 @@ from copolicy.dataset.features import ACTION
 
 from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
-from .network import RecurrentMixtureNetwork, State
+from .network import LayerStates, RecurrentMixtureNetwork
 
 
 class BcLstmGmmPolicy(FramePolicy):
@@ -37,7 +37,7 @@ class BcLstmGmmPolicy(FramePolicy):
 
     def reset(self) -> None:
         """Resets the state of the LSTM; call it whenever the environment is reset."""
-        self._state: State | None = None
+        self._state: LayerStates | None = None
         self._frames = 0
 
     def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> tuple[Tensor, dict]:
@@ -76,7 +76,6 @@ class BcLstmGmmPolicy(FramePolicy):
         if self._frames % self.config.sequence_length == 0:
             self._state = None
         self._frames += 1
-        inputs = self.features(self._observation(batch, None))[:, None]  # (B, 1, size)
-        mixture, self._state = self.network(inputs, self._state)
-        drawn = mixture.sample(self.config.execution_deviation)[:, 0]
+        inputs = self.features(self._observation(batch, None))  # (B, size)
+        drawn, self._state = self.network.sample(inputs, self._state, self.config.execution_deviation)
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))

@@ -9,6 +9,9 @@ from torch.distributions import Categorical, Independent, MixtureSameFamily, Nor
 State = tuple[Tensor, Tensor]
 """Hidden and cell state of the LSTM, `(layers, B, width)` each."""
 
+LayerStates = tuple[tuple[Tensor, Tensor], ...]
+"""Hidden and cell state `(B, width)` of each layer."""
+
 
 class Mixture(NamedTuple):
     """Parameters of a mixture for each frame: `(B, T, modes)` logits, `(B, T, modes, m)` means and deviations."""
@@ -23,16 +26,6 @@ class Mixture(NamedTuple):
         modes = Independent(Normal(self.means, self.deviations, validate_args=False), 1, validate_args=False)
         weights = Categorical(logits=self.logits, validate_args=False)
         return MixtureSameFamily(weights, modes, validate_args=False)
-
-    def sample(self, deviation: float) -> Tensor:
-        """Draws a mode and from it an action `(B, T, m)`, with one standard deviation for all modes.
-
-        Like a sample of `distribution`, without the tensors that torch's class makes for it in each call.
-        """
-        weights = torch.softmax(self.logits, dim=-1)  # (B, T, modes)
-        mode = torch.multinomial(weights.flatten(0, -2), 1).view(*weights.shape[:-1], 1, 1)
-        means = self.means.gather(-2, mode.expand(*mode.shape[:-1], self.means.shape[-1])).squeeze(-2)
-        return means + deviation * torch.randn_like(means)
 
 
 class RecurrentMixtureNetwork(nn.Module):
@@ -67,23 +60,34 @@ class RecurrentMixtureNetwork(nn.Module):
 
     def forward(self, inputs: Tensor, state: State | None = None) -> tuple[Mixture, State]:
         """Mixtures of the frames `(B, T, input_size)`, and the state after the last; a state of None is zero."""
-        one_frame = inputs.shape[1] == 1 and not torch.is_grad_enabled()
-        hidden, last_state = self._step(inputs, state) if one_frame else self.lstm(inputs, state)  # (B, T, width)
-        shape = (self.n_modes, self.action_size)
-        means = torch.tanh(self.mean(hidden)).unflatten(-1, shape)
-        deviations = nn.functional.softplus(self.deviation(hidden)).unflatten(-1, shape) + self.min_deviation
-        return Mixture(self.logits(hidden), means, deviations), last_state
+        hidden, last_state = self.lstm(inputs, state)  # (B, T, width)
+        deviations = nn.functional.softplus(self.deviation(hidden)) + self.min_deviation
+        return Mixture(self.logits(hidden), self._means(hidden), self._by_mode(deviations)), last_state
 
-    def _step(self, inputs: Tensor, state: State | None) -> tuple[Tensor, State]:
-        """As `self.lstm` for one frame `(B, 1, input_size)`; on a CPU torch.lstm reorders all weights in each call."""
-        hidden, lstm = inputs[:, 0], self.lstm
+    def sample(self, inputs: Tensor, state: LayerStates | None, deviation: float) -> tuple[Tensor, LayerStates]:
+        """Draws an action `(B, m)` for one frame `(B, input_size)`, and returns the state after it.
+
+        A mode is drawn, and from it an action with one standard deviation for all modes: like `forward` and
+        `Mixture.distribution`, in less time. On a CPU torch.lstm reorders all weights in each call.
+
+        Args:
+            state: of each layer, from the call before; zero if None.
+        """
+        lstm = self.lstm
         if state is None:
-            zeros = hidden.new_zeros(lstm.num_layers, len(hidden), lstm.hidden_size)
-            state = (zeros, zeros)
-        states = []
-        for layer in range(lstm.num_layers):
-            before = (state[0][layer], state[1][layer])
-            states.append(torch.lstm_cell(hidden, before, *lstm.all_weights[layer]))
+            zeros = inputs.new_zeros(len(inputs), lstm.hidden_size)
+            state = ((zeros, zeros),) * lstm.num_layers
+        hidden, states = inputs, []
+        for before, weights in zip(state, lstm.all_weights, strict=True):
+            states.append(torch.lstm_cell(hidden, before, *weights))
             hidden = states[-1][0]
-        h, c = zip(*states, strict=True)
-        return hidden[:, None], (torch.stack(h), torch.stack(c))
+        mode = torch.multinomial(torch.softmax(self.logits(hidden), dim=-1), 1)[:, :, None]  # (B, 1, 1)
+        means = self._means(hidden)
+        drawn = means.gather(1, mode.expand(-1, 1, means.shape[-1]))[:, 0]
+        return drawn + deviation * torch.randn_like(drawn), tuple(states)
+
+    def _means(self, hidden: Tensor) -> Tensor:
+        return self._by_mode(torch.tanh(self.mean(hidden)))
+
+    def _by_mode(self, values: Tensor) -> Tensor:
+        return values.unflatten(-1, (self.n_modes, self.action_size))
