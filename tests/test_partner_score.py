@@ -165,6 +165,44 @@ def test_a_partner_without_an_adaptation_has_no_part_in_who_gave_way():
     assert measured["gave_way"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
 
 
+def test_who_gave_way_is_compared_over_the_partners_with_which_both_had_adaptations():
+    """Both never yield to p; only one met a q with whom it disagreed."""
+    names = [f"m{index}" for index in range(12)]
+    none, never, always = ([adapted(name, *counts) for name in names] for counts in ((0, 0), (0, 1), (1, 1)))
+    cells = {"a": {"p": never, "q": always}, "b": {"p": never, "q": none}, "c": {"p": none, "q": never}}
+    found = gave_way(cells, ["a", "b"], ["b", "c"])
+    assert [found["robots"][robot]["mean"] for robot in "abc"] == [0.5, 0.0, 0.0]
+    assert found["separation"].keys() == {"a"}
+    assert found["separation"]["a"]["b"]["mean"] == 0.0
+    assert found["separation"]["a"]["c"]["mean"] == 1.0
+    assert gave_way(cells, ["b"], ["c"])["separation"] == {"b": {}}
+
+
+def test_the_own_kind_of_some_partners_leaves_the_others_in_who_gave_way():
+    """A task without an exchange of seats has no own kind of its scripted partners."""
+    names = [f"m{index}" for index in range(12)]
+    always, never = ([adapted(name, robot, 1) for name in names] for robot in (1, 0))
+    none = [adapted(name, 0, 0) for name in names]
+    cells = {"own-kind": {"p": none}, "a": {"p": never, "q": always}, "b": {"p": none, "q": always}}
+    found = gave_way(cells, ["a", "b"], [])["robots"]
+    assert {robot: (found[robot]["mean"], found[robot]["adaptations"]) for robot in found} == {
+        "a": (0.5, 24),
+        "b": (1.0, 12),
+    }
+    cells["own-kind"] = {"p": always}
+    assert gave_way(cells, ["a", "b"], [])["robots"]["own-kind"]["mean"] == 1.0
+
+
+def test_one_map_with_an_adaptation_gives_no_error():
+    """Every replicate that draws it is the same."""
+    cell = {"p": [adapted("m0", 1, 1), *(adapted(f"m{index}", 0, 0) for index in range(1, 9))]}
+    again = {"p": [adapted(f"m{index}", index % 2, 1) for index in range(9)]}
+    found = gave_way({"a": cell, "b": again}, ["a"], ["b"])
+    assert found["robots"]["a"] == {"mean": 1.0, "standard_error": None, "bootstrap_95": None, "adaptations": 1}
+    assert found["robots"]["b"]["standard_error"] > 0
+    assert found["separation"]["a"]["b"]["standard_errors"] is None
+
+
 def test_scores_are_given_for_each_value_of_a_factor_of_the_starts():
     """Good in one orientation alone: the mean over both would hide it."""
     turns = (0.0, 3.14159265)
