@@ -113,6 +113,6 @@ class Studies:
 
         Returns:
             The R strategy labels, see `PairTask.strategy`; `(T, 2, R, m)` actions, robot first, NaN where a strategy is
-            out of reach. None if the task does not define them.
+            out of reach. None if the task does not define them, or not for this scenario.
         """
         return None
