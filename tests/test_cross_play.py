@@ -230,6 +230,14 @@ def test_a_cell_that_is_run_again_has_its_own_trajectories_or_none(checkpoint, t
     assert steps() == ([20] * 4, None)
     assert run(checkpoint, out, "--no-floors", "--trajectories", "--step-limit", "20") == 0
     assert steps() == ([20] * 4, [20] * 4)
+    # A cell of an earlier version is run again for its adaptations; that takes no trajectories away.
+    (cell,) = (out / "cells").glob("ours--stubborn*.json")
+    stored = json.loads(cell.read_text(encoding="utf-8"))
+    stored["episodes"] = [{name: row[name] for name in row if name != "adaptations"} for row in stored["episodes"]]
+    cell.write_text(json.dumps(stored), encoding="utf-8")
+    assert run(checkpoint, out, "--no-floors", "--step-limit", "20") == 0
+    assert steps() == ([20] * 4, [20] * 4)
+    assert "adaptations" in cell.read_text(encoding="utf-8")
 
 
 def test_who_gave_way_is_counted_as_in_the_behaviours_of_the_trajectories(tmp_path, capsys):
