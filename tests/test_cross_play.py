@@ -71,6 +71,20 @@ def test_a_folder_with_training_seeds_is_a_method(tmp_path, capsys):
     assert "expected another training than" in capsys.readouterr().err
 
 
+def test_methods_have_names_of_their_own(checkpoint, tmp_path, capsys):
+    """Else the scores of one would be those of the other."""
+    for seed in (0, 1):
+        save_run(tmp_path / f"runs{seed}" / "training", seed=seed)
+    runs = [str(tmp_path / f"runs{seed}") for seed in (0, 1)]
+    call = ["--partners", "stubborn", "--maps", "unseen", "--out", str(tmp_path / "out")]
+    assert main(["cross-play", "--robots", f"random={runs[0]}", *call]) == 2
+    told = capsys.readouterr().err
+    assert "expected robots and methods of different names" in told
+    assert "found ['random-0', 'nothing', 'never-yields', 'random', 'random']" in told
+    assert main(["cross-play", "--robots", f"A={runs[0]}", f"A={runs[1]}", *call]) == 2
+    assert "expected methods of different names (NAME=DIR gives one), found 'A twice'" in capsys.readouterr().err
+
+
 def test_each_partner_has_its_own_kind_at_the_robots_seat():
     for partner in [make_partner(name, TABLE) for name in parse_partners(["stubborn", "human-like"], TABLE)]:
         robot = cells.own_kind_robot(partner, 1)
@@ -378,7 +392,10 @@ def test_a_replay_is_the_only_partner_of_a_partner_study(checkpoint, recordings,
     [
         (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
         (["--partners", "replay:nowhere"], "nowhere: expected a folder of recordings or a data set, found no such"),
-        (["--robots", "own-kind={0}"], "--robots: expected robots of different names (NAME=CKPT gives one), other"),
+        (
+            ["--robots", "own-kind={0}"],
+            "--robots: expected robots and methods of different names (NAME=CKPT gives one), other",
+        ),
         (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
         (["--partners", "still=proxy:{0},commit=9"], "proxy still: commit: expected at most 1 s, a whole chunk, found"),
     ],

@@ -96,7 +96,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     floors = [name for name in floors if name != "scripted"]
     texts = list(dict.fromkeys((*arguments.robots, *(name for name in floors if not _given(name, arguments.robots)))))
     robots = [make_robot(text, arguments, scripted) for text in texts]
-    _require_names(robots)
+    _require_names([*(robot.name for robot in robots), *methods])
     checkpoints = {robot.name: robot.policy.folder for robot in robots if robot.policy is not None}
     proxies = {partner.name: partner.detail for partner in named if partner.kind == PROXY}
     overlap = check_overlap(checkpoints, proxies, arguments.allow_overlap)
@@ -161,12 +161,12 @@ def _given(floor: str, robots: Sequence[str]) -> bool:
     return floor in robots or (floor == "nothing" and "passive" in robots)
 
 
-def _require_names(robots: Sequence["StudyRobot"]) -> None:
+def _require_names(names: Sequence[str]) -> None:
+    """Checks the names of robots and of methods."""
     from .cells import OWN_KIND
 
-    names = [robot.name for robot in robots]
     if len(set(names)) < len(names) or OWN_KIND in names:
-        expected = f"robots of different names (NAME=CKPT gives one), other than {OWN_KIND}"
+        expected = f"robots and methods of different names (NAME=CKPT gives one), other than {OWN_KIND}"
         raise InvalidValueError("--robots", expected, names)
 
 
