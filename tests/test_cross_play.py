@@ -267,12 +267,28 @@ def test_who_gave_way_is_counted_as_in_the_behaviours_of_the_trajectories(tmp_pa
     assert {name: found[name]["adaptations"] if name in found else 0 for name in numbers} == numbers
     assert numbers["never-yields"] > 0
     assert found["never-yields"]["mean"] == 0
-    assert f"gave way in 0.0 ± 0.0 % of {numbers['never-yields']} adaptations" in told["never-yields"]
+    # All on one of the two maps, which gives no error.
+    assert f"gave way 0.0 % (adaptations: {numbers['never-yields']})" in told["never-yields"]
     text = (tmp_path / "out" / "matrix.md").read_text(encoding="utf-8")
     assert "**robot gave way, %**" in text
+    assert "| robot | minus floor | score, points | / standard error | gave way, points | / standard error |" in text
     assert [line for line in text.splitlines() if line.startswith("| robot | 0 | 1.571 | 3.142 | 4.712 |")]
     scores = [each["robots"]["scripted"]["mean"] for each in result["by_factor"]["start_theta"].values()]
     assert np.mean(scores) == pytest.approx(result["scores"]["robots"]["scripted"]["mean"])
+
+
+def test_a_replay_with_other_starts_has_no_part_in_the_scores_by_orientation(recordings, tmp_path):
+    out, partners = tmp_path / "out", ("stubborn", f"r=replay:{recordings}")
+    call = ["--robots", "scripted", "--partners", *partners, "--configurations", "4", "--maps", "unseen", "--no-floors"]
+    assert main(["cross-play", *call, "--out", str(out)]) == 0
+    text, document = ((out / f"matrix.{suffix}").read_text(encoding="utf-8") for suffix in ("md", "json"))
+    assert "NaN" not in document
+    result = json.loads(document)
+    assert result["scores"]["robots"]["scripted"]["by_partner"].keys() == {"stubborn", "r"}
+    assert list(result["by_factor"]["start_theta"]) == ["0", "1.571", "3.142", "4.712"]
+    for value in result["by_factor"]["start_theta"].values():
+        assert value["robots"]["scripted"]["by_partner"].keys() == {"stubborn"}
+    assert "Partner score by start_theta, % (robots: bootstrap over maps; only with stubborn):" in text
 
 
 def test_trajectories_alone_are_not_removed_unless_told(checkpoint, tmp_path, capsys):

@@ -129,9 +129,8 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     with FolderLock(arguments.out / _LOCK, refusal):
         cells = _run(arguments, play, robots, partners)
         floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-        result = matrix_result(
-            task, settings, robots, partners, cells, floor_names, methods, list(task.studies.factors(scenarios[0]))
-        )
+        factors = list(dict.fromkeys(name for each in scenarios for name in task.studies.factors(each)))
+        result = matrix_result(task, settings, robots, partners, cells, floor_names, methods, factors)
         result = {"study": "cross-play", "label": partners_label(named, task), **result}
         if overlap:
             result["overlap"] = overlap
@@ -239,7 +238,7 @@ def _write(out: Path, result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _yielding(found: dict[str, Any] | None) -> str:
-    return "" if found is None else f", gave way in {_percent(found)} of {found['adaptations']} adaptations"
+    return "" if found is None else f", gave way {_percent(found)} (adaptations: {found['adaptations']})"
 
 
 def _percent(score: dict[str, Any]) -> str:
