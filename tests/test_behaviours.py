@@ -65,6 +65,15 @@ def test_the_adaptations_in_which_the_robot_gave_way_are_counted_by_episode():
     assert adaptation.robot_gave_way(_motion(*episodes)).tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 
 
+def test_an_episode_without_strategies_has_no_adaptation(monkeypatch):
+    states = _states(np.full(40, 420.0), 300.0)
+    actions = np.concatenate((_along("LR", states[:20]), _along("RR", states[20:])))
+    motion = _motion((states, actions), (states, actions))
+    found = iter((None, TASK.studies.strategy_actions(MAP, states)))
+    monkeypatch.setattr(type(TASK.studies), "strategy_actions", lambda self, scenario, states: next(found))
+    assert adaptation.robot_gave_way(motion).tolist() == [[0, 0], [1, 1]]
+
+
 def test_a_disagreement_that_lasts_is_no_adaptation():
     states = _states(np.full(40, 420.0))
     motion = _motion((states, _along("LR", states)))

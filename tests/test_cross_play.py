@@ -71,6 +71,20 @@ def test_a_folder_with_training_seeds_is_a_method(tmp_path, capsys):
     assert "expected another training than" in capsys.readouterr().err
 
 
+def test_methods_have_names_of_their_own(checkpoint, tmp_path, capsys):
+    """Else the scores of one would be those of the other."""
+    for seed in (0, 1):
+        save_run(tmp_path / f"runs{seed}" / "training", seed=seed)
+    runs = [str(tmp_path / f"runs{seed}") for seed in (0, 1)]
+    call = ["--partners", "stubborn", "--maps", "unseen", "--out", str(tmp_path / "out")]
+    assert main(["cross-play", "--robots", f"random={runs[0]}", *call]) == 2
+    told = capsys.readouterr().err
+    assert "expected robots and methods of different names" in told
+    assert "found ['random-0', 'nothing', 'never-yields', 'random', 'random']" in told
+    assert main(["cross-play", "--robots", f"A={runs[0]}", f"A={runs[1]}", *call]) == 2
+    assert "expected methods of different names (NAME=DIR gives one), found 'A twice'" in capsys.readouterr().err
+
+
 def test_each_partner_has_its_own_kind_at_the_robots_seat():
     for partner in [make_partner(name, TABLE) for name in parse_partners(["stubborn", "human-like"], TABLE)]:
         robot = cells.own_kind_robot(partner, 1)
@@ -230,6 +244,14 @@ def test_a_cell_that_is_run_again_has_its_own_trajectories_or_none(checkpoint, t
     assert steps() == ([20] * 4, None)
     assert run(checkpoint, out, "--no-floors", "--trajectories", "--step-limit", "20") == 0
     assert steps() == ([20] * 4, [20] * 4)
+    # A cell of an earlier version is run again for its adaptations; that takes no trajectories away.
+    (cell,) = (out / "cells").glob("ours--stubborn*.json")
+    stored = json.loads(cell.read_text(encoding="utf-8"))
+    stored["episodes"] = [{name: row[name] for name in row if name != "adaptations"} for row in stored["episodes"]]
+    cell.write_text(json.dumps(stored), encoding="utf-8")
+    assert run(checkpoint, out, "--no-floors", "--step-limit", "20") == 0
+    assert steps() == ([20] * 4, [20] * 4)
+    assert "adaptations" in cell.read_text(encoding="utf-8")
 
 
 def test_who_gave_way_is_counted_as_in_the_behaviours_of_the_trajectories(tmp_path, capsys):
@@ -245,12 +267,28 @@ def test_who_gave_way_is_counted_as_in_the_behaviours_of_the_trajectories(tmp_pa
     assert {name: found[name]["adaptations"] if name in found else 0 for name in numbers} == numbers
     assert numbers["never-yields"] > 0
     assert found["never-yields"]["mean"] == 0
-    assert f"gave way in 0.0 ± 0.0 % of {numbers['never-yields']} adaptations" in told["never-yields"]
+    # All on one of the two maps, which gives no error.
+    assert f"gave way 0.0 % (adaptations: {numbers['never-yields']})" in told["never-yields"]
     text = (tmp_path / "out" / "matrix.md").read_text(encoding="utf-8")
     assert "**robot gave way, %**" in text
+    assert "| robot | minus floor | score, points | / standard error | gave way, points | / standard error |" in text
     assert [line for line in text.splitlines() if line.startswith("| robot | 0 | 1.571 | 3.142 | 4.712 |")]
     scores = [each["robots"]["scripted"]["mean"] for each in result["by_factor"]["start_theta"].values()]
     assert np.mean(scores) == pytest.approx(result["scores"]["robots"]["scripted"]["mean"])
+
+
+def test_a_replay_with_other_starts_has_no_part_in_the_scores_by_orientation(recordings, tmp_path):
+    out, partners = tmp_path / "out", ("stubborn", f"r=replay:{recordings}")
+    call = ["--robots", "scripted", "--partners", *partners, "--configurations", "4", "--maps", "unseen", "--no-floors"]
+    assert main(["cross-play", *call, "--out", str(out)]) == 0
+    text, document = ((out / f"matrix.{suffix}").read_text(encoding="utf-8") for suffix in ("md", "json"))
+    assert "NaN" not in document
+    result = json.loads(document)
+    assert result["scores"]["robots"]["scripted"]["by_partner"].keys() == {"stubborn", "r"}
+    assert list(result["by_factor"]["start_theta"]) == ["0", "1.571", "3.142", "4.712"]
+    for value in result["by_factor"]["start_theta"].values():
+        assert value["robots"]["scripted"]["by_partner"].keys() == {"stubborn"}
+    assert "Partner score by start_theta, % (robots: bootstrap over maps; only with stubborn):" in text
 
 
 def test_trajectories_alone_are_not_removed_unless_told(checkpoint, tmp_path, capsys):
@@ -370,7 +408,10 @@ def test_a_replay_is_the_only_partner_of_a_partner_study(checkpoint, recordings,
     [
         (["--partners", "kind"], "unknown kind of partner 'kind'; available: erratic, follower, slow, stubborn"),
         (["--partners", "replay:nowhere"], "nowhere: expected a folder of recordings or a data set, found no such"),
-        (["--robots", "own-kind={0}"], "--robots: expected robots of different names (NAME=CKPT gives one), other"),
+        (
+            ["--robots", "own-kind={0}"],
+            "--robots: expected robots and methods of different names (NAME=CKPT gives one), other",
+        ),
         (["--configurations", "3"], "--configurations: expected a multiple of 4 from 4 to 336, found 3"),
         (["--partners", "still=proxy:{0},commit=9"], "proxy still: commit: expected at most 1 s, a whole chunk, found"),
     ],

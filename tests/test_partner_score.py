@@ -165,6 +165,44 @@ def test_a_partner_without_an_adaptation_has_no_part_in_who_gave_way():
     assert measured["gave_way"] == {"mean": 0.75, "standard_error": pytest.approx(0.25), "n": 2}
 
 
+def test_who_gave_way_is_compared_over_the_partners_with_which_both_had_adaptations():
+    """Both never yield to p; only one met a q with whom it disagreed."""
+    names = [f"m{index}" for index in range(12)]
+    none, never, always = ([adapted(name, *counts) for name in names] for counts in ((0, 0), (0, 1), (1, 1)))
+    cells = {"a": {"p": never, "q": always}, "b": {"p": never, "q": none}, "c": {"p": none, "q": never}}
+    found = gave_way(cells, ["a", "b"], ["b", "c"])
+    assert [found["robots"][robot]["mean"] for robot in "abc"] == [0.5, 0.0, 0.0]
+    assert found["separation"].keys() == {"a"}
+    assert found["separation"]["a"]["b"]["mean"] == 0.0
+    assert found["separation"]["a"]["c"]["mean"] == 1.0
+    assert gave_way(cells, ["b"], ["c"])["separation"] == {"b": {}}
+
+
+def test_the_own_kind_of_some_partners_leaves_the_others_in_who_gave_way():
+    """A task without an exchange of seats has no own kind of its scripted partners."""
+    names = [f"m{index}" for index in range(12)]
+    always, never = ([adapted(name, robot, 1) for name in names] for robot in (1, 0))
+    none = [adapted(name, 0, 0) for name in names]
+    cells = {"own-kind": {"p": none}, "a": {"p": never, "q": always}, "b": {"p": none, "q": always}}
+    found = gave_way(cells, ["a", "b"], [])["robots"]
+    assert {robot: (found[robot]["mean"], found[robot]["adaptations"]) for robot in found} == {
+        "a": (0.5, 24),
+        "b": (1.0, 12),
+    }
+    cells["own-kind"] = {"p": always}
+    assert gave_way(cells, ["a", "b"], [])["robots"]["own-kind"]["mean"] == 1.0
+
+
+def test_one_map_with_an_adaptation_gives_no_error():
+    """Every replicate that draws it is the same."""
+    cell = {"p": [adapted("m0", 1, 1), *(adapted(f"m{index}", 0, 0) for index in range(1, 9))]}
+    again = {"p": [adapted(f"m{index}", index % 2, 1) for index in range(9)]}
+    found = gave_way({"a": cell, "b": again}, ["a"], ["b"])
+    assert found["robots"]["a"] == {"mean": 1.0, "standard_error": None, "bootstrap_95": None, "adaptations": 1}
+    assert found["robots"]["b"]["standard_error"] > 0
+    assert found["separation"]["a"]["b"]["standard_errors"] is None
+
+
 def test_scores_are_given_for_each_value_of_a_factor_of_the_starts():
     """Good in one orientation alone: the mean over both would hide it."""
     turns = (0.0, 3.14159265)
@@ -186,14 +224,50 @@ def test_scores_are_given_for_each_value_of_a_factor_of_the_starts():
     assert means == {"0": 0.0, "3.142": 1.0}
     differences = [each["methods"]["B"]["differences"]["A"]["mean"] for each in found["start_theta"].values()]
     assert differences == [1.0, 0.0]
-    elsewhere = [{**row, "start_theta": 1.0} for row in own["p"]]
-    rows = {robot: {**by_partner, "replayed": elsewhere} for robot, by_partner in rows.items()}
-    found = by_factor(["start_theta"], rows, {**own, "replayed": elsewhere}, list(rows), [], methods)
-    assert found["start_theta"]["0"]["robots"]["B-0"]["by_partner"].keys() == {"p"}
-    assert found["start_theta"]["1"]["robots"]["B-0"]["by_partner"].keys() == {"replayed"}
     # A value that some maps lack: only the others are drawn.
-    halves = {"B-0": {"p": [{**row, "obstacles": int(row["map_id"][1]) % 2} for row in own["p"]]}}
-    one = by_factor(["obstacles"], halves, own, ["B-0"], [], {})["obstacles"]["1"]
+    halves = {"p": [{**row, "obstacles": int(row["map_id"][1]) % 2} for row in own["p"]]}
+    one = by_factor(["obstacles"], {"B-0": halves}, halves, ["B-0"], [], {})["obstacles"]["1"]
     assert (one["maps"], one["robots"]["B-0"]["mean"], one["robots"]["B-0"]["standard_error"]) == (5, 1.0, 0.0)
-    many = {"B-0": {"p": [{**row, "start_theta": k / 100} for k, row in enumerate(own["p"])]}}
-    assert by_factor(["start_theta"], many, own, ["B-0"], [], {}) == {}
+
+
+def of_values(values, time_s=10.0):
+    """Cell of an episode for each value of a factor, on a map of its own."""
+    return [{**adapted(f"m{index}", 0, 0), "time_s": time_s, "factor": value} for index, value in enumerate(values)]
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([3, 1, 10, 1.0], ["1", "3", "10"]),
+        ([0.0, -0.0, 1e-17, 0.0005, 0.001], ["0", "0.0005", "0.001"]),
+        (["narrow", "a|b", "narrow"], ["a|b", "narrow"]),
+        ([True, False, None], ["false", "true"]),
+        ([(1, 2), "wide", 7, [1, 2]], ["7", "[1, 2]", "wide"]),
+        ([None, None], []),
+        ([1, 1, 1], []),
+        ([index / 100 for index in range(13)], []),
+    ],
+)
+def test_a_factor_may_have_any_values(values, expected):
+    own = {"p": of_values(values)}
+    rows = {"good": {"p": of_values(values)}, "late": {"p": of_values(values, 99.0)}}
+    found = by_factor(["factor", "unknown"], rows, own, ["good", "late"], ["late"], {})
+    assert found.keys() == ({"factor"} if expected else set())
+    assert list(found.get("factor", {})) == expected
+    for each in found.get("factor", {}).values():
+        assert (each["robots"]["good"]["mean"], each["robots"]["late"]["mean"]) == (1.0, 0.0)
+
+
+def test_the_scores_by_a_factor_are_over_the_same_partners_for_every_value():
+    """A recording has its own starts: a value that it alone has would compare partners."""
+    own = {"p": of_values([0, 1, 0, 1]), "q": of_values([1, 0, 1, 0]), "replay": of_values([0.3, 1])}
+    lost = [{**row, "success": False} for row in of_values([5, 6])]
+    own = {"replay": own.pop("replay"), **own, "weak": lost}
+    rows = {"robot": {**own, "q": of_values([1, 0, 1, 0], 99.0)}}
+    found = by_factor(["factor"], rows, own, ["robot"], [], {})["factor"]
+    assert list(found) == ["0", "1"]
+    assert all(each["robots"]["robot"]["by_partner"].keys() == {"p", "q"} for each in found.values())
+    assert [each["robots"]["robot"]["mean"] for each in found.values()] == [0.5, 0.5]
+    many = {**own, "p": of_values(range(13)), "q": of_values(range(13))}
+    assert list(by_factor(["factor"], {"robot": many}, many, ["robot"], [], {})["factor"]) == ["0.3", "1"]
+    assert by_factor(["factor"], {"robot": {"weak": lost}}, {"weak": lost}, ["robot"], [], {}) == {}

@@ -98,7 +98,11 @@ class Studies:
         raise NotImplementedError(f"a task with fronts turns its scenarios: {front}")
 
     def factors(self, scenario: Any) -> dict[str, Any]:
-        """Columns for the result of an episode; results are grouped by `start_theta` (rad) and `obstacles` (count)."""
+        """Columns for the result of an episode, as JSON values.
+
+        Results are grouped by `start_theta` (rad) and `obstacles` (count), those of a cross-play by each factor with 2
+        to 12 values.
+        """
         return {}
 
     def at_rest(self, recorded: Array) -> Array | None:
@@ -113,6 +117,6 @@ class Studies:
 
         Returns:
             The R strategy labels, see `PairTask.strategy`; `(T, 2, R, m)` actions, robot first, NaN where a strategy is
-            out of reach. None if the task does not define them.
+            out of reach. None if the task does not define them, or not for this scenario.
         """
         return None

@@ -32,6 +32,7 @@ def preferences(labels: tuple[str, ...], wanted: Array, actions: Array, fps: int
     """Strategy that each player prefers in each frame of an episode.
 
     Args:
+        labels: R strategies.
         wanted: `(T, 2, R, m)` actions that would pursue each strategy; NaN where one is out of reach.
         actions: `(T, 2, m)`.
 
@@ -39,14 +40,14 @@ def preferences(labels: tuple[str, ...], wanted: Array, actions: Array, fps: int
         `(T, 2)` index of the strategy, -1 if several are followed equally well or only one is in reach; `(T, 2)` margin
         over the second best, 0 where the index is -1.
     """
+    if len(labels) < 2:
+        return np.full(wanted.shape[:2], -1), np.zeros(wanted.shape[:2])
     reach = ~np.isnan(wanted).any(axis=-1)
     directions = wanted / np.maximum(np.linalg.norm(wanted, axis=-1, keepdims=True), 1e-9)
     followed = np.einsum("tpm,tprm->tpr", actions, np.nan_to_num(directions))
     smooth = uniform_filter1d(followed, max(1, round(SMOOTHING_S * fps)), axis=0, mode="constant")
     smooth = np.where(reach, smooth, -math.inf)
     choice = reach.sum(axis=-1) > 1
-    if len(labels) < 2:
-        return np.full(choice.shape, -1), np.zeros(choice.shape)
     ordered = np.sort(smooth, axis=-1)
     margin = np.zeros(choice.shape)
     np.subtract(ordered[..., -1], ordered[..., -2], out=margin, where=choice)

@@ -96,13 +96,11 @@ class Motion:
 
     @cached_property
     def strategy_actions(self) -> list[tuple[tuple[str, ...], Array]]:
-        """Of each episode, see `Studies.strategy_actions`; empty if the task does not define them."""
+        """Of each episode, see `Studies.strategy_actions`; no strategies where the task defines none."""
         data, found = self.frames, []
         for row, start, end in zip(data.rows, data.starts, data.ends, strict=True):
             actions = self.task.studies.strategy_actions(row.scenario, data.states[start:end])
-            if actions is None:
-                return []
-            found.append(actions)
+            found.append(((), np.empty((end - start, 2, 0, 0))) if actions is None else actions)
         return found
 
     def joint_actions(self, order: Array | None) -> Array:

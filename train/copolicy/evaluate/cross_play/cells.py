@@ -83,6 +83,8 @@ def run_cell(
 ) -> CellDocument:
     """The episodes of a robot with a partner: read from the cell's file if it is there, else run and stored.
 
+    A cell of an earlier version, which did not count adaptations, is run again.
+
     Args:
         trajectories: also store the trajectories; a cell without them is run again.
 
@@ -95,10 +97,12 @@ def run_cell(
     if path.exists() and not overwrite:
         stored = read_json(path, CellDocument, "a cell of a cross-play")
         require_same_settings(path, stored["settings"], settings)
-        # A cell of an earlier version, which did not count adaptations, is run again.
+        has_trajectories = trajectories_beside(path).exists()
         complete = all("adaptations" in row for row in stored["episodes"])
-        if complete and (not trajectories or trajectories_beside(path).exists()):
+        if complete and (has_trajectories or not trajectories):
             return stored
+        # Only --overwrite removes trajectories.
+        trajectories = trajectories or has_trajectories
     already = 0 if robot.policy is None else len(robot.policy.inference_seconds)
     started = perf_counter()
     episodes = run_with_partners(

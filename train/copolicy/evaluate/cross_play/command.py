@@ -96,7 +96,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     floors = [name for name in floors if name != "scripted"]
     texts = list(dict.fromkeys((*arguments.robots, *(name for name in floors if not _given(name, arguments.robots)))))
     robots = [make_robot(text, arguments, scripted) for text in texts]
-    _require_names(robots)
+    _require_names([*(robot.name for robot in robots), *methods])
     checkpoints = {robot.name: robot.policy.folder for robot in robots if robot.policy is not None}
     proxies = {partner.name: partner.detail for partner in named if partner.kind == PROXY}
     overlap = check_overlap(checkpoints, proxies, arguments.allow_overlap)
@@ -129,9 +129,8 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
     with FolderLock(arguments.out / _LOCK, refusal):
         cells = _run(arguments, play, robots, partners)
         floor_names = [robot.name for robot in robots if robot.name in ("nothing", "passive", "never-yields", "random")]
-        result = matrix_result(
-            task, settings, robots, partners, cells, floor_names, methods, list(task.studies.factors(scenarios[0]))
-        )
+        factors = list(dict.fromkeys(name for each in scenarios for name in task.studies.factors(each)))
+        result = matrix_result(task, settings, robots, partners, cells, floor_names, methods, factors)
         result = {"study": "cross-play", "label": partners_label(named, task), **result}
         if overlap:
             result["overlap"] = overlap
@@ -161,12 +160,12 @@ def _given(floor: str, robots: Sequence[str]) -> bool:
     return floor in robots or (floor == "nothing" and "passive" in robots)
 
 
-def _require_names(robots: Sequence["StudyRobot"]) -> None:
+def _require_names(names: Sequence[str]) -> None:
+    """Checks the names of robots and of methods."""
     from .cells import OWN_KIND
 
-    names = [robot.name for robot in robots]
     if len(set(names)) < len(names) or OWN_KIND in names:
-        expected = f"robots of different names (NAME=CKPT gives one), other than {OWN_KIND}"
+        expected = f"robots and methods of different names (NAME=CKPT gives one), other than {OWN_KIND}"
         raise InvalidValueError("--robots", expected, names)
 
 
@@ -239,7 +238,7 @@ def _write(out: Path, result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _yielding(found: dict[str, Any] | None) -> str:
-    return "" if found is None else f", gave way in {_percent(found)} of {found['adaptations']} adaptations"
+    return "" if found is None else f", gave way {_percent(found)} (adaptations: {found['adaptations']})"
 
 
 def _percent(score: dict[str, Any]) -> str:

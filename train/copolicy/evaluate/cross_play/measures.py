@@ -182,8 +182,8 @@ def definitions(task: PairTask) -> dict[str, str]:
         **({} if limit is None else {"near_misses": f"episodes with a smallest distance below {limit:g} {unit}, of all "
                                                     "episodes, collisions included"}),
         "gave_way": "proportion of the adaptations of an episode in which the robot gave way, alone or as well as the "
-        f"partner; only of episodes with one: the players preferred different strategies for {SHORTEST_S:g} s or more "
-        f"and, within {WITHIN_S:g} s, the same",
+        f"partner; only of episodes with one, and means only over partners with such episodes: the players preferred "
+        f"different strategies for {SHORTEST_S:g} s or more and, within {WITHIN_S:g} s, the same",
         "wall_s": "wall time of the simulation of the cell, with inference",
     }  # fmt: skip
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.policies.training_run import find_policy_folder
 
 from ..coplanning_table.training_runs import read_trained_methods
@@ -24,6 +25,7 @@ def with_seeds(texts: Sequence[str], scripted: Sequence[str]) -> tuple[list[str]
 
     Raises:
         FileFormatError: runs of one folder are of different methods, or the same training twice.
+        InvalidValueError: two methods have one name.
     """
     robots: list[str] = []
     methods: dict[str, list[str]] = {}
@@ -33,6 +35,10 @@ def with_seeds(texts: Sequence[str], scripted: Sequence[str]) -> tuple[list[str]
             robots.append(text)
             continue
         (method,) = read_trained_methods([f"{name}={path}" if name else path])
+        if method.name in methods:
+            raise InvalidValueError(
+                "--robots", "methods of different names (NAME=DIR gives one)", f"{method.name} twice"
+            )
         option = HIDDEN_OPTION if hides else ""
         named = {f"{method.name}-{_label(run.seed, index)}": run.folder for index, run in enumerate(method.runs)}
         robots += [f"{robot}={folder}{option}" for robot, folder in named.items()]

@@ -12,12 +12,8 @@ from .score import FACTOR
 
 SCORE_LABEL = f"score: success within {FACTOR:g} x own kind's time and force, %"
 
-_DIFFERENCES = (
-    "difference of scores, points",
-    "in standard errors",
-    "difference in how often the robot gave way, points",
-    "in standard errors",
-)
+_DIFFERENCES = ("score, points", "/ standard error", "gave way, points", "/ standard error")
+_DIFFERENCES_TITLE = "Differences, bootstrap over maps (gave way: over the partners with which both had adaptations):"
 _COLUMNS = ("mean", "standard_error", "n")
 
 
@@ -39,7 +35,7 @@ def markdown(result: Mapping[str, Any]) -> str:
             for robot, floors in separation.items()
             for floor, difference in floors.items()
         ]
-        text.append(markdown_table(["robot", "floor", *_DIFFERENCES], rows))
+        text.append(f"{_DIFFERENCES_TITLE}\n\n" + markdown_table(["robot", "minus floor", *_DIFFERENCES], rows))
     partners = list(result["partners"])
     if scores:
         rows = [
@@ -106,26 +102,39 @@ def _methods(result: Mapping[str, Any]) -> list[str]:
     ]
     text = ["Methods, mean ± standard error over training seeds:\n\n" + markdown_table(head, rows)]
     if differences:
-        head = ["method", "against", *_DIFFERENCES]
-        text.append("With a bootstrap over maps:\n\n" + markdown_table(head, differences))
+        head = ["method", "minus", *_DIFFERENCES]
+        text.append(f"{_DIFFERENCES_TITLE}\n\n" + markdown_table(head, differences))
     return text
 
 
 def _factors(result: Mapping[str, Any]) -> list[str]:
     """Of each factor of the starts, scores of methods and robots by its values."""
     text = []
-    for name, found in result["by_factor"].items():
-        robots = [robot for robot in result["cells"] if any(robot in each.get("robots", {}) for each in found.values())]
+    for name, by_value in result["by_factor"].items():
+        values = list(by_value.values())
+        methods = {method: [each["methods"][method]["score"] for each in values] for method in result["methods"]}
+        robots = {robot: [each["robots"][robot] for each in values] for robot in values[0]["robots"]}
         rows = [
-            [method, *(estimate_text(each["methods"][method]["score"], 100, 1) for each in found.values())]
-            for method in result["methods"]
-        ] + [
-            [robot, *(estimate_text(each.get("robots", {}).get(robot), 100, 1) for each in found.values())]
-            for robot in robots
+            [row, *(estimate_text(score, 100, 1) for score in scores)]
+            for scored in (methods, robots)
+            for row, scores in scored.items()
         ]
-        if rows:
-            text.append(f"Partner score by {name}, %:\n\n" + markdown_table(["robot", *found], rows))
+        head = ["method or robot" if methods else "robot", *by_value]
+        text.append(
+            f"Partner score by {name}, % ({_factor_notes(result, values[0])}):\n\n" + markdown_table(head, rows)
+        )
     return text
+
+
+def _factor_notes(result: Mapping[str, Any], of_value: Mapping[str, Any]) -> str:
+    """What the errors are, and over which partners the scores are if not over all."""
+    notes = ["robots: bootstrap over maps"]
+    if result["methods"]:
+        notes.append("methods: standard error over training seeds")
+    scored, every = (next(iter(each["robots"].values()))["by_partner"] for each in (of_value, result["scores"]))
+    if len(scored) < len(every):
+        notes.append(f"only with {', '.join(scored)}")
+    return "; ".join(notes)
 
 
 def _over_partners(row: Mapping[str, Any], name: str) -> str:

@@ -102,14 +102,16 @@ def partner_scores(
 
 
 def gave_way(cells: Cells, ranked: Sequence[str], floors: Sequence[str], seed: int = 0) -> dict[str, Any]:
-    """Who gives way, as the score does not see it: proportion of adaptations in which the robot did, over partners.
+    """Who gives way, which the score does not see: in what proportion of adaptations the robot did.
+
+    Of an episode, then the mean over the episodes with an adaptation, then over the partners with such episodes.
 
     Args:
         ranked, floors: see `partner_scores`; robots without an adaptation are left out.
 
     Returns:
-        `robots` with mean, standard error, interval and number of adaptations; `separation` of robots from floors;
-        empty if there is no adaptation.
+        `robots` with mean, standard error, interval and number of adaptations; `separation` of robots from floors,
+        over the partners with which both have an adaptation; empty if there is no adaptation.
     """
     measure = MEASURES["gave_way"].value
     values: dict[str, dict[str, list[tuple[str, float]]]] = {}
@@ -124,9 +126,8 @@ def gave_way(cells: Cells, ranked: Sequence[str], floors: Sequence[str], seed: i
             numbers[robot] = sum(row["adaptations"] for rows in by_partner.values() for row in rows)
     if not values:
         return {}
-    bootstrap = MapBootstrap.of(
-        values, {partner: _maps(cells, partner) for partner in next(iter(cells.values()))}, seed
-    )
+    partners = dict.fromkeys(partner for by_partner in cells.values() for partner in by_partner)
+    bootstrap = MapBootstrap.of(values, {partner: _maps(cells, partner) for partner in partners}, seed)
     return {
         "robots": {robot: {**bootstrap.estimate(robot), "adaptations": number} for robot, number in numbers.items()},
         "separation": bootstrap.differences(
@@ -136,8 +137,8 @@ def gave_way(cells: Cells, ranked: Sequence[str], floors: Sequence[str], seed: i
 
 
 def _maps(cells: Cells, partner: str) -> list[str]:
-    """Maps of the episodes with a partner, the same for all robots."""
-    return list(dict.fromkeys(map_of(row) for by_partner in cells.values() for row in by_partner[partner]))
+    """Maps of the episodes with a partner, the same for all robots that met it."""
+    return list(dict.fromkeys(map_of(row) for by_partner in cells.values() for row in by_partner.get(partner, ())))
 
 
 def _first(totals: Mapping[str, Array]) -> dict[str, float]:
