@@ -358,7 +358,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     plan = StudyPlan.read(study / "plan.json")
     out = tmp_path / "recordings"
     flags = ["--participant", "P01", "--out", str(out), "--human", "scripted:S02", "--headless", "--json"]
-    flags += ["--practice", "1", "--countdown", "0", "--planner", "thread"]
+    flags += ["--practice", "1", "--countdown", "0", "--inference", "thread"]
     assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["complete"] is True
@@ -465,6 +465,13 @@ def test_the_plan_command_deals_sixty_starts_among_five_people(study, tmp_path, 
     assert capsys.readouterr().err == (
         "copolicy-eval: CKPT: expected at least two robots of different names, found ['A']\n"
     )
+
+
+def test_the_plan_is_no_abbreviation_of_another_flag_of_run(study, tmp_path, capsys):
+    """`human summarise` and `table human` have `--plan`; `run` took it for its `--planner`."""
+    with pytest.raises(SystemExit):
+        main(["human", "run", "--plan", str(study / "plan.json"), "--participant", "P01", "--out", str(tmp_path)])
+    assert capsys.readouterr().err.endswith("run: error: unrecognized arguments: --plan\n")
 
 
 def test_wrong_calls_of_run_are_one_line(study, tmp_path, capsys):
