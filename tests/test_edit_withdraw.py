@@ -204,7 +204,8 @@ def test_targets_of_linked_recordings_are_deleted(folder):
 ANSWERS = (("effort", ""), ("performance", "C-3"))
 
 
-def test_a_session_is_deleted_with_its_last_recording(folder):
+def make_sessions(folder: Path) -> Path:
+    """Sessions of two pairs with journal and answers, of episodes 0 and 1 (`P01`), 2 and 6 (`P02`)."""
     out = folder / "sessions"
     for pair, numbers in (("P01", (0, 1)), ("P02", (2, 6))):
         session = out / f"{pair}-01"
@@ -222,6 +223,11 @@ def test_a_session_is_deleted_with_its_last_recording(folder):
         lines = [{"participant": "other", "item": item, "consent": consent} for item, consent in ANSWERS]
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (session / "answers.jsonl").write_text(text, encoding="utf-8")
+    return out
+
+
+def test_a_session_is_deleted_with_its_last_recording(folder):
+    out = make_sessions(folder)
     withdraw("C-1", [folder / "set", out], delete=True)
     assert [path.name for path in out.iterdir()] == ["P02-01"]
     withdraw("C-3", [folder / "set", out], delete=True)
@@ -229,6 +235,99 @@ def test_a_session_is_deleted_with_its_last_recording(folder):
     assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
     answers = (out / "P02-01" / "answers.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["item"] for line in answers] == ["effort"]
+
+
+def entries(folder: Path) -> dict[Path, bytes | None]:
+    """Files, folders and links below a folder, except tables of frames; None for what is no file."""
+    found = {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+    return {path: content for path, content in found.items() if folder / "set" / "data" not in path.parents}
+
+
+@pytest.mark.parametrize("consent", ["C-1", "C-2", "C-3", "C-5"])
+def test_a_call_without_yes_lists_all_that_would_be_removed(folder, consent):
+    out = make_sessions(folder)
+    (out / "P01-01" / ".copolicy.lock").touch()
+    (out / "P02-01" / "._episode_002.mcap").write_bytes(b"macOS")
+    (folder / "set" / "raw" / "._episode_000002.mcap").write_bytes(b"macOS")
+    (folder / "set" / ".cache").mkdir()
+    (folder / "set" / ".cache" / "episode_000000.mcap.metadata").touch()
+    (folder / ".set.0123abcd.partial").mkdir()
+    (folder / "linked").mkdir()
+    (folder / "linked" / "any name.mcap").symlink_to(folder / "recordings" / "episode_000002.mcap")
+    if consent == "C-5":
+        set_columns(folder / "set", consent_id=["C-5"] * 8)
+    paths = [folder / name for name in ("linked", "set", "recordings", "sessions")]
+    before = entries(folder)
+    planned = withdraw(consent, paths)
+    assert entries(folder) == before
+    done = withdraw(consent, paths, delete=True)
+    after = entries(folder)
+    listed = {Path(name) for name in planned["files"]}
+    gone = before.keys() - after.keys()
+    assert {path for path in gone if not listed & {path, *path.parents}} == set()
+    assert {path.relative_to(folder).as_posix() for path in listed - gone} <= {"set/README.md"}  # the minimal card
+    counts = {
+        str(path): f"{content.count(b'\n') - after[path].count(b'\n')} of {content.count(b'\n')}"
+        for path, content in before.items()
+        if path.suffix == ".jsonl" and path in after and after[path] != content
+    }
+    assert planned.get("lines", {}) == counts
+    for name, facts in planned["data_sets"].items():
+        assert facts.items() <= done["data_sets"][name].items()
+
+
+def test_answers_that_would_be_removed_are_counted(folder, capsys):
+    out = make_sessions(folder)
+    assert main(["withdraw", "C-3", str(folder / "set"), str(out)]) == 0
+    told = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [str(out / "P02-01" / "answers.jsonl"), "1", "of", "2"] in told
+    assert [str(out / "P02-01" / "journal.jsonl"), "2", "of", "3"] in told
+
+
+def test_the_recording_behind_a_linked_raw_copy_is_deleted_with_its_session(folder):
+    """The link is gone when the data set is rewritten; the recording, visited through it, must not stay."""
+    out = make_sessions(folder)
+    for number in (0, 1):
+        raw = folder / "set" / "raw" / f"episode_00000{number}.mcap"
+        raw.unlink()
+        raw.symlink_to(out / "P01-01" / f"episode_{number:03d}.mcap")
+    shutil.rmtree(folder / "recordings")
+    withdraw("C-1", [folder / "set", out], delete=True)
+    assert [path.name for path in out.iterdir()] == ["P02-01"]
+
+
+def test_a_linked_session_is_deleted_with_its_link(folder):
+    out = make_sessions(folder)
+    (out / "P01-01").rename(folder / "disk")
+    (out / "P01-01").symlink_to(folder / "disk")
+    withdraw("C-1", [folder / "set", out], delete=True)
+    assert [path.name for path in out.iterdir()] == ["P02-01"]
+    assert not (folder / "disk").exists()
+
+
+@pytest.mark.parametrize("before", [".mcap", ".jsonl"])
+def test_an_interrupted_call_is_completed_by_the_next(folder, monkeypatch, before):
+    """The consent ids are in the data set only, which is therefore rewritten last."""
+
+    class Killed(BaseException):
+        pass
+
+    real = Path.unlink
+
+    def killed(path, **options):
+        if path.suffix == before:
+            raise Killed
+        real(path, **options)
+
+    out = make_sessions(folder)
+    (out / "P01-01" / "video.mp4").touch()
+    monkeypatch.setattr(Path, "unlink", killed)
+    with pytest.raises(Killed):
+        withdraw("C-1", [folder / "set", out], delete=True)
+    monkeypatch.undo()
+    withdraw("C-1", [folder / "set", out], delete=True)
+    assert [path.name for path in (out / "P01-01").iterdir()] == ["video.mp4"]
+    assert [row["pair_id"] for row in columns(folder / "set")][:2] == ["P02", "P02"]
 
 
 def test_a_set_without_remaining_episodes_is_deleted(folder):
