@@ -115,7 +115,8 @@ def _logging_as_found():
 
 @pytest.fixture(params=["stand-in", "ray"])
 def ray(request, monkeypatch, tmp_path_factory):
-    """Ray itself where it is installed, and the local executor in its place."""
+    """Ray itself where it is installed, and the local executor in its place; no cluster in the environment."""
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
     if request.param == "ray":
         pytest.importorskip("ray")
         return

@@ -1,4 +1,4 @@
-"""Policies without torch that a planner's process loads."""
+"""Policies without torch that a process of policies loads."""
 
 import os
 import time

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from copolicy.dataset.command_line.commands import add_command, command_parser, run
+from copolicy.dataset.command_line.commands import add_command, add_group, command_parser, run
 from copolicy.dataset.exceptions import FileFormatError, RunError
 
 
@@ -62,6 +62,18 @@ def test_an_unknown_flag_is_reported_by_its_command(capsys):
     assert capsys.readouterr().err == (
         "usage: tool do [-h] [--json] [--debug]\ntool do: error: unrecognized arguments: --pilots keyboard\n"
     )
+
+
+@pytest.mark.parametrize("argv", [["--ver"], ["do", "--js"], ["of", "it", "--deb"]])
+def test_a_flag_cannot_be_abbreviated(capsys, argv):
+    """It would change its meaning with each new flag."""
+    parser, commands = command_parser("tool", "A tool.")
+    add_command(commands, "do", lambda arguments: {}, "does it", "tool do")
+    add_command(add_group(commands, "of", "steps", "Steps.", ["tool of it"]), "it", lambda arguments: {}, "", "")
+    with pytest.raises(SystemExit) as stop:
+        run(parser, argv)
+    assert stop.value.code == 2
+    assert capsys.readouterr().out == ""
 
 
 def test_nothing_is_printed_as_none(capsys):

@@ -30,6 +30,14 @@ def test_shards_in_a_named_folder_are_kept(ray, unsharded, tmp_path, capsys):
     assert (tmp_path / "shards" / "findings.json").is_file()
 
 
+def test_no_cluster_at_the_address_of_the_environment_leaves_nothing(ray, unsharded, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
+    assert main(_ray(unsharded, tmp_path / "set")) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("copolicy-convert: RAY_ADDRESS: expected a Ray cluster that answers, found '127.0.0.1:1: ")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("executor", ["ray", "slurm"])
 def test_an_executor_that_is_not_here_leaves_nothing(unsharded, tmp_path, monkeypatch, executor):
     monkeypatch.setenv("PATH", "")

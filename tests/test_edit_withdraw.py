@@ -10,6 +10,7 @@ import pytest
 from checked_data import EPISODES, contents, set_columns
 from edited_data import columns, digests, info, load, make_people
 from mcap.writer import Writer
+from withdrawable_data import withdrawable
 
 from copolicy.dataset.checks.checking import check_dataset
 from copolicy.dataset.cli import main
@@ -32,30 +33,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def folder(made, tmp_path) -> Path:
-    """A data set `set` with raw copies, two releases, card and reports, and its `recordings`."""
-    shutil.copytree(made.parent / "recordings", tmp_path / "recordings")
-    root = Path(shutil.copytree(made, tmp_path / "set"))
-    raw = root / "raw"
-    shutil.copytree(tmp_path / "recordings", raw)
-    entries = {path.relative_to(root).as_posix(): file_entry(path) for path in raw.glob("*.mcap")}
-    (raw / "manifest.json").write_text(Manifest(entries).to_text(), encoding="utf-8")
-    rows = columns(root)
-    record = json.loads((root / "meta/copolicy.json").read_text(encoding="utf-8"))
-    record["notes"] = {rows[0]["episode_uuid"]: ["mended"], rows[2]["episode_uuid"]: ["doubtful"]}
-    record["left_out"]["discarded"] = ["episode_000000.mcap", "episode_000099.mcap"]
-    (root / "meta/copolicy.json").write_text(json.dumps(record), encoding="utf-8")
-    release(root, "major", "Sessions of P01 and P02.")
-    set_columns(root, license=["cc0-1.0"] * 8)
-    release(root, "patch", f"Episode {rows[1]['episode_uuid']} under another licence.")
-    (root / "README.md").write_text("P01 played two episodes", encoding="utf-8")
-    (root / "figures").mkdir()
-    (root / "figures" / "paths.png").write_bytes(b"paths of everybody")
-    (root / "report.html").write_text("all trajectories", encoding="utf-8")
-    (root / "meta/copolicy_stats.json").write_text('{"P01": 1}', encoding="utf-8")
-    (root / "meta/copolicy_check.json").write_text('{"findings": []}', encoding="utf-8")
-    (root / "LICENSE").write_text("a licence", encoding="utf-8")
-    (root / "notes.txt").write_text("lab notes", encoding="utf-8")
-    return tmp_path
+    return withdrawable(made, tmp_path)
 
 
 def everything(folder: Path) -> bytes:
@@ -172,63 +150,6 @@ def test_an_amended_consent_id_finds_copies_without_it(folder, made):
     assert (summary["withdrawn"], summary["recordings"], len(summary["data_sets"])) == (1, 1, 2)
     assert uuids[6] not in {row["episode_uuid"] for row in columns(other)}
     assert not (folder / "recordings" / "episode_000006.mcap").exists()
-
-
-def test_recordings_in_every_state(folder):
-    recordings = folder / "recordings"
-    files = [recordings / f"episode_00000{number}.mcap" for number in range(4)]
-    os_part = files[0].rename(f"{files[0]}.part")
-    undone = files[1].rename(f"{files[1]}.undone")
-    (recordings / "deeper").mkdir()
-    moved = files[2].rename(recordings / "deeper" / "any name.mcap")
-    (recordings / "._episode_000003.mcap").write_bytes(b"macOS")
-    shutil.rmtree(folder / "set" / "raw")
-    withdraw("C-1", [folder], delete=True)
-    assert not os_part.exists()
-    assert not undone.exists()
-    assert moved.exists()
-    withdraw("C-3", [folder], delete=True)
-    assert not moved.exists()
-    assert not files[3].exists()
-    assert not (recordings / "._episode_000003.mcap").exists()
-
-
-def test_targets_of_linked_recordings_are_deleted(folder):
-    elsewhere = folder / "disk"
-    (folder / "recordings").rename(elsewhere)
-    (folder / "recordings").symlink_to(elsewhere)
-    withdraw("C-3", [folder / "set", folder / "recordings"], delete=True)
-    assert len(list(elsewhere.glob("*.mcap"))) == 6
-
-
-ANSWERS = (("effort", ""), ("performance", "C-3"))
-
-
-def test_a_session_is_deleted_with_its_last_recording(folder):
-    out = folder / "sessions"
-    for pair, numbers in (("P01", (0, 1)), ("P02", (2, 6))):
-        session = out / f"{pair}-01"
-        session.mkdir(parents=True)
-        for number in numbers:
-            shutil.copy(folder / "recordings" / f"episode_00000{number}.mcap", session / f"episode_{number:03d}.mcap")
-        (session / "session.json").write_text(json.dumps({"pair_id": pair}), encoding="utf-8")
-        lines = [
-            {"event": "ready", "player": f"{pair}-a", "consent": "C-3"},
-            {"event": "keep", "file": f"episode_{numbers[0]:03d}.mcap"},
-            {"event": "keep", "file": f"episode_{numbers[1]:03d}.mcap"},
-        ]
-        text = "".join(json.dumps(line) + "\n" for line in lines)
-        (session / "journal.jsonl").write_text(text, encoding="utf-8")
-        lines = [{"participant": "other", "item": item, "consent": consent} for item, consent in ANSWERS]
-        text = "".join(json.dumps(line) + "\n" for line in lines)
-        (session / "answers.jsonl").write_text(text, encoding="utf-8")
-    withdraw("C-1", [folder / "set", out], delete=True)
-    assert [path.name for path in out.iterdir()] == ["P02-01"]
-    withdraw("C-3", [folder / "set", out], delete=True)
-    journal = (out / "P02-01" / "journal.jsonl").read_text(encoding="utf-8").splitlines()
-    assert [json.loads(line)["file"] for line in journal] == ["episode_006.mcap"]
-    answers = (out / "P02-01" / "answers.jsonl").read_text(encoding="utf-8").splitlines()
-    assert [json.loads(line)["item"] for line in answers] == ["effort"]
 
 
 def test_a_set_without_remaining_episodes_is_deleted(folder):

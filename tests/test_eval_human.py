@@ -1,249 +1,32 @@
-"""The human study: its design, its statistics, and a session with a simulated player at the human seat."""
+"""The study with people: a session with a simulated player at the human seat, and the commands."""
 
 import json
 from collections import Counter
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from human_plan import ROBOTS, SHORT
 from play_session import settings
 from untrained_policy import save_untrained_policy, untrained_robots
 
 from copolicy.collect.play.result import ResultPhase
 from copolicy.collect.play.session_run import prepared
 from copolicy.collect.play.settings import PlayerSpec
-from copolicy.collect.questionnaire import Answer, AnswerFile, read_questionnaire
 from copolicy.collect.session import EpisodeCounts, iter_recordings
 from copolicy.collect.simulate.command import simulate
-from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
+from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.files.staging import replace_json
 from copolicy.dataset.recording.reader import read_episode
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
-from copolicy.evaluate.human_study.design import make_plan, williams_square
+from copolicy.evaluate.human_study.design import make_plan
 from copolicy.evaluate.human_study.plan import Robot, StudyPlan
-from copolicy.evaluate.human_study.ratings import read_ratings, study_ratings
 from copolicy.evaluate.human_study.schedule import BlindPolicy, StudySchedule
 from copolicy.evaluate.human_study.session import require_planned_weights, run_session
-from copolicy.evaluate.human_study.summary import summarise_study
-from copolicy.evaluate.partner_study.configurations import front_configurations, study_configurations
-from copolicy.tasks.table.map_config import MapConfig
-
-SHORT = tuple(MapConfig((803.0, y, 3.14), (960.0, y)) for y in (250.0, 350.0))
-"""Straight ahead, about a second away."""
-
-
-@pytest.mark.parametrize("count", [2, 3, 4, 5])
-def test_every_condition_comes_everywhere_and_after_every_other_one(count):
-    square = williams_square(count)
-    rows = len(square)
-    assert rows == (count if count % 2 == 0 else 2 * count)
-    assert all(sorted(row) == list(range(count)) for row in square)
-    for place in range(count):
-        assert set(Counter(row[place] for row in square).values()) == {rows // count}
-    after = Counter(pair for row in square for pair in pairwise(row))
-    assert set(after.values()) == {rows // count}
-    assert len(after) == count * (count - 1)
-
-
-ROBOTS = (Robot("CoDP-H", "a", "1"), Robot("CoDP", "b", "2"))
-
-
-def test_a_plan_pairs_starts_within_a_person_and_counterbalances_robots():
-    plan = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 0)
-    assert list(plan.trials) == [f"P{k:02d}" for k in range(1, 11)]
-    firsts = Counter()
-    for trials in plan.trials.values():
-        assert [trial.block for trial in trials] == [1] * 12 + [2] * 12
-        one, other = ([t for t in trials if t.block == block] for block in (1, 2))
-        assert {t.robot for t in one} != {t.robot for t in other}
-        assert {t.configuration for t in one} == {t.configuration for t in other}
-        assert len({t.configuration for t in one}) == 12
-        assert [t.configuration for t in one] != [t.configuration for t in other]
-        assert len({t.code for t in trials}) == 24
-        firsts[one[0].robot] += 1
-    assert firsts == {"CoDP-H": 5, "CoDP": 5}
-    used = Counter(t.configuration for trials in plan.trials.values() for t in trials)
-    assert set(used.values()) == {4}
-    assert len(used) == 60
-    same = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 0)
-    other = make_plan(ROBOTS, "unseen", study_configurations("unseen", 60), 10, 12, 1)
-    assert plan == same
-    assert plan.plan_id != other.plan_id
-
-
-@pytest.mark.parametrize("robots", [2, 3])
-def test_set_ups_are_counterbalanced_with_the_robots_and_share_their_starts(robots):
-    names = tuple(Robot(f"R{k}", "a", str(k)) for k in range(robots))
-    task = get_task("table")
-    fronts = task.studies.fronts
-    starts = front_configurations(task.scenario_set("unseen"), 60, fronts)
-    assert Counter(task.studies.front(start) for start in starts) == {"human_front": 30, "robot_front": 30}
-    orders = 2 * len(williams_square(robots))
-    plan = make_plan(names, "unseen", starts, orders, 4, 0, fronts)
-    assert plan.fronts == fronts
-    first, places = Counter(), Counter()
-    for trials in plan.trials.values():
-        own = {}
-        for block, robot in {trial.block: trial.robot for trial in trials}.items():
-            parts = [trial for trial in trials if trial.block == block]
-            assert [trial.front for trial in parts] in ([a] * 2 + [b] * 2 for a, b in (fronts, fronts[::-1]))
-            assert all(task.studies.front(starts[trial.configuration]) == trial.front for trial in parts)
-            bases = [
-                {(s := starts[t.configuration]).start[:2] + s.goal + s.obstacles for t in parts[k : k + 2]}
-                for k in (0, 2)
-            ]
-            assert bases[0] == bases[1]
-            own[robot] = {trial.configuration for trial in parts}
-            first[robot, parts[0].front] += 1
-            places[block, parts[0].front] += 1
-        assert len({frozenset(indices) for indices in own.values()}) == 1
-    assert set(first.values()) == {orders // 2}
-    assert set(places.values()) == {orders // 2}
-    with pytest.raises(InvalidValueError, match="--episodes-per-robot: expected 1 to 60, a multiple of 2, found 3"):
-        make_plan(names, "unseen", starts, 1, 3, 0, fronts)
-
-
-def test_a_plan_of_before_the_set_ups_and_questionnaires_keeps_its_id(tmp_path):
-    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
-    content = plan.to_json()
-    assert plan.plan_id == "dc2998f5"
-    assert "questionnaires" not in content
-    assert set(content["robots"][0]) == {"name", "checkpoint", "weights_sha256"}
-    assert set(content["trials"]["P01"][0]) == {"code", "block", "robot", "configuration"}
-    asked = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, questionnaires=(read_questionnaire("nasa-tlx"),))
-    replace_json(tmp_path / "plan.json", asked.to_json())
-    assert StudyPlan.read(tmp_path / "plan.json") == asked
-    assert asked.plan_id != plan.plan_id
-
-
-def test_a_plan_is_read_as_it_was_written_and_refused_when_changed(tmp_path):
-    plan = make_plan(ROBOTS, "custom", SHORT, 1, 2, 3, settings={"num_inference_steps": 5})
-    path = tmp_path / "plan.json"
-    replace_json(path, plan.to_json())
-    assert StudyPlan.read(path) == plan
-    content = json.loads(path.read_text(encoding="utf-8"))
-    content["trials"]["P01"][0]["robot"] = "CoDP"
-    content["trials"]["P01"][1]["robot"] = "CoDP"
-    content["trials"]["P01"][2]["robot"] = "CoDP-H"
-    content["trials"]["P01"][3]["robot"] = "CoDP-H"
-    content["seed"] = 4
-    path.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(FileFormatError) as error:
-        StudyPlan.read(path)
-    assert f"{path}: expected the plan {plan.plan_id} as it was made, found a changed one, " in str(error.value)
-    path.write_text('{"study_plan": 1}', encoding="utf-8")
-    with pytest.raises(FileFormatError, match="expected a plan of copolicy-eval human plan, found none: KeyError"):
-        StudyPlan.read(path)
-
-
-def _rows(source="human"):
-    """Three people, two robots, two episodes each: the first robot is better, by another amount for each person."""
-    return [
-        {
-            "participant": f"P0{person}", "robot": robot, "source": source, "success": not (robot == "B" and k < gap),
-            "time_s": 10.0 + person + (gap + 1 if robot == "B" else 0), "interaction_mean": 0.1 * (1 + (robot == "B")),
-            "interaction_p95": 0.3, "planning_ms": None,
-        }
-        for person, gap in ((1, 0), (2, 1), (3, 2))
-        for robot in "AB"
-        for k in range(2)
-    ]  # fmt: skip
-
-
-def test_a_summary_is_within_persons_and_says_who_they_were():
-    summary = summarise_study(_rows())
-    assert summary["label"] == "human-in-the-loop study: people at the human seat"
-    a, b = summary["robots"]["A"], summary["robots"]["B"]
-    assert (a["success"]["mean"], b["success"]["mean"]) == (1.0, 0.5)
-    assert b["success"]["standard_error"] == pytest.approx(0.5 / np.sqrt(3))
-    assert (b["time_s"]["mean"], b["time_s"]["participants"]) == (13.0, 2)  # the third never succeeded with B
-    assert a["planning_ms"] == {"mean": None, "sd": None, "standard_error": None, "participants": 0}
-    assert summary["tests"]["success"]["anova"][0]["F"] == pytest.approx(3.0)
-    assert len(summary["tests"]["time_s"]["units"]) == 2
-    assert summary["tests"]["interaction_mean"]["anova"] is None  # the same difference for everybody: no spread
-    assert summary["tests"]["interaction_mean"]["tukey"][0]["difference"] == pytest.approx(-0.1)
-    assert summarise_study(_rows("simulated"))["label"].startswith("SIMULATED")
-
-
-def test_people_and_simulated_players_are_not_mixed():
-    with pytest.raises(Exception, match="expected one source, found human and simulated: summarise them apart"):
-        summarise_study([*_rows(), *_rows("simulated")])
-
-
-def test_ratings_get_their_robot_from_the_plan(tmp_path):
-    plan = make_plan(ROBOTS, "custom", SHORT, 2, 1, 0)
-    path = tmp_path / "ratings.csv"
-    path.write_text("participant,block,fluent,trust\nP01,1,6,5\nP01,2,4,\nP02,1,3,4\nP02,2,7,4\n", encoding="utf-8")
-    ratings = read_ratings(path, plan)
-    assert [row["robot"] for row in ratings] == [
-        next(t.robot for t in plan.trials_of(row["participant"]) if t.block == row["block"]) for row in ratings
-    ]
-    assert ratings[1]["trust"] is None
-    summary = summarise_study(_rows(), ratings)["ratings"]
-    assert list(summary) == ["fluent", "trust"]
-    assert {robot["participants"] for robot in summary["fluent"]["robots"].values()} == {2}
-    assert sum(robot["mean"] for robot in summary["fluent"]["robots"].values()) == pytest.approx(10.0)
-    path.write_text("participant,block,fluent\nP01,1,good\n", encoding="utf-8")
-    with pytest.raises(FileFormatError) as error:
-        read_ratings(path, plan)
-    assert str(error.value) == f"{path}: expected a number for 'fluent' in row 1, found 'good'"
-    path.write_text("participant,block,fluent\nP01,3,1\n", encoding="utf-8")
-    with pytest.raises(FileFormatError) as error:
-        read_ratings(path, plan)
-    assert str(error.value) == f"{path}: expected blocks of plan {plan.plan_id}, found P01 block 3 in row 1"
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("block,participant,fluent\n1,P01,3,5\n", "found more values than columns in row 1"),  # a comma in a number
-        ("participant,block,fluent\nP01,1.5,3\n", "expected the number of a block in row 1, found '1.5'"),
-        (
-            "participant,block,nasa-tlx.effort\nP01,1,105\n",
-            "expected 0 to 100 for 'nasa-tlx.effort' in row 1, found 105",
-        ),
-        ("participant,block,nasa-tlx.efort\nP01,1,5\n", "frustration, found nasa-tlx.efort"),
-        ("participant,block,nasa-tlx.raw_tlx\nP01,1,5\n", "frustration, found nasa-tlx.raw_tlx"),  # computed from items
-        ("participant,block,fluent\nP01,1,\xff\n", "found invalid UTF-8 (byte 31)"),
-        (
-            "participant,block,fluent\nP01,1,%s\n" % ("3" * 140_000),
-            "found no CSV (field larger than field limit (131072))",
-        ),
-    ],
-)
-def test_ratings_that_would_be_misread_are_refused_in_one_line(tmp_path, text, message):
-    plan = make_plan(ROBOTS, "custom", SHORT, 1, 1, 0, questionnaires=(read_questionnaire("nasa-tlx"),))
-    path = tmp_path / "ratings.csv"
-    path.write_bytes(text.encode("latin-1"))
-    with pytest.raises(FileFormatError) as error:
-        read_ratings(path, plan)
-    assert str(error.value).startswith(f"{path}: expected ")
-    assert str(error.value).endswith(message)
-
-
-def test_the_last_answer_in_a_session_counts_also_when_the_clock_was_set_back(tmp_path):
-    plan = make_plan(ROBOTS, "custom", SHORT, 1, 1, 0)
-    first = Answer(plan.plan_id, "P01", 1, "own", "one", 4.0, 1.0, "human", time="2024-05-01T10:00:05.000+00:00")
-    changed = replace(first, value=6.0, time="2024-05-01T10:00:02.000+00:00")
-    later = replace(first, item="two", value=2.0, time="2024-05-02T09:00:00.000+00:00")
-    for name, answers in (("P01-01", (first, changed, replace(first, item="two"))), ("P01-02", (later,))):
-        (tmp_path / name).mkdir()
-        for answer in answers:
-            AnswerFile(tmp_path / name).add(answer)
-    (row,) = study_ratings([tmp_path], plan, [], None, "human")
-    assert (row["own.one"], row["own.two"]) == (6.0, 2.0)
-
-
-@pytest.mark.parametrize(("dx", "dy"), [(100.0, 100.0), (300.0, -300.0), (113.0, 113.0), (100.0, 0.0), (100.0, 37.0)])
-def test_a_start_in_a_set_up_is_of_that_set_up_also_at_45_degrees(dx, dy):
-    studies = get_task("table").studies
-    scenario = MapConfig((400.0, 350.0, 0.3), (400.0 + dx, 350.0 + dy))
-    for front in studies.fronts:
-        assert studies.front(studies.with_front(scenario, front)) == front
+from copolicy.evaluate.partner_study.configurations import front_configurations
 
 
 class _Robot:
@@ -358,7 +141,7 @@ def test_a_session_is_blind_in_the_plans_order_and_goes_on_where_it_was_left(stu
     plan = StudyPlan.read(study / "plan.json")
     out = tmp_path / "recordings"
     flags = ["--participant", "P01", "--out", str(out), "--human", "scripted:S02", "--headless", "--json"]
-    flags += ["--practice", "1", "--countdown", "0", "--planner", "thread"]
+    flags += ["--practice", "1", "--countdown", "0", "--inference", "thread"]
     assert main(["human", "run", str(study / "plan.json"), *flags]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["complete"] is True
@@ -465,6 +248,13 @@ def test_the_plan_command_deals_sixty_starts_among_five_people(study, tmp_path, 
     assert capsys.readouterr().err == (
         "copolicy-eval: CKPT: expected at least two robots of different names, found ['A']\n"
     )
+
+
+def test_the_plan_is_no_abbreviation_of_another_flag_of_run(study, tmp_path, capsys):
+    """`human summarise` and `table human` have `--plan`; `run` took it for its `--planner`."""
+    with pytest.raises(SystemExit):
+        main(["human", "run", "--plan", str(study / "plan.json"), "--participant", "P01", "--out", str(tmp_path)])
+    assert capsys.readouterr().err.endswith("run: error: unrecognized arguments: --plan\n")
 
 
 def test_wrong_calls_of_run_are_one_line(study, tmp_path, capsys):

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from policy_runs import save_run
 from untrained_policy import save_untrained_policy
 
 from copolicy.cards.cli import main as cards
@@ -16,6 +17,7 @@ from copolicy.dataset.exceptions import InvalidValueError, UnknownNameError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
+from copolicy.evaluate.partner_study import study
 from copolicy.evaluate.partner_study.configurations import study_configurations
 from copolicy.evaluate.partner_study.episode_result import PartnerEpisodeResult
 from copolicy.evaluate.partner_study.robots import hidden_partner_robot, policy_robot, scripted_robots, split_robot
@@ -271,6 +273,22 @@ def test_the_command_writes_every_robots_episodes_and_the_card_reads_them(checkp
     text = (copy / "README.md").read_text(encoding="utf-8")
     assert "With simulated partners on 4 starts of the unseen maps, 1 action(s) per chunk" in text
     assert "| never-yields | 0.0 ± 0.0 | 0.0 to 19.4 | 16 |" in text
+
+
+@pytest.mark.parametrize(("flags", "of_policies"), [((), [10, 30]), (("--fps", "15"), [15, 15])])
+def test_each_policy_acts_at_its_own_rate_and_other_robots_at_every_step(
+    checkpoint, tmp_path, monkeypatch, flags, of_policies
+):
+    faster, rates = save_run(tmp_path / "run", fps=30.0), []
+    original = study.run_with_partners
+    monkeypatch.setattr(
+        study, "run_with_partners", lambda *given, **more: rates.append(more["fps"]) or original(*given, **more)
+    )
+    baseline = ("--baseline", f"faster={faster}", "passive", "never-yields", "random")
+    assert _command(checkpoint, tmp_path / "partner.json", "--partners", "slow", *baseline, *flags) == 0
+    assert rates == [*of_policies, 30, 30, 30]
+    settings = json.loads((tmp_path / "partner.json").read_text(encoding="utf-8"))["settings"]
+    assert settings["fps"] == of_policies[0]
 
 
 def _digest(folder):

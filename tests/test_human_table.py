@@ -172,10 +172,10 @@ def test_the_whole_walk_with_a_planner_that_dies_on_the_way(study, tmp_path, cap
     killer.join(10)
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error == (
-        "copolicy-eval: planner: expected a running process, found that it ended (killed, or out of memory); run the "
+        "copolicy-eval: inference: expected a running process, found that it ended (killed, or out of memory); run the "
         "same command to continue"
     )
-    assert main([*run, "--planner", "thread"]) == 0
+    assert main([*run, "--inference", "thread"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["complete"], told["kept_in_session"], told["episodes"]) == (True, 4, 4)
 
@@ -196,7 +196,7 @@ def test_the_whole_walk_with_a_planner_that_dies_on_the_way(study, tmp_path, cap
     # Without the answers to the last block the session is not over: they are asked for again, in the same session.
     (path,) = out.rglob("answers.jsonl")
     path.write_text("".join(path.read_text(encoding="utf-8").splitlines(keepends=True)[:3]), encoding="utf-8")
-    assert main([*run, "--planner", "thread"]) == 0
+    assert main([*run, "--inference", "thread"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["complete"], told["kept"], told["kept_in_session"]) == (True, 0, 4)
     assert [(one.block, one.item) for _, one in answers_in(out)] == [(a.block, a.item) for a in answers]

@@ -64,8 +64,8 @@ def test_errors_of_loading_are_the_callers():
 
 def test_a_process_that_ends_is_said_in_one_line():
     process = PolicyProcess(process_policies.load)
-    with pytest.raises(RunError, match=r"^planner: expected a running process, found that it ended"):
+    with pytest.raises(RunError, match=r"^inference: expected a running process, found that it ended"):
         process.policies["dies"].predict_action_chunk({})
-    with pytest.raises(RunError, match=r"^planner: expected a running process"):
+    with pytest.raises(RunError, match=r"^inference: expected a running process"):
         process.policies["calm"].reset(0)
     process.close()

@@ -2,17 +2,21 @@
 
 import json
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from policy_runs import save_run
+from ray_stand_in import ClusterStandIn
 from slurm_cluster import stand_in_cluster
 
 from copolicy.dataset.distributed.executors import _slurm
 from copolicy.dataset.distributed.flags import Distribution, SlurmOptions
 from copolicy.dataset.distributed.job import Job, Step
+from copolicy.dataset.distributed.ray_executor import _cluster
+from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.evaluate.cli import main
 
 
@@ -59,6 +63,54 @@ def test_an_address_without_a_cluster_is_one_line(ray, run, tmp_path, capsys, ad
     assert sweep(run, tmp_path / "out", "--executor", "ray", "--address", address) == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith(f"copolicy-eval: --address: {message}")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("variable", "flags", "message"),
+    [
+        ("127.0.0.1:1", (), "RAY_ADDRESS: expected a Ray cluster that answers, found '127.0.0.1:1: "),
+        ("ray://127.0.0.1:1", ("--address", "auto"), "RAY_ADDRESS: expected a Ray cluster that answers, found 'ray:"),
+        ("127.0.0.1:2", ("--address", "[::1]:1"), "--address: expected a Ray cluster that answers, found '[::1]:1: "),
+        ("http://127.0.0.1:8265", (), "RAY_ADDRESS: expected HOST:PORT, ray://HOST:PORT or auto, found 'http://127"),
+    ],
+)
+def test_the_environments_address_counts_as_in_ray(ray, run, tmp_path, capsys, monkeypatch, variable, flags, message):
+    monkeypatch.setenv("RAY_ADDRESS", variable)
+    assert sweep(run, tmp_path / "out", "--executor", "ray", *flags) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"copolicy-eval: {message}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_address_in_the_environment_is_asked_only_where_ray_would_connect_to_it(ray, monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        monkeypatch.setenv("RAY_ADDRESS", f"127.0.0.1:{server.getsockname()[1]}")
+        Distribution("ray").require()
+    monkeypatch.setenv("RAY_ADDRESS", "anyscale://our-cluster")
+    Distribution("ray").require()
+    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
+    Distribution("local").require()
+    Distribution("ray", address="local").require()
+    monkeypatch.setitem(sys.modules, "ray", ClusterStandIn(connected=True))  # of a notebook, say
+    Distribution("ray").require()
+
+
+@pytest.mark.parametrize(
+    ("variable", "address", "name", "place"),
+    [
+        ("10.0.0.5:6379", None, "RAY_ADDRESS", "10.0.0.5:6379"),
+        ("10.0.0.5:6379", "auto", "RAY_ADDRESS", "10.0.0.5:6379"),
+        ("10.0.0.5:6379", "10.0.0.6:6379", "--address", "10.0.0.6:6379"),
+        ("", "auto", "--address", "auto"),
+    ],
+)
+def test_an_address_without_a_cluster_is_named_by_what_states_it(monkeypatch, variable, address, name, place):
+    cluster = ClusterStandIn(RuntimeError("no head node\nat all"))
+    monkeypatch.setitem(sys.modules, "ray", cluster)
+    monkeypatch.setenv("RAY_ADDRESS", variable)
+    with pytest.raises(InvalidValueError) as error, _cluster(address):
+        pass
+    assert str(error.value) == f"{name}: expected a Ray cluster that answers, found '{place}: no head node'"
+    assert cluster.addresses == [address]  # Ray itself reads the variable
 
 
 class Nothing(Step):

@@ -29,6 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "minutes. The data are of simulated pairs; nothing it prints is a result about people.",
         epilog="example:\n  copolicy-quickstart --out outputs/quickstart",
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     parser.add_argument("--out", type=Path, default=Path("outputs/quickstart"), help="folder for all outputs")
     add_whole_number(parser, "--episodes", "simulated episodes (default: 376)", 376)

@@ -11,7 +11,7 @@ from copolicy.dataset.worker_pool import WorkerPool
 from .policy import Policy
 
 _ATTRIBUTES = ("name", "task", "n_obs_steps", "n_action_steps", "fps", "keeps_history")
-_loaded: dict[str, Policy] = {}  # in the planner's process
+_loaded: dict[str, Policy] = {}  # in the process of the policies
 
 
 class PolicyProcess:
@@ -50,7 +50,7 @@ class PolicyProcess:
             return self._pool.submit(function, *arguments).result()
         except BrokenProcessPool:
             expected = "expected a running process, found that it ended (killed, or out of memory)"
-            raise RunError(f"planner: {expected}; run the same command to continue") from None
+            raise RunError(f"inference: {expected}; run the same command to continue") from None
 
     def close(self) -> None:
         """Ends the process after the chunk that it predicts."""

@@ -31,8 +31,11 @@ Needs = Sequence[str] | Callable[[argparse.Namespace], Sequence[str]]
 
 
 def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, Commands]:
-    """Returns the parser of a room's script and the object that its commands are added to."""
-    parser = argparse.ArgumentParser(prog=prog, description=description)
+    """Returns the parser of a room's script and the object that its commands are added to.
+
+    Flags cannot be abbreviated, here and in the commands: `--plan` must not be `--planner` where there is no `--plan`.
+    """
+    parser = argparse.ArgumentParser(prog=prog, description=description, allow_abbrev=False)
     add_version_flag(parser)
     return parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -56,6 +59,7 @@ def add_command(
         description=help,
         epilog=f"example:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     add_common_flags(parser)
     parser.set_defaults(handler=handler, needs=needs, parser=parser)
@@ -70,6 +74,7 @@ def add_group(commands: Commands, name: str, help: str, description: str, exampl
         description=description,
         epilog="\n  ".join(("example:", *examples)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     return parser.add_subparsers(dest="step", required=True, metavar="STEP")
 

@@ -2,8 +2,10 @@
 
 import argparse
 import importlib.util
+import os
 import shutil
 import socket
+import sys
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +13,9 @@ from ..command_line.flag_numbers import whole_number
 from ..exceptions import InvalidValueError
 
 EXECUTORS = ("local", "slurm", "ray")
+
+ADDRESS_VARIABLE = "RAY_ADDRESS"
+"""Environment variable with the address of a Ray cluster, read by `ray.init`."""
 
 _ANSWER_S = 10.0
 
@@ -42,7 +47,7 @@ class Distribution:
         executor: `local`, `slurm` or `ray`.
         workers: number of tasks at a time; None for one locally, for all on a cluster.
         slurm: options of SLURM jobs.
-        address: of a Ray cluster; None for the cluster of this process or machine.
+        address: of a Ray cluster; None for the cluster of this process, of `RAY_ADDRESS`, or of this machine.
     """
 
     executor: str = "local"
@@ -54,14 +59,16 @@ class Distribution:
         """Checks that the executor is usable on this machine.
 
         Raises:
-            InvalidValueError: Ray is not installed, nothing answers at its address, sbatch is not found, or no
-                partition is given.
+            InvalidValueError: Ray is not installed, nothing answers at its address or that of `RAY_ADDRESS`, sbatch is
+                not found, or no partition is given.
         """
-        if self.executor == "ray" and importlib.util.find_spec("ray") is None:
-            expected = "local or slurm, as ray is not installed (pip install ray)"
-            raise InvalidValueError("--executor", expected, self.executor)
-        if self.address is not None:
-            _require_answer(self.address)
+        if self.executor == "ray":
+            if importlib.util.find_spec("ray") is None:
+                expected = "local or slurm, as ray is not installed (pip install ray)"
+                raise InvalidValueError("--executor", expected, self.executor)
+            stated = stated_address(self.address)
+            if stated is not None and not _is_connected():
+                _require_answer(*stated)
         if self.executor == "slurm":
             if shutil.which("sbatch") is None:
                 raise InvalidValueError("--executor", "sbatch on the PATH, for slurm", "none")
@@ -121,17 +128,35 @@ def distribution_from_flags(arguments: argparse.Namespace) -> Distribution:
     return Distribution(executor, arguments.workers, SlurmOptions(**slurm), arguments.address)
 
 
-def _require_answer(address: str) -> None:
+def stated_address(address: str | None) -> tuple[str, str] | None:
+    """The address to which `ray.init` connects, after the flag or the variable that states it; None if neither does.
+
+    Args:
+        address: value of `--address`; as in `ray.init`, `RAY_ADDRESS` replaces none and `auto`, but no other.
+    """
+    variable = os.environ.get(ADDRESS_VARIABLE)
+    if variable and address in (None, "auto"):
+        return ADDRESS_VARIABLE, variable
+    return None if address is None else ("--address", address)
+
+
+def _is_connected() -> bool:
+    """Whether this process is connected to a Ray cluster, which then runs the tasks."""
+    return "ray" in sys.modules and sys.modules["ray"].is_initialized()
+
+
+def _require_answer(name: str, address: str) -> None:
     """Checks that something answers at an address; Ray itself tries for minutes."""
-    host, colon, port = address.removeprefix("ray://").rpartition(":")
-    if address in ("auto", "local"):
-        return
-    if not colon or not port.isdecimal():
-        raise InvalidValueError("--address", "HOST:PORT, ray://HOST:PORT or auto", address)
+    scheme, _, place = address.rpartition("://")
+    if address in ("auto", "local") or scheme not in ("", "ray", "http", "https"):
+        return  # of another scheme, such as anyscale://, only Ray's plugin knows the place
+    host, colon, port = place.rpartition(":")
+    if not colon or not port.isdecimal() or scheme.startswith("http"):  # http is Ray's dashboard, which takes jobs
+        raise InvalidValueError(name, "HOST:PORT, ray://HOST:PORT or auto", address)
     try:
         socket.create_connection((host.strip("[]"), int(port)), _ANSWER_S).close()
     except (OSError, OverflowError) as error:
-        raise InvalidValueError("--address", "a Ray cluster that answers", f"{address}: {error}") from None
+        raise InvalidValueError(name, "a Ray cluster that answers", f"{address}: {error}") from None
 
 
 def _option(text: str) -> tuple[str, str]:

@@ -11,6 +11,7 @@ from datatrove.executor import RayPipelineExecutor
 
 from ..command_line.commands import progress_bar
 from ..exceptions import CopolicyError, InvalidValueError
+from .flags import stated_address
 from .job import Job, run_rank
 
 RETRIES = 3
@@ -90,10 +91,12 @@ def _cluster(address: str | None) -> Iterator[None]:
         try:
             ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
         except (ConnectionError, ValueError, RuntimeError) as error:
-            if address is None:
+            stated = stated_address(address)
+            if stated is None:
                 raise
-            found = f"{address}: {next(iter(str(error).splitlines()), type(error).__name__)}"
-            raise InvalidValueError("--address", "a Ray cluster that answers", found) from None
+            name, place = stated
+            found = f"{place}: {next(iter(str(error).splitlines()), type(error).__name__)}"
+            raise InvalidValueError(name, "a Ray cluster that answers", found) from None
         try:
             yield
         finally:

@@ -17,7 +17,7 @@ from copolicy.dataset.task import PairTask, get_task
 
 from ..partner_study.command import add_overlap_flag
 from ..partner_study.configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
-from ..partner_study.robots import HIDDEN_HELP, make_robot, scripted_robots, split_robot
+from ..partner_study.robots import HIDDEN_HELP, make_robot, robot_rate, scripted_robots, split_robot
 from ..partners.names import PARTNERS_HELP, PROXY, PartnerName, parse_partners, partners_label
 from ..study_flags import POLICY_HELP, add_study_flags, checkpoint_task, study_needs, study_protocol, study_settings
 from ..trajectories import add_trajectories_flag
@@ -119,7 +119,7 @@ def _cross_play(arguments: argparse.Namespace) -> dict[str, Any]:
         task,
         scenarios,
         protocol.settings,
-        lambda robot: _rate(robot, arguments.fps, task),
+        lambda robot: robot_rate(robot, arguments.fps, task),
         arguments.repeats,
         arguments.seed,
         arguments.partner_seed,
@@ -147,13 +147,6 @@ def _task(arguments: argparse.Namespace) -> PairTask:
             named = parse_partners([text], get_task())[0]
             return checkpoint_task(named.detail)
     return get_task()
-
-
-def _rate(robot: "StudyRobot", fps: int | None, task: PairTask) -> int:
-    """Actions per second of a robot: the given ones or those of a policy's training data; others act at every step."""
-    if robot.policy is None:
-        return task.spec.record_hz
-    return robot.policy.fps if fps is None else fps
 
 
 def _given(floor: str, robots: Sequence[str]) -> bool:

@@ -42,10 +42,11 @@ def add_run(steps: Commands) -> None:
     )
     command.add_argument("--device", default="cpu", help="device of the policies (default: cpu)")
     command.add_argument(
-        "--planner",
+        "--inference",
         choices=("process", "thread"),
         default="process",
-        help="where the robots plan; a thread needs less memory, but can delay the control loop (default: process)",
+        help="runs the policies in a process of their own, or in a thread, which needs less memory but can delay the "
+        "control loop (default: process)",
     )
     command.add_argument("--new-session", action="store_true", help="do not continue the unfinished session")
     command.add_argument("--headless", action="store_true", help="no window, in real time; every episode is kept")
@@ -71,7 +72,7 @@ def _run(arguments: argparse.Namespace) -> dict[str, Any]:
         human,
         arguments.out,
         arguments.device,
-        arguments.planner,
+        arguments.inference,
         break_s=arguments.break_s,
         practice=arguments.practice,
         consents=("", arguments.consent),

@@ -27,7 +27,7 @@ def run_session(
     human: PlayerSpec,
     out: Path,
     device: str = "cpu",
-    planner: str = "process",
+    inference: str = "process",
     **play: Any,
 ) -> dict[str, Any]:
     """Runs or continues a participant's session until it is complete or is ended.
@@ -36,7 +36,7 @@ def run_session(
         human: agent at the human's seat: a joystick, the keyboard, or a scripted agent.
         out: folder of all sessions.
         device: device of the policies.
-        planner: where the robots plan: `process`, of their own, or `thread`, beside the control loop.
+        inference: runs the policies in a `process` of their own, or in a `thread` beside the control loop.
         play: further `StudySettings`.
 
     Returns:
@@ -69,7 +69,7 @@ def run_session(
         def load() -> None:
             require_planned_weights(plan)
             loader = partial(load_robots, plan.robots, plan.settings, device, plan.task_name, plan.configurations[0])
-            if planner == "thread":
+            if inference == "thread":
                 robots.update(loader())
                 return
             process = PolicyProcess(loader)

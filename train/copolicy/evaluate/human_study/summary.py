@@ -31,7 +31,7 @@ _DEFINITIONS = {
     **DEFINITIONS,
     "time_s": "simulated time: steps / rate",
     "wall_time_s": "by the clock, from the first step to the end of the last, without pauses",
-    "planning_ms": "mean time until an action chunk is there, with the way to the planner's process and back",
+    "planning_ms": "mean time until an action chunk is there, with the way to the policies' process and back",
     "fronts": "robot x set-up; a participant without a value in every cell is left out of the test, by name",
     "ratings": "Friedman's test, with two robots Wilcoxon's signed-rank test, over participants who rated every robot",
 }

@@ -25,7 +25,7 @@ from ..study_flags import (
 from ..summary import not_measured, percent
 from ..trajectories import BESIDE_RESULT, add_trajectories_flag, trajectories_beside, write_result
 from .configurations import DEFAULT_MAPS, DEFAULT_STARTS, study_configurations
-from .robots import HIDDEN_HELP, make_robot, scripted_robots, split_robot
+from .robots import HIDDEN_HELP, make_robot, robot_rate, scripted_robots, split_robot
 
 
 def add_partner_command(commands: Commands) -> None:
@@ -110,14 +110,10 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
     partners = [make_partner(partner, task, protocol, arguments.device, len(scenarios)) for partner in named]
     if partners[0].recorded is not None:
         scenarios = partners[0].recorded.scenarios
-    # Each policy acts at the rate of its training data; a scripted robot acts at every step of the world.
-    rates = [
-        protocol.fps if arguments.fps is not None or robot.policy is None else robot.policy.fps for robot in robots
-    ]
     by_robot = []
     episodes_per_robot = len(scenarios) * len(partners) * arguments.repeats
     with progress_bar(episodes_per_robot * len(robots), "episodes") as bar:
-        for index, (robot, fps) in enumerate(zip(robots, rates, strict=True)):
+        for index, robot in enumerate(robots):
             episodes = run_with_partners(
                 robot,
                 scenarios,
@@ -125,7 +121,7 @@ def _partner(arguments: argparse.Namespace) -> dict[str, Any]:
                 protocol.settings,
                 task=task,
                 repeats=arguments.repeats,
-                fps=fps,
+                fps=robot_rate(robot, arguments.fps, task),
                 seed=arguments.seed,
                 partner_seed=arguments.partner_seed,
                 on_step=lambda finished, done=index * episodes_per_robot: bar.update(done + finished - bar.n),

@@ -52,6 +52,20 @@ class StudyRobot:
     policy: "Checkpoint | None" = None
 
 
+def robot_rate(robot: StudyRobot, fps: int | None, task: PairTask) -> int:
+    """Actions per second of a robot.
+
+    Args:
+        fps: that of all policies; None for the rate of each policy's training data.
+
+    Returns:
+        The rate of a policy; for a robot without one, that of the steps, as it acts at each of them.
+    """
+    if robot.policy is None:
+        return task.spec.record_hz
+    return robot.policy.fps if fps is None else fps
+
+
 def policy_robot(name: str, policy: "Checkpoint") -> StudyRobot:
     """A robot that executes its half of a policy's joint action chunks."""
     task = get_task(policy.task)

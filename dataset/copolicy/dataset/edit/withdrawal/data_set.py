@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,9 @@ REGENERATED = {
 }
 """Files about all episodes, and the command that writes each again."""
 
-_WRITTEN = {"data", "videos", "images", ".cache", EPISODES_FOLDER} | {
+_DROPPED = ("images", ".cache")  # frames that are not encoded yet, and notes of the Hub's client on all files
+
+_WRITTEN = {"data", "videos", EPISODES_FOLDER, *_DROPPED} | {
     INFO_FILE,
     STATS_FILE,
     TASKS_FILE,
@@ -76,6 +78,12 @@ class AffectedDataSet:
     def root(self) -> Path:
         return self.stored.root
 
+    @property
+    def remaining(self) -> list[int]:
+        """Numbers of the other episodes."""
+        withdrawn = set(self.numbers)
+        return [row["episode_index"] for row in self.stored.rows if row["episode_index"] not in withdrawn]
+
 
 def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -> dict[str, Any]:
     """Rewrites a data set without its withdrawn episodes, or deletes it if no episode remains.
@@ -84,15 +92,15 @@ def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -
         episodes: number of episodes for the record of the withdrawal.
 
     Returns:
-        Deleted files with the command that writes them again, and files that still contain a name.
+        Files that still contain a name.
     """
     root, source = data_set.root, data_set.stored
-    withdrawn = set(data_set.numbers)
-    numbers = [row["episode_index"] for row in source.rows if row["episode_index"] not in withdrawn]
-    _delete_unfinished(root)
+    withdrawn, numbers = set(data_set.numbers), data_set.remaining
+    for path in _unfinished_beside(root):
+        shutil.rmtree(path)
     if not numbers:
         delete_folder(root)
-        return {"removed": "the whole data set: no episode is left"}
+        return {}
     with replaced_folder(root) as partial:
         write_subset(source, numbers, partial, remaining_splits(source.info, numbers))
         _link_other_files(root, partial, set(data_set.recordings))
@@ -103,14 +111,12 @@ def remove_withdrawn(data_set: AffectedDataSet, traces: Traces, episodes: int) -
         if entries:
             (partial / WITHDRAWALS_FILE).write_text(withdrawals_text(entries), encoding="utf-8")
         files_with_names = [path.relative_to(partial).as_posix() for path in traces.matching_files(partial)]
-        regenerate = {name: command for name, command in REGENERATED.items() if os.path.lexists(root / name)}
-    return {"make_anew": regenerate, **({"still_named_in": files_with_names} if files_with_names else {})}
+    return {"still_named_in": files_with_names} if files_with_names else {}
 
 
 def _link_other_files(root: Path, partial: Path, withdrawn: set[str]) -> None:
     """Links all files except withdrawn recordings and files that are rewritten or regenerated."""
-    side_files = {Path(name).with_name(f"._{Path(name).name}").as_posix() for name in withdrawn}
-    dropped = withdrawn | side_files | _WRITTEN | REGENERATED.keys()
+    dropped = withdrawn | _side_files(withdrawn) | _WRITTEN | REGENERATED.keys()
 
     def ignored(folder: str, names: list[str]) -> set[str]:
         relative_folder = Path(folder).relative_to(root)
@@ -153,12 +159,19 @@ def _rewrite(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _delete_unfinished(root: Path) -> None:
-    """Deletes hidden folders beside the data set that killed commands left."""
+def _unfinished_beside(root: Path) -> list[Path]:
+    """Hidden folders beside the data set that killed commands left."""
     target = root.resolve()
-    for path in target.parent.iterdir():
-        if path.name.startswith(f".{target.name}.") and is_unfinished(path.name) and path.is_dir():
-            shutil.rmtree(path)
+    return [
+        path
+        for path in sorted(target.parent.glob(".*"))
+        if path.name.startswith(f".{target.name}.") and is_unfinished(path.name) and path.is_dir()
+    ]
+
+
+def _side_files(names: Iterable[str]) -> set[str]:
+    """Names of macOS side files of recordings."""
+    return {Path(name).with_name(f"._{Path(name).name}").as_posix() for name in names}
 
 
 def _link(source: str, target: str) -> None:
@@ -171,11 +184,22 @@ def _link(source: str, target: str) -> None:
 
 
 def describe(data_set: AffectedDataSet) -> dict[str, Any]:
-    """Counts of what is withdrawn, for a summary."""
+    """What is withdrawn, for a summary: counts, and deleted files with the command that writes them again."""
+    regenerate = {name: command for name, command in REGENERATED.items() if os.path.lexists(data_set.root / name)}
     return {
         "episodes": f"{len(data_set.numbers)} of {len(data_set.stored.rows)}",
         **({"raw_recordings": len(data_set.recordings)} if data_set.recordings else {}),
+        **({"make_anew": regenerate} if data_set.remaining else {"removed": "the whole data set: no episode is left"}),
     }
+
+
+def deleted_with(data_set: AffectedDataSet) -> list[Path]:
+    """Files and folders that `remove_withdrawn` deletes or replaces by new ones, besides those with frames."""
+    root = data_set.root
+    if not data_set.remaining:
+        return [root, *_unfinished_beside(root)]
+    names = (*data_set.recordings, *sorted(_side_files(data_set.recordings)), *REGENERATED, *_DROPPED)
+    return [path for path in (root / name for name in names) if os.path.lexists(path)] + _unfinished_beside(root)
 
 
 def people_in(row: dict[str, Any]) -> set[str]:
