@@ -116,9 +116,9 @@ def test_a_call_without_yes_lists_all_that_would_be_removed(folder, consent):
     assert {path for path in gone if not listed & {path, *path.parents}} == set()
     assert {path.relative_to(folder).as_posix() for path in listed - gone} <= {"set/README.md"}  # the minimal card
     counts = {
-        str(path): f"{content.count(b'\n') - after[path].count(b'\n')} of {content.count(b'\n')}"
+        str(path): f"{len(content.splitlines()) - len(left.splitlines())} of {len(content.splitlines())}"
         for path, content in before.items()
-        if path.suffix == ".jsonl" and path in after and after[path] != content
+        if path.suffix == ".jsonl" and content and (left := after.get(path)) is not None and left != content
     }
     assert planned.get("lines", {}) == counts
     for name, facts in planned["data_sets"].items():
