@@ -168,6 +168,30 @@ def sound(sound_recordings):
 
 
 @pytest.fixture(scope="session")
+def recording(tmp_path_factory) -> Path:
+    """A recording of a straight carry, not to be changed."""
+    from straight_carry import record
+
+    return record(tmp_path_factory.mktemp("replay") / "episode.mcap")
+
+
+@pytest.fixture(scope="session")
+def track(recording):
+    """That recording as replay reads it."""
+    from copolicy.collect.replay.track import read_track
+
+    return read_track(recording)
+
+
+@pytest.fixture(scope="session")
+def people_set(tmp_path_factory) -> Path:
+    """A data set of eight episodes that say that people played them, not to be changed; see `make_people`."""
+    from edited_data import make_people
+
+    return make_people(tmp_path_factory.mktemp("people"))
+
+
+@pytest.fixture(scope="session")
 def unsharded(tmp_path_factory) -> Path:
     """Simulated recordings in `recordings`, and the data set that they become in one go in `whole`."""
     from checked_data import make_data_set, make_recordings

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from checked_data import EPISODES, contents, set_columns
-from edited_data import columns, digests, info, load, make_people
+from edited_data import columns, digests, info, load
 from mcap.writer import Writer
 from withdrawable_data import withdrawable
 
@@ -26,14 +26,9 @@ from copolicy.dataset.versions.release import release
 from copolicy.dataset.versions.release_record import read_release
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    return make_people(tmp_path_factory.mktemp("withdraw"))
-
-
 @pytest.fixture
-def folder(made, tmp_path) -> Path:
-    return withdrawable(made, tmp_path)
+def folder(people_set, tmp_path) -> Path:
+    return withdrawable(people_set, tmp_path)
 
 
 def everything(folder: Path) -> bytes:
@@ -128,8 +123,8 @@ def test_a_release_is_compared_with_the_remaining_episodes(folder, capsys):
     assert "added" not in out
 
 
-def test_the_first_release_counts_earlier_withdrawals(made, tmp_path):
-    root = Path(shutil.copytree(made, tmp_path / "set"))
+def test_the_first_release_counts_earlier_withdrawals(people_set, tmp_path):
+    root = Path(shutil.copytree(people_set, tmp_path / "set"))
     withdraw("C-9", [root], delete=True)
     changes = release(root, "minor", "The first.").changes
     assert changes[1] == "1 episode removed: withdrawn by people who took part; no release held them"
@@ -141,9 +136,9 @@ def test_a_consent_id_may_cover_several_pairs_and_be_one_of_several(folder):
     assert len(list((folder / "recordings").glob("*.mcap"))) == 4
 
 
-def test_an_amended_consent_id_finds_copies_without_it(folder, made):
+def test_an_amended_consent_id_finds_copies_without_it(folder, people_set):
     """The recordings were made without consent ids, and so was the other data set."""
-    other = Path(shutil.copytree(made, folder / "other"))
+    other = Path(shutil.copytree(people_set, folder / "other"))
     set_columns(other, consent_id=[""] * 8)
     uuids = [row["episode_uuid"] for row in columns(folder / "set")]
     summary = withdraw("C-9", [folder], delete=True)

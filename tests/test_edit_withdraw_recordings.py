@@ -6,21 +6,16 @@ from pathlib import Path
 
 import pytest
 from checked_data import set_columns
-from edited_data import columns, make_people
+from edited_data import columns
 from withdrawable_data import withdrawable
 
 from copolicy.dataset.cli import main
 from copolicy.dataset.edit.withdrawal.withdraw import withdraw
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    return make_people(tmp_path_factory.mktemp("withdraw"))
-
-
 @pytest.fixture
-def folder(made, tmp_path) -> Path:
-    return withdrawable(made, tmp_path)
+def folder(people_set, tmp_path) -> Path:
+    return withdrawable(people_set, tmp_path)
 
 
 def test_recordings_in_every_state(folder):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from straight_carry import record
 
 from copolicy.collect.replay.playback import Playback
 from copolicy.collect.replay.track import frame_positions, read_track
@@ -13,16 +12,6 @@ from copolicy.collect.replay.viewer import Viewer
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import FileFormatError
 from copolicy.tasks.table.interaction import interaction_force
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("replay") / "episode.mcap")
-
-
-@pytest.fixture(scope="module")
-def track(recording):
-    return read_track(recording)
 
 
 def pixels(surface):

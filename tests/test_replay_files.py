@@ -10,26 +10,14 @@ import av
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
-from straight_carry import record
 
 from copolicy.collect.cli import main
 from copolicy.collect.replay.playback import Playback
 from copolicy.collect.replay.sheet import draw_sheet, write_sheet
-from copolicy.collect.replay.track import read_track
 from copolicy.collect.replay.video import write_gif, write_video
 from copolicy.collect.replay.view import ReplayView, ViewOptions
 from copolicy.collect.sdl import pygame
 from copolicy.dataset.exceptions import InvalidValueError, MissingExtraError, OutputExistsError
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("replay") / "episode.mcap")
-
-
-@pytest.fixture(scope="module")
-def track(recording):
-    return read_track(recording)
 
 
 def pixels(surface):

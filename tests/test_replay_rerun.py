@@ -7,20 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from straight_carry import record
-
-from copolicy.collect.replay.track import read_track
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("replay") / "episode.mcap")
-
-
-@pytest.fixture(scope="module")
-def track(recording):
-    return read_track(recording)
-
 
 RERUN = """
 import sys, types

@@ -15,16 +15,6 @@ from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("replay") / "episode.mcap")
-
-
-@pytest.fixture(scope="module")
-def track(recording):
-    return read_track(recording)
-
-
 def test_a_recording_of_this_world_is_reproduced(track):
     result = verify(track)
     assert result["reproduced"]

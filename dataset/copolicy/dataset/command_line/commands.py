@@ -33,7 +33,7 @@ Needs = Sequence[str] | Callable[[argparse.Namespace], Sequence[str]]
 def command_parser(prog: str, description: str) -> tuple[argparse.ArgumentParser, Commands]:
     """Returns the parser of a room's script and the object that its commands are added to.
 
-    Flags cannot be abbreviated, here and in the commands: `--plan` must not be `--planner` where there is no `--plan`.
+    Flags cannot be abbreviated, here and in the commands: `--map 3` must not be `--maps 3` where there is no `--map`.
     """
     parser = argparse.ArgumentParser(prog=prog, description=description, allow_abbrev=False)
     add_version_flag(parser)
