@@ -185,7 +185,7 @@ def track(recording):
 
 @pytest.fixture(scope="session")
 def people_set(tmp_path_factory) -> Path:
-    """A data set of eight episodes that say that people played them, not to be changed; see `make_people`."""
+    """Episodes of the pairs P01 to P04, two each, which say that people played them; not to be changed."""
     from edited_data import make_people
 
     return make_people(tmp_path_factory.mktemp("people"))

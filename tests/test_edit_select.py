@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from checked_data import contents, make_data_set, make_recordings, set_columns
-from edited_data import columns, digests, episode_statistics, info, load, make_people, split_files
+from edited_data import columns, digests, episode_statistics, info, load, split_files
 from lerobot.datasets.compute_stats import aggregate_stats
 
 from copolicy.convert.video.scene_video import SCENE
@@ -24,14 +24,9 @@ from copolicy.dataset.versions.content import read_content
 VIDEO = ("--no-drift", "--video", "--video-size", "160x80")
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    return make_people(tmp_path_factory.mktemp("select"))
-
-
 @pytest.fixture
-def root(made, tmp_path) -> Path:
-    return Path(shutil.copytree(made, tmp_path / "set"))
+def root(people_set, tmp_path) -> Path:
+    return Path(shutil.copytree(people_set, tmp_path / "set"))
 
 
 @pytest.fixture(scope="module")
@@ -166,10 +161,10 @@ def test_a_file_whose_episodes_are_all_selected_is_copied(filmed, tmp_path):
         (Selection(episodes=("6-7",), where="episode_index > 6"), [7]),
     ],
 )
-def test_flags_are_combined_and_values_are_alternatives(made, selection, expected):
+def test_flags_are_combined_and_values_are_alternatives(people_set, selection, expected):
     from copolicy.dataset.edit.subset.stored_set import StoredSet
 
-    stored = StoredSet.read(made)
+    stored = StoredSet.read(people_set)
     assert selection.numbers(stored.rows, stored.column_types) == expected
 
 

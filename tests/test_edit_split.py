@@ -1,10 +1,8 @@
 """`copolicy-dataset split`: parts close to the requested proportions, without overlap."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from edited_data import columns, digests, info, load, make_people
+from edited_data import columns, digests, info, load
 
 from copolicy.convert.cli import main as convert
 from copolicy.dataset.checks.checking import check_dataset
@@ -143,21 +141,16 @@ def test_invalid_parts_are_refused(texts):
         parse_parts(texts)
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
-    return make_people(tmp_path_factory.mktemp("split"))
-
-
-def test_folders_share_no_person(made, tmp_path, capsys):
+def test_folders_share_no_person(people_set, tmp_path, capsys):
     out = tmp_path / "parts"
-    assert main(["split", str(made), "--out", str(out), "--parts", "train=0.75", "test=0.25"]) == 0
+    assert main(["split", str(people_set), "--out", str(out), "--parts", "train=0.75", "test=0.25"]) == 0
     shown = capsys.readouterr().out
     assert "reached" in shown
     assert sorted(path.name for path in out.iterdir()) == ["test", "train"]
     pairs = [{row["pair_id"] for row in columns(out / name)} for name in ("train", "test")]
     assert not pairs[0] & pairs[1]
     assert (len(pairs[0]), len(pairs[1])) == (3, 1)
-    before = {uuid: entry.digest for uuid, entry in digests(made).items()}
+    before = {uuid: entry.digest for uuid, entry in digests(people_set).items()}
     after = {uuid: entry.digest for name in ("train", "test") for uuid, entry in digests(out / name).items()}
     assert after == before
     result = check_dataset(out / "train", against=out / "test")
@@ -165,9 +158,9 @@ def test_folders_share_no_person(made, tmp_path, capsys):
     assert load(out / "test").num_episodes == 2
 
 
-def test_one_data_set_whose_splits_the_checks_and_robomimic_read(made, tmp_path, capsys):
+def test_one_data_set_whose_splits_the_checks_and_robomimic_read(people_set, tmp_path, capsys):
     out = tmp_path / "one"
-    summary = split(made, out, parse_parts(["train=0.75", "valid=0.25"]), as_splits=True)
+    summary = split(people_set, out, parse_parts(["train=0.75", "valid=0.25"]), as_splits=True)
     assert info(out)["splits"] == {"train": "0:6", "valid": "6:8"}
     assert summary["in_several_parts"].keys() <= {"maps", "consents"}
     found = {finding.rule for finding in check_dataset(out).findings}
@@ -181,10 +174,10 @@ def test_one_data_set_whose_splits_the_checks_and_robomimic_read(made, tmp_path,
     assert "a data set without splits" in capsys.readouterr().err
 
 
-def test_robomimics_valid_key_shares_no_person_with_train(made, tmp_path):
+def test_robomimics_valid_key_shares_no_person_with_train(people_set, tmp_path):
     h5py = pytest.importorskip("h5py")
     flags = ["--format", "robomimic", "--out", str(tmp_path / "a.hdf5"), "--valid", "0.25", "--seed", "1"]
-    assert convert(["export", str(made), *flags]) == 0
+    assert convert(["export", str(people_set), *flags]) == 0
     with h5py.File(tmp_path / "a.hdf5") as file:
         names = {key: [name.decode() for name in file[f"mask/{key}"]] for key in ("train", "valid")}
         pairs = {key: {file[f"data/{name}"].attrs["pair_id"] for name in names[key]} for key in names}
@@ -201,14 +194,14 @@ def test_robomimics_valid_key_shares_no_person_with_train(made, tmp_path):
         (["--format", "robomimic", "--valid", "0.2", "--seed", "-1"], "--seed: expected at least 0"),
     ],
 )
-def test_wrong_flags_of_the_export(made, tmp_path, capsys, flags, line):
-    assert convert(["export", str(made), "--out", str(tmp_path / "out"), *flags]) == 2
+def test_wrong_flags_of_the_export(people_set, tmp_path, capsys, flags, line):
+    assert convert(["export", str(people_set), "--out", str(tmp_path / "out"), *flags]) == 2
     assert line in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
-def test_too_few_people_leave_nothing(made, tmp_path, capsys):
+def test_too_few_people_leave_nothing(people_set, tmp_path, capsys):
     parts = [f"p{number}=0.2" for number in range(5)]
-    assert main(["split", str(made), "--out", str(tmp_path / "parts"), "--parts", *parts]) == 1
+    assert main(["split", str(people_set), "--out", str(tmp_path / "parts"), "--parts", *parts]) == 1
     assert "groups of people for each part, found 4 for 5 parts" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

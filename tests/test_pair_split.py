@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-from edited_data import make_people
 from lerobot.datasets import LeRobotDatasetMetadata
 from training_table import flags
 
@@ -16,30 +15,24 @@ from copolicy.train.recipe import training_recipe
 from copolicy.train.training_data import training_pairs
 
 
-@pytest.fixture(scope="module")
-def people(tmp_path_factory) -> Path:
-    """Eight episodes of the pairs P01 to P04, two each."""
-    return make_people(tmp_path_factory.mktemp("people"))
-
-
 def chosen(root: Path, text: str) -> list[int]:
     return PairSplit.parse(text).episodes(LeRobotDatasetMetadata("local/set", root))
 
 
-def test_named_pairs_and_all_others(people):
-    assert chosen(people, "pairs:P02,P04") == [2, 3, 6, 7]
-    assert chosen(people, "not-pairs:P02,P04") == [0, 1, 4, 5]
+def test_named_pairs_and_all_others(people_set):
+    assert chosen(people_set, "pairs:P02,P04") == [2, 3, 6, 7]
+    assert chosen(people_set, "not-pairs:P02,P04") == [0, 1, 4, 5]
 
 
-def test_a_fraction_and_its_complement_share_no_pair(people):
+def test_a_fraction_and_its_complement_share_no_pair(people_set):
     for seed in range(4):
-        part, rest = (chosen(people, f"{kind}:0.25:{seed}") for kind in ("pairs", "not-pairs"))
+        part, rest = (chosen(people_set, f"{kind}:0.25:{seed}") for kind in ("pairs", "not-pairs"))
         assert len(part) == 2
         assert sorted(part + rest) == list(range(8))
         assert part[0] % 2 == 0
         assert part[1] == part[0] + 1
-    assert chosen(people, "pairs:0.25") == chosen(people, "pairs:0.25:0")
-    assert len({tuple(chosen(people, f"pairs:.25:{seed}")) for seed in range(8)}) > 1
+    assert chosen(people_set, "pairs:0.25") == chosen(people_set, "pairs:0.25:0")
+    assert len({tuple(chosen(people_set, f"pairs:.25:{seed}")) for seed in range(8)}) > 1
 
 
 @pytest.mark.parametrize(
@@ -52,15 +45,15 @@ def test_a_fraction_and_its_complement_share_no_pair(people):
         ("not-pairs:P01,P02,P03,P04", "--split: expected a choice that leaves a pair, found"),
     ],
 )
-def test_another_split_is_refused_in_one_line(people, text, message):
+def test_another_split_is_refused_in_one_line(people_set, text, message):
     with pytest.raises(CopolicyError) as error:
-        chosen(people, text)
+        chosen(people_set, text)
     assert str(error.value).startswith(message)
 
 
-def test_each_checkpoint_records_the_pairs_of_its_run(people, tmp_path, capsys):
+def test_each_checkpoint_records_the_pairs_of_its_run(people_set, tmp_path, capsys):
     output = tmp_path / "run"
-    assert main([*flags(people, output), "--split=pairs:P01,P03"]) == 0
+    assert main([*flags(people_set, output), "--split=pairs:P01,P03"]) == 0
     for step in (2, 4):
         folder = output / "checkpoints" / f"{step:06d}" / "pretrained_model"
         recorded = json.loads((folder / "training_data.json").read_text(encoding="utf-8"))
@@ -71,7 +64,7 @@ def test_each_checkpoint_records_the_pairs_of_its_run(people, tmp_path, capsys):
             "people": ["P01-a", "P01-b", "P03-a", "P03-b"],
             "sources": ["human"],
             "episodes": [0, 1, 4, 5],
-            "content_hash": read_content(people).hash,
+            "content_hash": read_content(people_set).hash,
         }
         config = json.loads((folder / "train_config.json").read_text(encoding="utf-8"))
         assert config["dataset"]["episodes"] == [0, 1, 4, 5]
@@ -93,11 +86,11 @@ def test_each_checkpoint_records_the_pairs_of_its_run(people, tmp_path, capsys):
     record = output / "checkpoints" / "000006" / "pretrained_model" / "training_data.json"
     last = json.loads(record.read_text(encoding="utf-8"))
     assert last["episodes"] == [0, 1, 4, 5]
-    assert main([*flags(people, tmp_path / "x"), "--split=pairs:P02", "--dataset.episodes=[1]"]) == 2
+    assert main([*flags(people_set, tmp_path / "x"), "--split=pairs:P02", "--dataset.episodes=[1]"]) == 2
     assert "--split: expected no such flag beside --dataset.episodes" in capsys.readouterr().err.splitlines()[-1]
 
 
 @pytest.mark.parametrize("extra", [["--split"], ["--split=pairs:P01", "--split=pairs:P02"]])
-def test_the_flag_is_given_once_with_a_value(people, tmp_path, capsys, extra):
-    assert main([*flags(people, tmp_path / "x"), *extra]) == 2
+def test_the_flag_is_given_once_with_a_value(people_set, tmp_path, capsys, extra):
+    assert main([*flags(people_set, tmp_path / "x"), *extra]) == 2
     assert "copolicy-train: --split: expected" in capsys.readouterr().err.splitlines()[-1]

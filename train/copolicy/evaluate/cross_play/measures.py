@@ -41,6 +41,7 @@ class Measure(NamedTuple):
         scale: factor in tables, 100 for a proportion in percent.
         lower_is_better: None if neither is.
         value: value of an episode from its row and its partner's own kind; None if it has none.
+        proportion: whether an episode counts 0 or 1.
     """
 
     label: str
@@ -48,6 +49,7 @@ class Measure(NamedTuple):
     scale: float
     lower_is_better: bool | None
     value: Callable[[Row, OwnKind | None], float | None]
+    proportion: bool = False
 
 
 def _time(row: Row, own: OwnKind | None) -> float | None:
@@ -75,7 +77,7 @@ def _gave_way(row: Row, own: OwnKind | None) -> float | None:
 
 
 MEASURES: dict[str, Measure] = {
-    "success": Measure("success, %", 1, 100, False, lambda row, own: float(row["success"])),
+    "success": Measure("success, %", 1, 100, False, lambda row, own: float(row["success"]), proportion=True),
     "time_s": Measure("time of successes, s", 1, 1, True, _time),
     "relative_time": Measure("time / own kind's", 2, 1, True, _relative_time),
     "interaction_force": Measure("interaction force", 3, 1, True, lambda row, own: row["interaction_mean"]),
@@ -83,12 +85,10 @@ MEASURES: dict[str, Measure] = {
     "robot_share": Measure("robot's share of work", 2, 1, None, lambda row, own: row["robot_share"]),
     "deadlock": Measure("time in deadlock, %", 1, 100, True, _deadlock),
     "smallest_distance": Measure("smallest distance", 1, 1, False, lambda row, own: row["smallest_distance"]),
-    "near_misses": Measure("near misses, %", 1, 100, True, _near_miss),
+    "near_misses": Measure("near misses, %", 1, 100, True, _near_miss, proportion=True),
     "gave_way": Measure("robot gave way, %", 1, 100, None, _gave_way),
 }
 """By name in results, in the order of tables."""
-
-_PROPORTIONS = ("success", "near_misses")  # an episode counts 0 or 1
 
 
 def label(name: str, length_unit: str) -> str:
@@ -133,7 +133,7 @@ def summary(rows: Sequence[Row], own: Callable[[Row], OwnKind | None]) -> dict[s
     for name, measure in MEASURES.items():
         values = [measure.value(row, own(row)) for row in rows]
         known = [value for value in values if value is not None and math.isfinite(value)]
-        result[name] = mean_and_error(known, proportion=name in _PROPORTIONS)
+        result[name] = mean_and_error(known, measure.proportion)
     return result
 
 

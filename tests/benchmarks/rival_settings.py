@@ -1,0 +1,96 @@
+"""Effect of single settings of the paper's rivals in execution: co-planning of trained runs with one setting changed.
+
+    uv run python tests/benchmarks/rival_settings.py --runs outputs/rivals/runs/vrnn/seed_* --out vrnn.json
+
+The runs are of one method and differ in their training seed. Each is evaluated on the 84 holdout and the 84 unseen maps
+as it is and with each line of `CHANGES`, with the same starts and noise: most changes bring back one published choice
+or defect. Differences are in percentage points, with standard errors over maps (bootstrap; the seeds of a map
+together). Settings that shape the training are not here: rivals.py has rows of these. Demonstrations are simulated
+pairs.
+"""
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported
+
+import argparse
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from copolicy.dataset.episode import Episode
+from copolicy.evaluate.notebook import compare_episodes, coplan_episodes, success
+from copolicy.train.checkpoint import Checkpoint
+
+MAPS = ("holdout", "unseen")
+
+_PROPORTIONAL = {"controller": "proportional"}
+_FAR = {"plan_frames": 130, "lookahead_frames": 120}
+CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "vrnn": {
+        "a history of zeros": {"zero_history": True},
+        "absent obstacles are copies of the last": {"repeat_last_obstacle": True},
+        "the velocity read as the goal's place": {"velocity_as_goal": True},
+        "waypoint 4 s ahead": _FAR,
+        "proportional controller": _PROPORTIONAL,
+        "the same, forces of unit norm": {**_PROPORTIONAL, "unit_force": True},
+        "the same, angles not wrapped": {**_PROPORTIONAL, "unit_force": True, "wrapped_angle": False},
+        "all of these but the velocity": {
+            **_PROPORTIONAL, **_FAR, "unit_force": True, "wrapped_angle": False, "zero_history": True,
+            "repeat_last_obstacle": True,
+        },
+        "one sampled future, no choice": {"n_samples": 1},
+    },
+    "bc_lstm_gmm": {
+        "state never reset": {"sequence_length": 100_000},
+        "state reset every frame": {"sequence_length": 1},
+    },
+    "cogail": {
+        "code drawn every frame": {"code": "drawn"},
+        "code inferred from the partner": {"code": "inferred"},
+        "a history of zeros": {"history_start": "zeros"},
+    },
+}  # fmt: skip
+"""For each policy type the changes, by name."""
+
+
+def episodes(runs: list[Path], maps: str, changes: Mapping[str, Any], limit: int | None) -> list[Episode]:
+    """The episodes of all runs with settings changed, one run after the other."""
+    return [
+        episode for run in runs for episode in coplan_episodes(Checkpoint(run, settings=changes), maps, limit=limit)
+    ]
+
+
+def main() -> None:
+    """Evaluates, prints a Markdown table and writes the figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", nargs="+", type=Path, required=True, help="training runs of one method")
+    parser.add_argument("--out", type=Path, required=True, help="file (JSON) for the figures")
+    parser.add_argument("--limit", type=int, help="only the first N maps; to try the script")
+    arguments = parser.parse_args()
+    runs = [path for run in arguments.runs for path in ([run / "training"] if (run / "training").exists() else [run])]
+    types = {Checkpoint(run).policy.config.type for run in runs}
+    if len(types) != 1 or (kind := types.pop()) not in CHANGES:
+        raise SystemExit(f"--runs: expected runs of one of {', '.join(CHANGES)}, found {', '.join(sorted(types))}")
+    changes = {"as trained": {}, **CHANGES[kind]}
+    whole = {maps: episodes(runs, maps, {}, arguments.limit) for maps in MAPS}
+    result: dict[str, Any] = {"policy": kind, "runs": len(runs), "changes": {}}
+    print(f"| {kind}, {len(runs)} runs | holdout % | difference | unseen % | difference |\n|---|---:|---:|---:|---:|")
+    for name, changed in changes.items():
+        row, cells = {}, [name]
+        for maps in MAPS:
+            found = episodes(runs, maps, changed, arguments.limit) if changed else whole[maps]
+            difference = compare_episodes(found, whole[maps])["success"]
+            row[maps] = {"success": success(found), "difference": difference}
+            cells.append(f"{100 * row[maps]['success']['mean']:.1f}")
+            cells.append(
+                f"{100 * difference['mean']:+.1f} ± {100 * difference['standard_error']:.1f}" if changed else ""
+            )
+        result["changes"][name] = {"settings": dict(changed), **row}
+        print(f"| {' | '.join(cells)} |", flush=True)
+    arguments.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
