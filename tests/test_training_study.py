@@ -6,10 +6,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from lerobot.configs import PreTrainedConfig
 from policy_runs import save_run
+
+from copolicy.train.plugins import register_plugins
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 
+import rival_settings  # pyright: ignore[reportMissingImports]
 import rivals  # pyright: ignore[reportMissingImports]
 import training_study  # pyright: ignore[reportMissingImports]
 
@@ -91,9 +95,20 @@ def test_every_row_names_its_budget():
 def test_rows_that_read_the_obstacles_as_a_list_learn_from_every_order():
     order_free = {name for name, row in rivals.ROWS.items() if row.recipe == "pairs-sim-376"}
     assert order_free == {
-        "codp-h", "codp", "bc-scan", "bc-scan-10hz", "cnn-small", "vrnn-scan", "cogail-scan",
+        "codp-h", "codp", "bc-scan", "bc-scan-10hz", "cnn-small", "cnn-small-long", "vrnn-scan",
+        "cogail-scan",
     }  # fmt: skip
     turned = {name for name, row in rivals.ROWS.items() if row.recipe == "pairs-sim-376-orientations"}
     assert turned == {"codp-h-orientations", "bc-scan-10hz-orientations"}  # with the scan
     others = [row.recipe for name, row in rivals.ROWS.items() if name not in order_free | turned]
     assert set(others) == {"pairs-sim-376-orders"}
+
+
+@pytest.mark.parametrize("kind", rival_settings.CHANGES)
+def test_a_changed_setting_is_one_of_the_policy_and_another_value(kind):
+    register_plugins()
+    preset = {"bc_lstm_gmm": "normalized", "cogail": "corrected", "vrnn": "default"}[kind]
+    trained = PreTrainedConfig.get_choice_class(kind)(device="cpu", preset=preset)
+    for changes in rival_settings.CHANGES[kind].values():
+        assert all(getattr(trained, name) != value for name, value in changes.items())
+        PreTrainedConfig.get_choice_class(kind)(device="cpu", preset=preset, **changes)

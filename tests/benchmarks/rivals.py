@@ -105,6 +105,7 @@ ROWS: Mapping[str, Row] = {
     "cnn": _cnn("cnn"),
     "cnn-inpainting": _cnn("cnn-inpainting"),
     "cnn-small": _cnn("cnn-small", 800),
+    "cnn-small-long": _cnn("cnn-small", 3_200),
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
     "vrnn-scan": _vrnn("scan"),
