@@ -1,5 +1,6 @@
 """BC-LSTM-GMM as a LeRobot policy: settings, loss, state in execution, training, studies, either seat."""
 
+import copy
 import json
 from pathlib import Path
 
@@ -146,6 +147,45 @@ def test_a_mode_is_drawn_at_each_frame():
     assert 0.4 < is_first.float().mean() < 0.6
     switches = (is_first[1:] != is_first[:-1]).float().mean()
     assert 0.4 < switches < 0.6
+
+
+def by_reset(policy: BcLstmGmmPolicy) -> None:
+    with torch.no_grad():
+        policy.network.lstm.weight_ih_l0.data.mul_(-2)  # as EMA and fused optimizers: not counted as a change
+    policy.reset()
+
+
+def by_loading(policy: BcLstmGmmPolicy) -> None:
+    policy.load_state_dict(BcLstmGmmPolicy(config(n_modes=1)).state_dict())
+    policy.reset()
+
+
+def by_training(policy: BcLstmGmmPolicy) -> None:
+    policy.train()
+    by_fine_tuning(policy)
+    policy.eval()
+
+
+def by_fine_tuning(policy: BcLstmGmmPolicy) -> None:
+    """In the mode of evaluation."""
+    optimizer = torch.optim.Adam(policy.get_optim_params(), lr=0.1)
+    policy.forward(batch(10))[0].backward()
+    optimizer.step()
+
+
+@pytest.mark.parametrize("change", [by_reset, by_loading, by_training, by_fine_tuning])
+def test_actions_are_of_the_weights_as_they_are(change):
+    policy = BcLstmGmmPolicy(config(n_modes=1, execution_deviation=0.0)).eval()
+    observation = {key: values / 100 for key, values in batch(None).items()}
+    with torch.inference_mode():
+        policy.select_action(observation)
+    change(policy)
+    policy._state, policy._frames = None, 0
+    with torch.inference_mode():
+        acted = policy.select_action(observation)
+        mixture, _ = policy.network(policy.features(policy._observation(observation, None))[:, None])
+    torch.testing.assert_close(acted, mixture.means[:, 0, 0])
+    copy.deepcopy(policy).select_action(observation)
 
 
 def test_missing_columns_and_chunks_are_one_line():

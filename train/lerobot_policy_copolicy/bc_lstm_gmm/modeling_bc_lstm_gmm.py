@@ -10,7 +10,7 @@ from copolicy.dataset.features import ACTION
 
 from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
-from .network import LayerStates, RecurrentMixtureNetwork
+from .network import LayerStates, LayerWeights, RecurrentMixtureNetwork
 
 
 class BcLstmGmmPolicy(FramePolicy):
@@ -36,9 +36,15 @@ class BcLstmGmmPolicy(FramePolicy):
         self.reset()
 
     def reset(self) -> None:
-        """Resets the state of the LSTM; call it whenever the environment is reset."""
+        """Resets the state of the LSTM; call it whenever the environment is reset or weights were changed."""
         self._state: LayerStates | None = None
         self._frames = 0
+        self._layers: list[LayerWeights] | None = None  # copied at the first frame
+
+    def train(self, mode: bool = True) -> "BcLstmGmmPolicy":
+        """As in torch; the next action is of the weights as they are then."""
+        self._layers = None
+        return super().train(mode)
 
     def forward(self, batch: dict[str, Tensor], reduction: str = "mean") -> tuple[Tensor, dict]:
         """The training loss: negative log-likelihood of the joint actions, in nats.
@@ -55,6 +61,7 @@ class BcLstmGmmPolicy(FramePolicy):
             ShapeError: a column has another shape.
             RunError: the batch has a frame of an excluded episode, or the loss of the step before is not finite.
         """
+        self._layers = None  # the weights are about to change
         sample = self._training_sample(batch, self.config.sequence_length, self.config.sequence_length)
         mixture, _ = self.network(self.features(sample))
         loss = -mixture.distribution().log_prob(self.action_scale.scaled(sample[ACTION]))  # (B, L)
@@ -77,5 +84,8 @@ class BcLstmGmmPolicy(FramePolicy):
             self._state = None
         self._frames += 1
         inputs = self.features(self._observation(batch, None))  # (B, size)
-        drawn, self._state = self.network.sample(inputs, self._state, self.config.execution_deviation)
+        if self._layers is None or self.training:
+            self._layers = self.network.layer_weights()
+        deviation = self.config.execution_deviation
+        drawn, self._state = self.network.sample(inputs, self._state, deviation, self._layers)
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))

@@ -1,5 +1,6 @@
 """The network of BC-RNN-GMM: an LSTM whose output is a mixture of normal distributions over the joint action."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -28,7 +29,7 @@ class Mixture(NamedTuple):
         return MixtureSameFamily(weights, modes, validate_args=False)
 
 
-class _LayerWeights(NamedTuple):
+class LayerWeights(NamedTuple):
     """Weights of an LSTM layer for input and hidden state in one product: `(n + width, 4 width)`, `(4 width,)`."""
 
     weight: Tensor
@@ -64,12 +65,6 @@ class RecurrentMixtureNetwork(nn.Module):
         self.mean = nn.Linear(width, n_modes * action_size)
         self.deviation = nn.Linear(width, n_modes * action_size)
         self.logits = nn.Linear(width, n_modes)
-        self._joined: tuple[tuple[int, ...], list[_LayerWeights]] | None = None
-
-    def train(self, mode: bool = True) -> "RecurrentMixtureNetwork":
-        """As in torch; forgets the copies of the weights that `sample` reads."""
-        self._joined = None
-        return super().train(mode)
 
     def forward(self, inputs: Tensor, state: State | None = None) -> tuple[Mixture, State]:
         """Mixtures of the frames `(B, T, input_size)`, and the state after the last; a state of None is zero."""
@@ -78,7 +73,17 @@ class RecurrentMixtureNetwork(nn.Module):
         return Mixture(self.logits(hidden), self._means(hidden), self._by_mode(deviations)), last_state
 
     @torch.no_grad()
-    def sample(self, inputs: Tensor, state: LayerStates | None, deviation: float) -> tuple[Tensor, LayerStates]:
+    def layer_weights(self) -> list[LayerWeights]:
+        """A copy of the weights of each layer, in the order in which `sample` reads them."""
+        return [
+            LayerWeights(torch.cat((inputs, hidden), dim=1).t().contiguous(), input_bias + hidden_bias)
+            for inputs, hidden, input_bias, hidden_bias in self.lstm.all_weights
+        ]
+
+    @torch.no_grad()
+    def sample(
+        self, inputs: Tensor, state: LayerStates | None, deviation: float, layers: Sequence[LayerWeights]
+    ) -> tuple[Tensor, LayerStates]:
         """Draws an action `(B, m)` for one frame `(B, input_size)`, and returns the state after it; no gradients.
 
         A mode is drawn, and from it an action with one standard deviation for all modes: like `forward` and
@@ -87,12 +92,13 @@ class RecurrentMixtureNetwork(nn.Module):
 
         Args:
             state: of each layer, from the call before; zero if None.
+            layers: result of `layer_weights`.
         """
         if state is None:
             zeros = inputs.new_zeros(len(inputs), self.lstm.hidden_size)
             state = ((zeros, zeros),) * self.lstm.num_layers
         hidden, states = inputs, []
-        for (hidden_before, cell_before), (weight, bias) in zip(state, self._layer_weights(), strict=True):
+        for (hidden_before, cell_before), (weight, bias) in zip(state, layers, strict=True):
             gates = torch.addmm(bias, torch.cat((hidden, hidden_before), dim=-1), weight)  # (B, 4 width)
             entry, forget, change, output = gates.chunk(4, dim=-1)
             cell = forget.sigmoid() * cell_before + entry.sigmoid() * change.tanh()
@@ -103,27 +109,8 @@ class RecurrentMixtureNetwork(nn.Module):
         drawn = means.gather(1, mode.expand(-1, 1, means.shape[-1]))[:, 0]
         return drawn + deviation * torch.randn_like(drawn), tuple(states)
 
-    def _layer_weights(self) -> list[_LayerWeights]:
-        """Of each layer; copied once, until the weights change or `train` is called.
-
-        A fused optimizer changes weights without counting it in their version: in training they are copied each time.
-        """
-        key = tuple(number for weight in self.lstm.parameters() for number in (weight.data_ptr(), _version(weight)))
-        if self.training or self._joined is None or self._joined[0] != key:
-            layers = [
-                _LayerWeights(torch.cat((inputs, hidden), dim=1).t().contiguous(), input_bias + hidden_bias)
-                for inputs, hidden, input_bias, hidden_bias in self.lstm.all_weights
-            ]
-            self._joined = key, layers
-        return self._joined[1]
-
     def _means(self, hidden: Tensor) -> Tensor:
         return self._by_mode(torch.tanh(self.mean(hidden)))
 
     def _by_mode(self, values: Tensor) -> Tensor:
         return values.unflatten(-1, (self.n_modes, self.action_size))
-
-
-def _version(weight: Tensor) -> int:
-    """Times that a tensor was changed in place, which is not counted for one that was made in inference mode."""
-    return -1 if weight.is_inference() else weight._version
