@@ -28,10 +28,12 @@ from copolicy.tasks.table.maps import MAP_SETS
 from copolicy.tasks.table.physics import Physics
 from copolicy.tasks.table.world import TableWorld
 from copolicy.train.cli import main as train
+from lerobot_policy_copolicy.cogail.configuration_cogail import CoGailConfig
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 from lerobot_policy_copolicy.env import TableCarryingEnvConfig
 from lerobot_policy_copolicy.pair_policy.training_data import record_conditions
+from lerobot_policy_copolicy.vrnn.configuration_vrnn import VrnnConfig
 
 SLOW = Physics(angular_acceleration_limit=math.pi / 8)
 
@@ -112,6 +114,20 @@ def test_a_mixture_is_recorded_with_its_counts_and_is_no_physics(copied_table, c
     assert config.physics is not None
     assert config.physics["angular_acceleration_limit"] == math.pi / 2
     assert config.physics_mixture[""] == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "setting", "frames"), [(VrnnConfig, "history_frames", 30), (CoGailConfig, "history", 15)]
+)
+def test_settings_in_frames_of_another_rate_are_named(copied_table, caplog, kind, setting, frames):
+    record_conditions(kind(device="cpu"), LeRobotDatasetMetadata("local/table", copied_table), None)
+    assert f"{setting} = {frames} is for data of 30 frames a second, and these have 10; convert" in caplog.text
+    caplog.clear()
+    divided = kind(device="cpu", **{setting: frames // 3})
+    record_conditions(divided, LeRobotDatasetMetadata("local/table", copied_table), None)
+    _set_rate(copied_table, 30)
+    record_conditions(kind(device="cpu"), LeRobotDatasetMetadata("local/table", copied_table), None)
+    assert "settings in frames" not in caplog.text
 
 
 def test_what_a_checkpoint_does_not_say_is_assumed_and_said(old, tmp_path):

@@ -75,6 +75,7 @@ class CoGailConfig(PairPolicyConfig):
         "after_success": ("zero", "demonstrated"),
     }
     n_action_steps: ClassVar[int] = 1  # it acts frame by frame
+    frames_at_30_hz: ClassVar = {"history": 15}
     bounds: ClassVar = {
         **dict.fromkeys(("history", "width", "n_worlds", "frames_per_update", "n_epochs", "n_minibatches"), Bounds(1)),
         **dict.fromkeys(("expert_batch_size", "discriminator_passes", "first_discriminator_passes"), Bounds(1)),

@@ -33,8 +33,9 @@ class PairPolicyConfig(PreTrainedConfig):
     obstacle) then gets huge values. Instead the policy scales by the fixed bounds of the task.
 
     A subclass gives `presets` (settings by preset), `choices` and `bounds` (of its own settings), the names of the
-    inputs that it has for any task (`generic_features`, the first where a preset asks for what a task lacks), and
-    `_validate` for rules between settings.
+    inputs that it has for any task (`generic_features`, the first where a preset asks for what a task lacks),
+    `_validate` for rules between settings, and settings that count frames with their values for 30 frames a second
+    (`frames_at_30_hz`).
 
     Raises:
         UnknownNameError: the preset does not exist.
@@ -45,6 +46,7 @@ class PairPolicyConfig(PreTrainedConfig):
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     bounds: ClassVar[Mapping[str, Bounds]] = {}
     generic_features: ClassVar[tuple[str, ...]] = ("absolute",)
+    frames_at_30_hz: ClassVar[Mapping[str, int]] = {}
 
     task: str | None = None  # task that defines columns, bounds, features; default: that of the data, else the table
     preset: str = "default"  # named set of values for the settings that are not given

@@ -24,6 +24,7 @@ from .callers import data_sets_of_callers, environment_of_callers
 from .configuration_pair import PairPolicyConfig
 
 _PHYSICS = "physics"
+_PUBLISHED_FPS = 30  # see PairPolicyConfig.frames_at_30_hz
 _STEP_LIMIT = "step_limit"  # not compared: no property of the dynamics
 
 
@@ -70,6 +71,12 @@ def record_conditions(config: PairPolicyConfig, meta: Any, episodes: Collection[
     if config.fps is not None and config.fps != fps:
         logging.warning("The policy was trained at %g frames a second; these data have %g", config.fps, fps)
     config.fps = fps
+    for name, frames in config.frames_at_30_hz.items():
+        if fps != _PUBLISHED_FPS and getattr(config, name) == frames:
+            logging.warning(
+                "%s: %s = %d is for data of %d frames a second, and these have %g; convert with --fps %d, or divide "
+                "the settings in frames", config.type, name, frames, _PUBLISHED_FPS, fps, _PUBLISHED_FPS,
+            )  # fmt: skip
     counts = _settings_counts(meta, episodes)
     recorded = [text for text in counts if text]
     settings = json.loads(recorded[0]) if len(recorded) == 1 else None

@@ -38,6 +38,7 @@ class VrnnConfig(PairPolicyConfig):
 
     presets: ClassVar = PRESETS
     generic_features: ClassVar = ("points",)
+    frames_at_30_hz: ClassVar = {"history_frames": 30}
     choices: ClassVar = {
         "motion_axes": ("body", "scene"),
         "predicted": ("motion", "row"),
