@@ -225,6 +225,7 @@ def save_curves(curves: Mapping[str, list[tuple[list[Point], list[tuple[int, flo
     axes = figure.subplots(2 * lines, columns, squeeze=False)
     for axis in axes.flat:
         axis.set_visible(False)
+    title, of_mean = "Simulated pairs: success on the maps of the demonstrations and training loss, a line a seed", ""
     for index, (name, seeds) in enumerate(curves.items()):
         line, column = divmod(index, columns)
         success, loss = axes[2 * line, column], axes[2 * line + 1, column]
@@ -235,13 +236,14 @@ def save_curves(curves: Mapping[str, list[tuple[list[Point], list[tuple[int, flo
             if values:
                 loss.set_visible(True)
                 loss.plot([samples / 1e6 for samples, _ in values], [value for _, value in values], alpha=0.7)
-        if len({len(points) for points, _ in seeds}) == 1 and seeds[0][0]:
+        if len({len(points) for points, _ in seeds}) == 1 and seeds[0][0] and len(seeds) > 1:
+            of_mean = "; black: mean over seeds"
             means = np.mean([[p.success for p in points] for points, _ in seeds], axis=0)
             success.plot([p.samples / 1e6 for p in seeds[0][0]], 100 * means, "k-", linewidth=2)
         loss.set(xlabel="samples, M", ylabel="training loss" if column == 0 else "")
         for axis in (success, loss):
             axis.grid(alpha=0.3)
-    figure.suptitle("Simulated pairs: success on the maps of the demonstrations (black: mean over seeds) and loss")
+    figure.suptitle(title + of_mean)
     figure.savefig(path)
 
 

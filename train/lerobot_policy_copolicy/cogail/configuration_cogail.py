@@ -42,7 +42,7 @@ _CORRECTED: dict[str, Any] = {
 @PreTrainedConfig.register_subclass("cogail")
 @dataclass
 class CoGailConfig(PairPolicyConfig):
-    """Settings of Co-GAIL; the defaults are the published ones.
+    """Settings of Co-GAIL; the defaults are the published ones, but for 60 worlds at once (published: one).
 
     Presets: "paper" is Co-GAIL as the co-policy paper evaluated it; "corrected" scales to [-1, 1], starts the history
     with the first frame, keeps one code an episode, shows the discriminator the actions that the world executes,
