@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -254,3 +255,8 @@ def test_it_is_evaluated_and_described(run, tmp_path):
     assert cards(["model", str(tmp_path / "exported")]) == 0
     assert "vrnn" in (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
     assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]
+
+
+def test_adapters_are_refused():
+    with pytest.raises(InvalidValueError, match="--peft: expected no adapters, which vrnn would not compute"):
+        VrnnPolicy(config())._validate_peft_config(SimpleNamespace(peft_type="LORA"))

@@ -5,6 +5,8 @@ from typing import Any, Unpack
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
 
+from copolicy.dataset.exceptions import InvalidValueError
+
 from .modeling_pair import PairPolicy
 
 
@@ -29,3 +31,14 @@ class FramePolicy(PairPolicy):
             NotImplementedError: always; call `select_action`.
         """
         raise NotImplementedError(f"{self.name} acts frame by frame: call select_action")
+
+    def _validate_peft_config(self, peft_config: Any) -> None:
+        """LeRobot's hook.
+
+        Raises:
+            InvalidValueError: always; these networks read their own weights, beside which an adapter has no effect.
+        """
+        method = getattr(peft_config, "peft_type", peft_config)
+        raise InvalidValueError(
+            "--peft", f"no adapters, which {self.name} would not compute; train all its weights", method
+        )
