@@ -84,8 +84,8 @@ def _cnn(preset: str, steps: int = 5_000) -> Row:
     return Row((), preset, _recipe(preset), steps, 256, bf16=False)
 
 
-def _lerobot(policy: str, *flags: str) -> Row:
-    return Row(flags, "", _ORDERS, 1_600, 64, policy=policy, bf16=False)
+def _lerobot(policy: str, steps: int, *flags: str) -> Row:
+    return Row(flags, "", _ORDERS, steps, 64, policy=policy, bf16=False)
 
 
 ROWS: Mapping[str, Row] = {
@@ -112,10 +112,10 @@ ROWS: Mapping[str, Row] = {
     "cogail": _cogail("paper"),
     "cogail-corrected": _cogail("corrected"),
     "cogail-scan": _cogail("scan"),
-    "diffusion": _lerobot("diffusion", *_DIFFUSION),
-    "diffusion-scaled": _lerobot("diffusion", *_DIFFUSION, _SCALED),
-    "act": _lerobot("act", *_ACT),
-    "act-scaled": _lerobot("act", *_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")),
+    "diffusion": _lerobot("diffusion", 6_400, *_DIFFUSION),
+    "diffusion-scaled": _lerobot("diffusion", 6_400, *_DIFFUSION, _SCALED),
+    "act": _lerobot("act", 1_600, *_ACT),
+    "act-scaled": _lerobot("act", 1_600, *_ACT, _SCALED.replace("MIN_MAX", "MEAN_STD")),
 }
 """The methods, each with its budget on a CPU."""
 
