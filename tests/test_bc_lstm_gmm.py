@@ -185,7 +185,14 @@ def test_actions_are_of_the_weights_as_they_are(change):
         acted = policy.select_action(observation)
         mixture, _ = policy.network(policy.features(policy._observation(observation, None))[:, None])
     torch.testing.assert_close(acted, mixture.means[:, 0, 0])
-    copy.deepcopy(policy).select_action(observation)
+
+
+def test_a_policy_that_has_acted_is_copied():
+    policy = BcLstmGmmPolicy(config(n_modes=1, execution_deviation=0.0)).eval()
+    with torch.inference_mode():
+        policy.select_action(batch(None))
+    copied = copy.deepcopy(policy)
+    torch.testing.assert_close(copied.select_action(batch(None)), policy.select_action(batch(None)))
 
 
 def test_missing_columns_and_chunks_are_one_line():

@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import torch
@@ -258,5 +257,5 @@ def test_it_is_evaluated_and_described(run, tmp_path):
 
 
 def test_adapters_are_refused():
-    with pytest.raises(InvalidValueError, match="--peft: expected no adapters, which vrnn would not compute"):
-        VrnnPolicy(config())._validate_peft_config(SimpleNamespace(peft_type="LORA"))
+    with pytest.raises(InvalidValueError, match="--peft: expected no adapters: vrnn reads its weights directly"):
+        VrnnPolicy(config()).wrap_with_peft(peft_cli_overrides={"method_type": "LORA"})

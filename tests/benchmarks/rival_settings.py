@@ -1,4 +1,4 @@
-"""Effect of single settings of the paper's rivals in execution: co-planning of trained runs with one setting changed.
+"""Effect of settings of the paper's rivals in execution: co-planning of trained runs with single settings changed.
 
     uv run python tests/benchmarks/rival_settings.py --runs outputs/rivals/runs/vrnn/seed_* --out vrnn.json
 
@@ -26,6 +26,7 @@ from copolicy.train.checkpoint import Checkpoint
 MAPS = ("holdout", "unseen")
 
 _PROPORTIONAL = {"controller": "proportional"}
+_UNIT_FORCE = {**_PROPORTIONAL, "unit_force": True}
 _FAR = {"plan_frames": 130, "lookahead_frames": 120}
 CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "vrnn": {
@@ -34,11 +35,10 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "the velocity read as the goal's place": {"velocity_as_goal": True},
         "waypoint 4 s ahead": _FAR,
         "proportional controller": _PROPORTIONAL,
-        "the same, forces of unit norm": {**_PROPORTIONAL, "unit_force": True},
-        "the same, angles not wrapped": {**_PROPORTIONAL, "unit_force": True, "wrapped_angle": False},
+        "proportional controller, forces of unit norm": _UNIT_FORCE,
+        "the latter, angles not wrapped": {**_UNIT_FORCE, "wrapped_angle": False},
         "all of these but the velocity": {
-            **_PROPORTIONAL, **_FAR, "unit_force": True, "wrapped_angle": False, "zero_history": True,
-            "repeat_last_obstacle": True,
+            **_UNIT_FORCE, **_FAR, "wrapped_angle": False, "zero_history": True, "repeat_last_obstacle": True,
         },
         "one sampled future, no choice": {"n_samples": 1},
     },
@@ -63,26 +63,27 @@ def episodes(runs: list[Path], maps: str, changes: Mapping[str, Any], limit: int
 
 
 def main() -> None:
-    """Evaluates, prints a Markdown table and writes the figures."""
+    """Evaluates, prints a Markdown table and writes the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", nargs="+", type=Path, required=True, help="training runs of one method")
-    parser.add_argument("--out", type=Path, required=True, help="file (JSON) for the figures")
+    parser.add_argument("--out", type=Path, required=True, help="file (JSON) for the results")
     parser.add_argument("--limit", type=int, help="only the first N maps; to try the script")
     arguments = parser.parse_args()
     runs = [path for run in arguments.runs for path in ([run / "training"] if (run / "training").exists() else [run])]
     types = {Checkpoint(run).policy.config.type for run in runs}
-    if len(types) != 1 or (kind := types.pop()) not in CHANGES:
+    if len(types) != 1 or not types <= CHANGES.keys():
         raise SystemExit(f"--runs: expected runs of one of {', '.join(CHANGES)}, found {', '.join(sorted(types))}")
+    (kind,) = types
     changes = {"as trained": {}, **CHANGES[kind]}
-    whole = {maps: episodes(runs, maps, {}, arguments.limit) for maps in MAPS}
+    unchanged = {maps: episodes(runs, maps, {}, arguments.limit) for maps in MAPS}
     result: dict[str, Any] = {"policy": kind, "runs": len(runs), "changes": {}}
     print(f"| {kind}, {len(runs)} runs | holdout % | difference | unseen % | difference |\n|---|---:|---:|---:|---:|")
     for name, changed in changes.items():
         row, cells = {}, [name]
         for maps in MAPS:
-            found = episodes(runs, maps, changed, arguments.limit) if changed else whole[maps]
-            difference = compare_episodes(found, whole[maps])["success"]
-            row[maps] = {"success": success(found), "difference": difference}
+            changed_episodes = episodes(runs, maps, changed, arguments.limit) if changed else unchanged[maps]
+            difference = compare_episodes(changed_episodes, unchanged[maps])["success"]
+            row[maps] = {"success": success(changed_episodes), "difference": difference}
             cells.append(f"{100 * row[maps]['success']['mean']:.1f}")
             cells.append(
                 f"{100 * difference['mean']:+.1f} ± {100 * difference['standard_error']:.1f}" if changed else ""

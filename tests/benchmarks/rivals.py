@@ -70,8 +70,8 @@ def _bc(preset: str, fps: int, recipe: str | None = None) -> Row:
     return Row(_BC_RATE, preset, recipe or _recipe(preset), bf16=False, **settings)
 
 
-def _vrnn(preset: str) -> Row:
-    return Row((), preset, _recipe(preset), 10_000, 64, policy="vrnn", fps=_RIVALS_HZ, bf16=False)
+def _vrnn(preset: str, steps: int = 10_000) -> Row:
+    return Row((), preset, _recipe(preset), steps, 64, policy="vrnn", fps=_RIVALS_HZ, bf16=False)
 
 
 def _cogail(preset: str) -> Row:
@@ -109,6 +109,7 @@ ROWS: Mapping[str, Row] = {
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
     "vrnn-scan": _vrnn("scan"),
+    "vrnn-scan-long": _vrnn("scan", 25_000),
     "cogail": _cogail("paper"),
     "cogail-corrected": _cogail("corrected"),
     "cogail-scan": _cogail("scan"),

@@ -19,7 +19,7 @@ class BcLstmGmmPolicy(FramePolicy):
     As robomimic's `BC_RNN_GMM`: the loss is the negative log-likelihood over all frames of a window that starts with
     the state zero; frames beyond the end of the episode repeat its last frame and count. In execution a mode is drawn
     at every frame with the standard deviation `execution_deviation`, and the state is reset every `sequence_length` (L)
-    frames.
+    frames. It acts by a copy of the weights, made at the first frame after `reset`.
 
     Mandlekar et al., "What Matters in Learning from Offline Human Demonstrations" (2021, arXiv 2108.03298).
     """

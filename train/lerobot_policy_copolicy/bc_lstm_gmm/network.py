@@ -30,7 +30,7 @@ class Mixture(NamedTuple):
 
 
 class LayerWeights(NamedTuple):
-    """Weights of an LSTM layer for input and hidden state in one product: `(n + width, 4 width)`, `(4 width,)`."""
+    """Weights of an LSTM layer for its n inputs and the hidden state together: `(n + width, 4 width)`, `(4 width,)`."""
 
     weight: Tensor
     bias: Tensor
@@ -91,7 +91,9 @@ class RecurrentMixtureNetwork(nn.Module):
         of them in each call, and a copy with the outputs side by side is read fastest.
 
         Args:
+            inputs: of one frame, `(B, input_size)`.
             state: of each layer, from the call before; zero if None.
+            deviation: standard deviation of each value, scaled to [-1, 1].
             layers: result of `layer_weights`.
         """
         if state is None:
@@ -100,9 +102,9 @@ class RecurrentMixtureNetwork(nn.Module):
         hidden, states = inputs, []
         for (hidden_before, cell_before), (weight, bias) in zip(state, layers, strict=True):
             gates = torch.addmm(bias, torch.cat((hidden, hidden_before), dim=-1), weight)  # (B, 4 width)
-            entry, forget, change, output = gates.chunk(4, dim=-1)
-            cell = forget.sigmoid() * cell_before + entry.sigmoid() * change.tanh()
-            hidden = output.sigmoid() * cell.tanh()
+            input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
+            cell = forget_gate.sigmoid() * cell_before + input_gate.sigmoid() * candidate.tanh()
+            hidden = output_gate.sigmoid() * cell.tanh()
             states.append((hidden, cell))
         mode = torch.multinomial(torch.softmax(self.logits(hidden), dim=-1), 1)[:, :, None]  # (B, 1, 1)
         means = self._means(hidden)

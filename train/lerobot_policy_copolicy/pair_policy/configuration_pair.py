@@ -34,8 +34,8 @@ class PairPolicyConfig(PreTrainedConfig):
 
     A subclass gives `presets` (settings by preset), `choices` and `bounds` (of its own settings), the names of the
     inputs that it has for any task (`generic_features`, the first where a preset asks for what a task lacks),
-    `_validate` for rules between settings, and settings that count frames with their values for 30 frames a second
-    (`frames_at_30_hz`).
+    `_validate` for rules between settings, and a setting in frames with its published value, by which settings of 30 Hz
+    are noticed on data of another rate (`frames_at_30_hz`).
 
     Raises:
         UnknownNameError: the preset does not exist.

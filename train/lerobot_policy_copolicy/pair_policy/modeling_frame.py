@@ -1,6 +1,6 @@
 """Base of the policies that act frame by frame, with a state that they keep from frame to frame."""
 
-from typing import Any, Unpack
+from typing import Any, NoReturn, Unpack
 
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
@@ -32,13 +32,11 @@ class FramePolicy(PairPolicy):
         """
         raise NotImplementedError(f"{self.name} acts frame by frame: call select_action")
 
-    def _validate_peft_config(self, peft_config: Any) -> None:
-        """LeRobot's hook.
+    def wrap_with_peft(self, peft_config: Any = None, peft_cli_overrides: dict | None = None) -> NoReturn:
+        """Not offered: these networks read their own weights, beside which an adapter has no effect.
 
         Raises:
-            InvalidValueError: always; these networks read their own weights, beside which an adapter has no effect.
+            InvalidValueError: always.
         """
-        method = getattr(peft_config, "peft_type", peft_config)
-        raise InvalidValueError(
-            "--peft", f"no adapters, which {self.name} would not compute; train all its weights", method
-        )
+        expected = f"no adapters: {self.name} reads its weights directly, so an adapter has no effect"
+        raise InvalidValueError("--peft", expected, peft_config or peft_cli_overrides)

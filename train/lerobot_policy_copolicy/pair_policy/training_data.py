@@ -74,8 +74,9 @@ def record_conditions(config: PairPolicyConfig, meta: Any, episodes: Collection[
     for name, frames in config.frames_at_30_hz.items():
         if fps != _PUBLISHED_FPS and getattr(config, name) == frames:
             logging.warning(
-                "%s: %s = %d is for data of %d frames a second, and these have %g; convert with --fps %d, or divide "
-                "the settings in frames", config.type, name, frames, _PUBLISHED_FPS, fps, _PUBLISHED_FPS,
+                "%s: %s = %d is for data of %d frames a second, and these have %g; convert with --fps %d, or "
+                "multiply all settings in frames by %.2g", config.type, name, frames, _PUBLISHED_FPS, fps,
+                _PUBLISHED_FPS, fps / _PUBLISHED_FPS,
             )  # fmt: skip
     counts = _settings_counts(meta, episodes)
     recorded = [text for text in counts if text]

@@ -29,10 +29,10 @@ class VrnnConfig(PairPolicyConfig):
     Settings in frames count frames of the training data. Controllers use seconds (`fps`), so that other rates than the
     30 Hz of the published settings work with frames chosen accordingly.
 
-    Of the known defects of the published program these are not reproduced: its loader read the first 30 files only, the
-    divergence beyond the history used an old encoder output, a checkpoint of stride 5 ran at stride 1, the validation
-    loss chose the epoch, and the human's wrench, numerically negligible, was subtracted from the plan's. See
-    train/docs/rivals.md for all.
+    Of the known defects of the published program these, among others, are not reproduced: its loader read the first 30
+    files only, the divergence beyond the history used an old encoder output, a checkpoint of stride 5 ran at stride 1,
+    the validation loss chose the epoch, and the human's wrench, numerically negligible, was subtracted from the plan's.
+    See train/docs/rivals.md for all.
 
     `fps`, `physics`, `unseen` and `kl_steps` are set from the training; see `PairPolicyConfig` for shared settings.
     """
