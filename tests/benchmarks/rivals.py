@@ -64,9 +64,9 @@ def _recipe(preset: str) -> str:
     return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
 
 
-def _bc(preset: str, fps: int, recipe: str | None = None) -> Row:
+def _bc(preset: str, fps: int, recipe: str | None = None, steps: int = 6_000) -> Row:
     """robomimic's batch; `_BC_RATE` on a short budget."""
-    settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": 6_000, "batch": 100}
+    settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": steps, "batch": 100}
     return Row(_BC_RATE, preset, recipe or _recipe(preset), bf16=False, **settings)
 
 
@@ -101,6 +101,7 @@ ROWS: Mapping[str, Row] = {
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-scan": _bc("scan", _RIVALS_HZ),
     "bc-scan-10hz": _bc("scan", 10),
+    "bc-scan-10hz-long": _bc("scan", 10, steps=15_000),
     "bc-scan-10hz-orientations": _bc("scan", 10, _ORIENTATIONS),
     "cnn": _cnn("cnn"),
     "cnn-inpainting": _cnn("cnn-inpainting"),
