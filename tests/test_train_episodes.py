@@ -3,7 +3,6 @@
 import json
 import logging
 from pathlib import Path
-from types import SimpleNamespace
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -15,6 +14,7 @@ from training_table import flags, lerobot_train, mark_discarded, windows
 from copolicy.dataset.exceptions import RunError
 from copolicy.train.cli import main
 from copolicy.train.episode_choice import resumed_episodes, selected_episodes
+from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 from lerobot_policy_copolicy.pair_policy.training_data import prepare_training
 
@@ -170,9 +170,9 @@ def test_a_loop_of_ones_own_is_stopped_at_an_excluded_frame(copied_table):
 
 def test_a_data_set_beside_the_policy_is_seen(copied_table):
     mark_discarded(copied_table, (1,))
-    config = SimpleNamespace(fps=None, physics=None, physics_mixture={}, filled=SimpleNamespace(task="table"))
+    config = CopolicyConfig(device="cpu")
     data = windows(copied_table, episodes=[0, 2])
-    assert prepare_training(config, data.meta) == frozenset()  # pyright: ignore[reportArgumentType]
+    assert prepare_training(config, data.meta) == frozenset()
     data = windows(copied_table, episodes=[0, 1])
     with pytest.raises(RunError, match=r"found \[1\]"):
-        prepare_training(config, data.meta)  # pyright: ignore[reportArgumentType]
+        prepare_training(config, data.meta)
