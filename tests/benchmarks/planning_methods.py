@@ -31,6 +31,7 @@ import torch
 from lerobot.configs import FeatureType, PolicyFeature, PreTrainedConfig
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.utils.import_utils import register_third_party_plugins
+from rivals import ACT_NETWORK, DIFFUSION_NETWORK
 
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, bounds_of, features_of
@@ -51,8 +52,6 @@ class Made:
     limit_ms: float | None = None
 
 
-# The networks of rivals.py.
-_ACT = {"chunk_size": 16, "n_action_steps": 8, "dim_model": 128, "n_heads": 4, "dim_feedforward": 512}
 _STEPS_34 = {"num_inference_steps": 34}
 METHODS = {
     "CoDP-H, paper's network, DDPM-34": Made("copolicy", {"preset": "paper", **_STEPS_34}),
@@ -70,8 +69,8 @@ METHODS = {
     "VRNN, paper": Made("vrnn", {"preset": "paper"}, limit_ms=40),
     "VRNN": Made("vrnn", {"preset": "default"}, limit_ms=40),
     "VRNN, scan": Made("vrnn", {"preset": "scan"}, limit_ms=40),
-    "LeRobot's diffusion, narrow": Made("diffusion", {"down_dims": (32, 64, 128), "diffusion_step_embed_dim": 64}, 8),
-    "LeRobot's ACT, narrow": Made("act", _ACT, 8),
+    "LeRobot's diffusion, narrow": Made("diffusion", dict(DIFFUSION_NETWORK), 8),
+    "LeRobot's ACT, narrow": Made("act", dict(ACT_NETWORK), 8),
 }
 
 

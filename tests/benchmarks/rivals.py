@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -44,10 +45,12 @@ _PAPER_SETTINGS = {
     **_PAPER_INPUTS, "prediction_type": "epsilon", "sampler": "ddpm", "num_inference_steps": 100,
 }  # fmt: skip
 # Networks of LeRobot's policies that one core trains; every other setting is LeRobot's default.
-_DIFFUSION = ("--policy.down_dims=[32,64,128]", "--policy.diffusion_step_embed_dim=64")
-_ACT = policy_flags(
-    chunk_size=16, n_action_steps=8, dim_model=128, n_heads=4, dim_feedforward=512, optimizer_lr=1e-4
-)  # fmt: skip
+DIFFUSION_NETWORK: Mapping[str, Any] = {"down_dims": [32, 64, 128], "diffusion_step_embed_dim": 64}
+ACT_NETWORK: Mapping[str, Any] = {
+    "chunk_size": 16, "n_action_steps": 8, "dim_model": 128, "n_heads": 4, "dim_feedforward": 512,
+}  # fmt: skip
+_DIFFUSION = policy_flags(**DIFFUSION_NETWORK)
+_ACT = policy_flags(**ACT_NETWORK, optimizer_lr=1e-4)
 # LeRobot scales no column of the kind ENV unless it is told to: goal and obstacles reach the network in px.
 _SCALED = '--policy.normalization_mapping={"STATE":"MIN_MAX","ENV":"MIN_MAX","ACTION":"MIN_MAX"}'
 

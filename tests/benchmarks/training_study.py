@@ -50,7 +50,7 @@ class Row:
 
 def policy_flags(**settings: object) -> tuple[str, ...]:
     """Flags of settings of the policy."""
-    return tuple(f"--policy.{name}={str(value).lower()}" for name, value in settings.items())
+    return tuple(f"--policy.{name}={str(value).lower().replace(' ', '')}" for name, value in settings.items())
 
 
 def train(row: Row, dataset: Path, folder: Path, seed: int, device: str = "cpu", checkpoints: int = 1) -> Path:
