@@ -183,6 +183,21 @@ def test_it_plans_every_other_frame_from_the_last_second(monkeypatch):
     assert len(seen) == 21
 
 
+def test_a_temperature_widens_the_sampled_futures():
+    torch.manual_seed(0)
+    policy = VrnnPolicy(config(n_samples=64)).eval()
+    columns = batch(policy, 1)
+    states, scenarios = columns[STATE][:, : 30 // policy.config.filled.stride + 1], columns[ENVIRONMENT_STATE][:, 0]
+    spreads = []
+    for temperature in (0.0, 1.0, 2.0):
+        policy.config.temperature = temperature
+        torch.manual_seed(1)
+        futures = policy._planner.sample(states, scenarios)[0, :, -1, :2]
+        spreads.append(futures.std(dim=0).norm().item())
+    # The encoder's latent variables of the history vary at any temperature.
+    assert 0 < spreads[0] < 0.7 * spreads[1] < 0.5 * spreads[2]
+
+
 def test_the_defects_of_execution_are_settings():
     paper, default = VrnnPolicy(config(preset="paper")).eval(), VrnnPolicy(config()).eval()
     assert (paper.features.repeat_last, paper.features.velocity_as_goal) == (True, False)

@@ -27,6 +27,7 @@ MAPS = ("holdout", "unseen")
 
 _PROPORTIONAL = {"controller": "proportional"}
 _UNIT_FORCE = {**_PROPORTIONAL, "unit_force": True}
+_ONE = {"n_samples": 1}
 _FAR = {"plan_frames": 130, "lookahead_frames": 120}
 CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "vrnn": {
@@ -40,7 +41,9 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "all of these but the velocity": {
             **_UNIT_FORCE, **_FAR, "wrapped_angle": False, "zero_history": True, "repeat_last_obstacle": True,
         },
-        "one sampled future, no choice": {"n_samples": 1},
+        "one sampled future, no choice": _ONE,
+        "one sampled future, absent obstacles are copies of the last": {**_ONE, "repeat_last_obstacle": True},
+        "sampled futures of twice the deviation": {"temperature": 2.0},
     },
     "bc_lstm_gmm": {
         "state never reset": {"sequence_length": 100_000},

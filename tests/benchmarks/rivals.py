@@ -77,10 +77,10 @@ def _vrnn(preset: str, steps: int = 10_000) -> Row:
     return Row((), preset, _recipe(preset), steps, 64, policy="vrnn", fps=_RIVALS_HZ, bf16=False)
 
 
-def _cogail(preset: str) -> Row:
+def _cogail(preset: str, steps: int = 6_000_000) -> Row:
     """Its own command: a step is a frame in the world."""
     settings = {"policy": "cogail", "command": "cogail", "fps": _RIVALS_HZ}
-    return Row((), preset, _recipe(preset), 6_000_000, 1, bf16=False, **settings)
+    return Row((), preset, _recipe(preset), steps, 1, bf16=False, **settings)
 
 
 def _cnn(preset: str, steps: int = 5_000) -> Row:
@@ -96,12 +96,14 @@ ROWS: Mapping[str, Row] = {
     "codp-h-orientations": Row(recipe=_ORIENTATIONS),
     "codp": Row(policy_flags(past_human_action=False)),
     "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
+    "codp-h-paper-long": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS, steps=18_000),
     "codp-paper": Row(policy_flags(past_human_action=False, **_PAPER_INPUTS), recipe=_ORDERS),
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
     "bc-normalized-10hz": _bc("normalized", 10),
+    "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
     "bc-scan": _bc("scan", _RIVALS_HZ),
     "bc-scan-10hz": _bc("scan", 10),
     "bc-scan-10hz-long": _bc("scan", 10, steps=15_000),
@@ -112,11 +114,15 @@ ROWS: Mapping[str, Row] = {
     "cnn-small-long": _cnn("cnn-small", 3_200),
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
+    "vrnn-long": _vrnn("default", 25_000),
     "vrnn-scan": _vrnn("scan"),
     "vrnn-scan-long": _vrnn("scan", 25_000),
+    "vrnn-scan-longer": _vrnn("scan", 60_000),
     "cogail": _cogail("paper"),
     "cogail-corrected": _cogail("corrected"),
+    "cogail-corrected-long": _cogail("corrected", 12_000_000),
     "cogail-scan": _cogail("scan"),
+    "cogail-scan-long": _cogail("scan", 12_000_000),
     "diffusion": _lerobot("diffusion", 6_400, *_DIFFUSION),
     "diffusion-scaled": _lerobot("diffusion", 6_400, *_DIFFUSION, _SCALED),
     "act": _lerobot("act", 1_600, *_ACT),

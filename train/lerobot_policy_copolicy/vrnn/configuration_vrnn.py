@@ -56,6 +56,7 @@ class VrnnConfig(PairPolicyConfig):
         "lookahead_frames": _COUNT,
         "replan_frames": _COUNT,
         "n_samples": _COUNT,
+        "temperature": Bounds(0),
         "latent": _COUNT,
         "width": _COUNT,
         "n_layers": _COUNT,
@@ -80,6 +81,7 @@ class VrnnConfig(PairPolicyConfig):
     lookahead_frames: int | None = None  # frames from the plan's start to the waypoint that the controller drives to
     replan_frames: int = 2  # frames between two plans
     n_samples: int = 16  # sampled plans, of which the one with the greatest sum of rewards is executed
+    temperature: float = 1.0  # factor of the prior's standard deviations in sampled plans
 
     latent: int = 6  # values of the latent variable of a row
     width: int = 64  # hidden size of all layers

@@ -47,7 +47,7 @@ class MotionPlanner:
         start = poses[:, -1].repeat_interleave(samples, dim=0)
         steps = settings.plan_frames // settings.stride
         repeated = scenarios.repeat_interleave(samples, dim=0)
-        run = free_run(self._network, self._rows, encoded.state, start, repeated, steps)
+        run = free_run(self._network, self._rows, encoded.state, start, repeated, steps, settings.temperature)
         return run.poses.unflatten(0, (len(states), samples))
 
     def follow(self, path: Tensor, age: int, state: Tensor) -> Tensor:

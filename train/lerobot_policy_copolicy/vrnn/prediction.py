@@ -48,7 +48,13 @@ class FreeRun(NamedTuple):
 
 
 def free_run(
-    network: MotionNetwork, motion_rows: MotionRows, state: Tensor, pose: Tensor, scenarios: Tensor, steps: int
+    network: MotionNetwork,
+    motion_rows: MotionRows,
+    state: Tensor,
+    pose: Tensor,
+    scenarios: Tensor,
+    steps: int,
+    temperature: float = 1.0,
 ) -> FreeRun:
     """Predicts rows beyond the observed ones; latent variables are drawn from the prior.
 
@@ -60,6 +66,7 @@ def free_run(
         pose: `(B, 4)` last observed pose.
         scenarios: `(B, k)` scenario vectors.
         steps: rows to predict, T >= 1.
+        temperature: factor of the prior's standard deviations.
     """
     poses = [pose]
 
@@ -69,7 +76,7 @@ def free_run(
             return predicted
         return torch.cat((predicted, motion_rows.surroundings(poses[-2], poses[-1], scenarios)), dim=-1)
 
-    noise = torch.randn(steps, len(pose), network.latent, dtype=pose.dtype, device=pose.device)
+    noise = temperature * torch.randn(steps, len(pose), network.latent, dtype=pose.dtype, device=pose.device)
     weights = network.predicted_weights
     if not torch.is_grad_enabled():  # so that a plan keeps nothing for a backward pass
         weights = [weight.detach() for weight in weights]
