@@ -67,6 +67,7 @@ def test_a_preset_chooses_the_inputs(preset, features, symmetries, size):
         ({"preset": "small"}, UnknownNameError, "preset"),
         ({"observation_features": "pixels"}, InvalidValueError, "absolute, raw, relative, scan"),
         ({"sequence_length": 0}, InvalidValueError, "sequence_length: expected at least 1, found 0"),
+        ({"execution_mode": "mean"}, UnknownNameError, "execution_mode.*drawn, likeliest"),
         ({"n_modes": 0}, InvalidValueError, "n_modes: expected at least 1, found 0"),
         ({"min_deviation": 0.0}, InvalidValueError, "min_deviation: expected a number above 0, found 0"),
         ({"optimizer_lr": float("nan")}, InvalidValueError, "optimizer_lr"),
@@ -132,17 +133,21 @@ def test_the_state_is_kept_and_reset_every_window():
     torch.testing.assert_close(policy.select_action(frame), acted[0], rtol=0, atol=2e-3)
 
 
-def test_a_mode_is_drawn_at_each_frame():
-    policy = BcLstmGmmPolicy(config(execution_deviation=0.0)).eval()
+@pytest.mark.parametrize("mode", ["drawn", "likeliest"])
+def test_a_mode_is_drawn_at_each_frame_or_is_the_likeliest(mode):
+    policy = BcLstmGmmPolicy(config(execution_deviation=0.0, execution_mode=mode)).eval()
     with torch.no_grad():
         policy.network.logits.weight.zero_()
-        policy.network.logits.bias.copy_(torch.tensor([0.0, 0.0, -30, -30, -30]))
+        policy.network.logits.bias.copy_(torch.tensor([0.01, 0.0, -30, -30, -30]))
         policy.network.mean.weight.zero_()
         policy.network.mean.bias.copy_(torch.tensor([1.0] * 4 + [-1.0] * 4 + [0.0] * 12))
     torch.manual_seed(0)
     drawn = torch.stack([policy.select_action(batch(None, 1))[0] for _ in range(400)])
     means = torch.tanh(torch.ones(4))
     is_first = (drawn - means).abs().max(dim=1).values < 1e-5
+    if mode == "likeliest":
+        assert torch.all(is_first)
+        return
     assert torch.all(is_first | ((drawn + means).abs().max(dim=1).values < 1e-5))
     assert 0.4 < is_first.float().mean() < 0.6
     switches = (is_first[1:] != is_first[:-1]).float().mean()

@@ -48,6 +48,7 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "bc_lstm_gmm": {
         "state never reset": {"sequence_length": 100_000},
         "state reset every frame": {"sequence_length": 1},
+        "the likeliest mode": {"execution_mode": "likeliest"},
     },
     "cogail": {
         "code drawn every frame": {"code": "drawn"},

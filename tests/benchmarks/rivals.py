@@ -67,20 +67,44 @@ def _recipe(preset: str) -> str:
     return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
 
 
-def _bc(preset: str, fps: int, recipe: str | None = None, steps: int = 6_000) -> Row:
+def _bc(preset: str, fps: int, recipe: str | None = None, steps: int = 6_000, flags: tuple[str, ...] = _BC_RATE) -> Row:
     """robomimic's batch; `_BC_RATE` on a short budget."""
     settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": steps, "batch": 100}
-    return Row(_BC_RATE, preset, recipe or _recipe(preset), bf16=False, **settings)
+    return Row(flags, preset, recipe or _recipe(preset), bf16=False, **settings)
 
 
-def _vrnn(preset: str, steps: int = 10_000) -> Row:
-    return Row((), preset, _recipe(preset), steps, 64, policy="vrnn", fps=_RIVALS_HZ, bf16=False)
+def _vrnn(preset: str, steps: int = 10_000, **changed: object) -> Row:
+    settings = {"policy": "vrnn", "fps": _RIVALS_HZ}
+    return Row(policy_flags(**changed), preset, _recipe(preset), steps, 64, bf16=False, **settings)
 
 
-def _cogail(preset: str, steps: int = 6_000_000) -> Row:
+def _cogail(preset: str, steps: int = 6_000_000, **changed: object) -> Row:
     """Its own command: a step is a frame in the world."""
     settings = {"policy": "cogail", "command": "cogail", "fps": _RIVALS_HZ}
-    return Row((), preset, _recipe(preset), steps, 1, bf16=False, **settings)
+    return Row(policy_flags(**changed), preset, _recipe(preset), steps, 1, bf16=False, **settings)
+
+
+# Single published choices of the training, each in the corrected settings; those of execution: rival_settings.py.
+_VRNN_CHOICES: Mapping[str, Mapping[str, Any]] = {
+    "loss": {"loss_balance": "published"},
+    "predicted-row": {"predicted": "row"},
+    "prior": {"encoded_frames": 30},
+    "scene-axes": {"motion_axes": "scene"},
+    "px": {"scaled_rows": False, "loss_balance": "published"},  # the other balance is of scaled rows
+    "off-circle": {"heading_on_circle": False},
+    "no-pose": {"observe_pose": False},
+    "cycles": {"kl_cycles": 4, "kl_ramp": 0.5},
+    "weight-decay": {"optimizer_weight_decay": 0.2},
+}
+_COGAIL_CHOICES: Mapping[str, Mapping[str, Any]] = {
+    "unit-range": {"input_range": "unit"},
+    "zeros": {"history_start": "zeros"},
+    "unbounded": {"bounded_actions": False},
+    "first-frame": {"start_frames": "first"},
+    "exploration": {"initial_deviation": 1.0},
+    "logit": {"reward": "logit"},
+    "zero-success": {"after_success": "zero"},
+}
 
 
 def _cnn(preset: str, steps: int = 5_000) -> Row:
@@ -101,6 +125,7 @@ ROWS: Mapping[str, Row] = {
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
+    "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),  # the published constant rate
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
@@ -123,6 +148,8 @@ ROWS: Mapping[str, Row] = {
     "cogail-corrected-long": _cogail("corrected", 12_000_000),
     "cogail-scan": _cogail("scan"),
     "cogail-scan-long": _cogail("scan", 12_000_000),
+    **{f"vrnn-{name}": _vrnn("default", **changed) for name, changed in _VRNN_CHOICES.items()},
+    **{f"cogail-{name}": _cogail("corrected", **changed) for name, changed in _COGAIL_CHOICES.items()},
     "diffusion": _lerobot("diffusion", 6_400, *_DIFFUSION),
     "diffusion-scaled": _lerobot("diffusion", 6_400, *_DIFFUSION, _SCALED),
     "act": _lerobot("act", 1_600, *_ACT),

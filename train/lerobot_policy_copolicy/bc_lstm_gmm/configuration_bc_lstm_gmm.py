@@ -31,6 +31,7 @@ class BcLstmGmmConfig(PairPolicyConfig):
         "scan": {"observation_features": "scan", "mirror": True, "permute_obstacles": True},
     }
     generic_features: ClassVar = ("absolute", "raw")
+    choices: ClassVar = {"execution_mode": ("drawn", "likeliest")}
     n_action_steps: ClassVar[int] = 1  # it acts frame by frame
     bounds: ClassVar = {
         "sequence_length": Bounds(1),
@@ -51,6 +52,7 @@ class BcLstmGmmConfig(PairPolicyConfig):
     width: int = 400  # hidden size of the LSTM
     n_modes: int = 5  # modes of the mixture
     min_deviation: float = 1e-4  # added to each standard deviation in training
+    execution_mode: str = "drawn"  # mode of each action in execution: "drawn", or the "likeliest"
     execution_deviation: float = 1e-4  # standard deviation of every mode in execution
     optimizer_lr: float = 1e-4  # learning rate of Adam
     optimizer_weight_decay: float = 0.0  # weight decay of Adam

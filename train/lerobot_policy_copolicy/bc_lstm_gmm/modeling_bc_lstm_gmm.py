@@ -86,6 +86,6 @@ class BcLstmGmmPolicy(FramePolicy):
         inputs = self.features(self._observation(batch, None))  # (B, size)
         if self._layers is None or self.training:
             self._layers = self.network.layer_weights()
-        deviation = self.config.execution_deviation
-        drawn, self._state = self.network.sample(inputs, self._state, deviation, self._layers)
+        deviation, likeliest = self.config.execution_deviation, self.config.execution_mode == "likeliest"
+        drawn, self._state = self.network.sample(inputs, self._state, deviation, self._layers, likeliest)
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))

@@ -82,7 +82,12 @@ class RecurrentMixtureNetwork(nn.Module):
 
     @torch.no_grad()
     def sample(
-        self, inputs: Tensor, state: LayerStates | None, deviation: float, layers: Sequence[LayerWeights]
+        self,
+        inputs: Tensor,
+        state: LayerStates | None,
+        deviation: float,
+        layers: Sequence[LayerWeights],
+        likeliest: bool = False,
     ) -> tuple[Tensor, LayerStates]:
         """Draws an action `(B, m)` for one frame `(B, input_size)`, and returns the state after it; no gradients.
 
@@ -95,6 +100,7 @@ class RecurrentMixtureNetwork(nn.Module):
             state: of each layer, from the call before; zero if None.
             deviation: standard deviation of each value, scaled to [-1, 1].
             layers: result of `layer_weights`.
+            likeliest: take the likeliest mode, draw none.
         """
         if state is None:
             zeros = inputs.new_zeros(len(inputs), self.lstm.hidden_size)
@@ -106,9 +112,9 @@ class RecurrentMixtureNetwork(nn.Module):
             cell = forget_gate.sigmoid() * cell_before + input_gate.sigmoid() * candidate.tanh()
             hidden = output_gate.sigmoid() * cell.tanh()
             states.append((hidden, cell))
-        mode = torch.multinomial(torch.softmax(self.logits(hidden), dim=-1), 1)[:, :, None]  # (B, 1, 1)
-        means = self._means(hidden)
-        drawn = means.gather(1, mode.expand(-1, 1, means.shape[-1]))[:, 0]
+        logits, means = self.logits(hidden), self._means(hidden)
+        mode = logits.argmax(dim=-1, keepdim=True) if likeliest else torch.multinomial(torch.softmax(logits, dim=-1), 1)
+        drawn = means.gather(1, mode[:, :, None].expand(-1, 1, means.shape[-1]))[:, 0]
         return drawn + deviation * torch.randn_like(drawn), tuple(states)
 
     def _means(self, hidden: Tensor) -> Tensor:
