@@ -59,6 +59,7 @@ METHODS = {
     "CoDP-H, paper's network, DDPM-100": Made("copolicy", {"preset": "paper"}, 8),
     "CoDP-H, default (DDIM-10)": Made("copolicy", {"preset": "default"}),
     "CoDP-H, small (DDIM-10)": Made("copolicy", {"preset": "small"}),
+    "CoDP, small (DDIM-10)": Made("copolicy", {"preset": "small", "past_human_action": False}),
     "CNN": Made("copolicy", {"preset": "cnn"}),
     "CNN, inpainting (DDIM-8)": Made("copolicy", {"preset": "cnn-inpainting"}),
     "CNN, small (DDIM-10)": Made("copolicy", {"preset": "cnn-small"}),

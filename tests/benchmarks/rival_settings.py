@@ -5,8 +5,7 @@
 The runs are of one method and differ in their training seed. Each is evaluated on the 84 holdout and the 84 unseen maps
 as it is and with each line of `CHANGES`, with the same starts and noise: most changes bring back one published choice
 or defect. Differences are in percentage points, with standard errors over maps (bootstrap; the seeds of a map
-together). Settings that shape the training are not here: rivals.py has rows of these. Demonstrations are simulated
-pairs.
+together). Settings that shape the training are rows of rivals.py. Demonstrations are simulated pairs.
 """
 
 import os

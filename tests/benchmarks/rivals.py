@@ -44,7 +44,7 @@ _PAPER_INPUTS = {"observation_features": "absolute", "mirror": False, "permute_o
 _PAPER_SETTINGS = {
     **_PAPER_INPUTS, "prediction_type": "epsilon", "sampler": "ddpm", "num_inference_steps": 100,
 }  # fmt: skip
-# Networks of LeRobot's policies that one core trains; every other setting is LeRobot's default.
+# Networks of LeRobot's policies that one core trains; ACT's chunks are about as long as the paper's.
 DIFFUSION_NETWORK: Mapping[str, Any] = {"down_dims": [32, 64, 128], "diffusion_step_embed_dim": 64}
 ACT_NETWORK: Mapping[str, Any] = {
     "chunk_size": 16, "n_action_steps": 8, "dim_model": 128, "n_heads": 4, "dim_feedforward": 512,
