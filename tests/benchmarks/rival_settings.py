@@ -34,6 +34,7 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "absent obstacles are copies of the last": {"repeat_last_obstacle": True},
         "the velocity read as the goal's place": {"velocity_as_goal": True},
         "waypoint 4 s ahead": _FAR,
+        "waypoint half a second ahead": {"lookahead_frames": 15},
         "proportional controller": _PROPORTIONAL,
         "proportional controller, forces of unit norm": _UNIT_FORCE,
         "the latter, angles not wrapped": {**_UNIT_FORCE, "wrapped_angle": False},
