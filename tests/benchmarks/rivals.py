@@ -122,6 +122,7 @@ ROWS: Mapping[str, Row] = {
     "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
     "codp-h-paper-long": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS, steps=18_000),
     "codp-paper": Row(policy_flags(past_human_action=False, **_PAPER_INPUTS), recipe=_ORDERS),
+    "codp-paper-long": Row(policy_flags(past_human_action=False, **_PAPER_INPUTS), recipe=_ORDERS, steps=18_000),
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
