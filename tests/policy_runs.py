@@ -12,6 +12,8 @@ from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, S
 from copolicy.dataset.task import get_task
 from lerobot_policy_copolicy.bc_lstm_gmm.configuration_bc_lstm_gmm import BcLstmGmmConfig
 from lerobot_policy_copolicy.bc_lstm_gmm.modeling_bc_lstm_gmm import BcLstmGmmPolicy
+from lerobot_policy_copolicy.cogail.configuration_cogail import CoGailConfig
+from lerobot_policy_copolicy.cogail.modeling_cogail import CoGailPolicy
 from lerobot_policy_copolicy.copolicy.configuration_copolicy import CopolicyConfig
 from lerobot_policy_copolicy.copolicy.modeling_copolicy import CopolicyPolicy
 
@@ -19,6 +21,7 @@ _KINDS = {STATE: FeatureType.STATE, ENVIRONMENT_STATE: FeatureType.ENV, HUMAN_AC
 _POLICIES = {
     "copolicy": (CopolicyConfig, CopolicyPolicy, {"preset": "small", "width": 16, "n_layers": 1, "backend": "torch"}),
     "bc_lstm_gmm": (BcLstmGmmConfig, BcLstmGmmPolicy, {"width": 8, "n_layers": 1}),
+    "cogail": (CoGailConfig, CoGailPolicy, {"width": 8}),
 }
 
 

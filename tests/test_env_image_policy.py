@@ -1,7 +1,5 @@
 """A policy that learned from images of the scene, evaluated by LeRobot's command in the environment."""
 
-import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +9,7 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.policies.factory import make_pre_post_processors
-from lerobot.scripts import lerobot_eval
+from lerobot_evaluation import evaluated
 
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, SCENE_IMAGE, STATE
 from copolicy.tasks.table import TableTask
@@ -46,19 +44,8 @@ def checkpoint(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("partner", ["", "S01"])
 def test_lerobot_evaluates_a_policy_that_sees_the_scene(checkpoint, tmp_path, monkeypatch, partner):
-    seen = []
-    act = ACTPolicy.select_action
-    monkeypatch.setattr(ACTPolicy, "select_action", lambda self, batch: seen.append(batch) or act(self, batch))
-    flags = {
-        "policy.path": checkpoint, "policy.device": "cpu",
-        "env.type": "table_carrying", "env.step_limit": 9, "env.partner": partner,
-        "env.pixels": "true", "env.observation_width": SIZE[0], "env.observation_height": SIZE[1],
-        "eval.n_episodes": 1, "eval.batch_size": 1, "eval.use_async_envs": "false", "seed": 0, "output_dir": tmp_path,
-    }  # fmt: skip
-    monkeypatch.setattr(sys, "argv", ["lerobot-eval", *(f"--{name}={value}" for name, value in flags.items())])
-    lerobot_eval.main()
-    result = json.loads((tmp_path / "eval_info.json").read_text(encoding="utf-8"))
-    assert result["overall"]["n_episodes"] == 1
+    images = {"pixels": "true", "observation_width": SIZE[0], "observation_height": SIZE[1]}
+    seen = evaluated(monkeypatch, "act", checkpoint, tmp_path, step_limit=9, partner=partner, **images)
     assert len(seen) == 3  # frames of three steps each
     state = seen[0][STATE].numpy().astype(float)
     (image,) = TableTask().images(MAP_SETS["training"][0], state, SIZE)
