@@ -262,10 +262,10 @@ def visit(browser):
 @pytest.fixture
 def peg(monkeypatch):
     """A task of another package, installed as far as Python can tell, here and in the commands that a test starts."""
-    from copolicy.dataset.task import get_task
+    from copolicy.dataset.task import get_task, load_task
 
     folder = str(Path(__file__).parent / "peg_task")
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH")))))
     yield get_task("peg")
-    get_task.cache_clear()
+    load_task.cache_clear()

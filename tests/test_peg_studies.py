@@ -9,7 +9,7 @@ import pytest
 from peg_data import convert_pegs, record_pegs
 from training_table import flags
 
-from copolicy.dataset.task import get_task
+from copolicy.dataset.task import get_task, load_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.human_study.plan import StudyPlan
 from copolicy.train.cli import main as train
@@ -27,7 +27,7 @@ def runs(tmp_path_factory) -> Iterator[list[Path]]:
         for seed in range(2):
             assert train(flags(root, folder / f"run{seed}", steps=50, save_freq=50, seed=seed)) == 0
         yield [folder / f"run{seed}" for seed in range(2)]
-    get_task.cache_clear()
+    load_task.cache_clear()
 
 
 def judged(out: Path, *call: object) -> Any:

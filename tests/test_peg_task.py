@@ -17,7 +17,7 @@ from copolicy.dataset.episode import EpisodeMeta
 from copolicy.dataset.exceptions import ForeignRecordingError, InvalidValueError, ShapeError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.dataset.recording.reader import read_episode, read_metadata
-from copolicy.dataset.task import get_task, installed_tasks
+from copolicy.dataset.task import get_task, installed_tasks, load_task
 
 
 def record(task, path: Path, index: int = 0, steps: int | None = None):
@@ -106,7 +106,7 @@ def test_a_task_that_is_not_installed_is_said_in_one_line(peg, tmp_path, monkeyp
     path = tmp_path / "one.mcap"
     record(peg, path)
     monkeypatch.undo()
-    get_task.cache_clear()
+    load_task.cache_clear()
     with pytest.raises(ForeignRecordingError) as error:
         read_episode(path)
     assert str(error.value) == f"{path}: expected a recording of a task that is installed (table), found one of 'peg'"

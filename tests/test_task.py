@@ -16,7 +16,7 @@ from copolicy.tasks.table.features import ACTION_NAMES, BOUNDS, ENVIRONMENT_NAME
 def test_the_table_is_installed_as_any_task_is():
     assert "table" in installed_tasks()
     task = get_task("table")
-    assert task is get_task("table")
+    assert task is get_task("table") is get_task() is get_task(name="table")
     assert task.spec.name == "table"
 
 

@@ -393,15 +393,20 @@ def distribution_of(task: PairTask) -> str | None:
     return None if package is None else package.name
 
 
-@functools.cache
 def get_task(name: str = TABLE) -> PairTask:
-    """The installed task with a name.
+    """The installed task with a name: one object for each name.
 
     Raises:
         UnknownNameError: no such task is installed.
         InvalidValueError: the object registered under the name is not a `PairTask` of that name.
         CopolicyError: the task cannot be imported.
     """
+    return load_task(name)
+
+
+@functools.cache  # its own function, since a cache takes `get_task()` and `get_task("table")` for two calls
+def load_task(name: str) -> PairTask:
+    """As `get_task`; `load_task.cache_clear` forgets the tasks after a package was removed."""
     entries = list(entry_points(group=ENTRY_POINTS, name=name))
     if not entries:
         raise UnknownNameError("task", name, installed_tasks())
