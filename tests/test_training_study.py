@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ from lerobot.configs import PreTrainedConfig
 from policy_runs import save_run
 
 from copolicy.collect.episodes import run_episodes
+from copolicy.dataset.task import get_task
 from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.plugins import register_plugins
 
@@ -20,6 +22,7 @@ sys.path.append(str(Path(__file__).parent / "benchmarks"))
 import handover  # pyright: ignore[reportMissingImports]
 import rival_settings  # pyright: ignore[reportMissingImports]
 import rivals  # pyright: ignore[reportMissingImports]
+import routes_and_success  # pyright: ignore[reportMissingImports]
 import training_study  # pyright: ignore[reportMissingImports]
 
 ROW = training_study.Row(policy="bc_lstm_gmm", preset="paper", steps=100, batch=8, bf16=False)
@@ -148,3 +151,25 @@ def test_a_failure_counts_at_the_column_of_obstacles_before_which_it_ended(end_x
         scenario=SimpleNamespace(obstacles=((480.0, 300.0), (720.0, 180.0))),
     )
     assert handover.obstacle_failures([episode], place) == expected
+
+
+def test_kinds_of_maps_are_compared_within_equally_many_obstacles():
+    """Not over all maps: those with several routes are most of the difficult ones."""
+    one = [(0.9, 1, True), (0.9, 1, True), (0.8, 1, True), (0.4, 2, True), (0.3, 2, True)]
+    several = [(0.7, 1, False), (0.6, 1, False), (0.2, 2, False), (0.1, 2, False), (0.15, 2, False), (0.0, 3, False)]
+    row = routes_and_success.compare(*zip(*one, *several, strict=True))
+    assert row["one_route"] == {"mean": pytest.approx(0.66), "maps": 5}
+    assert row["several"] == {"mean": pytest.approx(1.75 / 6), "maps": 6}
+    # At one obstacle 0.65 - 0.8667 and at two 0.15 - 0.35, each weighted by 1 / (1/3 + 1/2).
+    assert row["difference"] == pytest.approx((0.65 - 2.6 / 3 - 0.2) / 2)
+    variances = (0.01 / 3 / 3 + 0.005 / 2, 0.005 / 2 + 0.0025 / 3)
+    assert row["standard_error"] == pytest.approx(sum(variances) ** 0.5 / 2)
+
+
+def test_a_map_is_the_same_in_any_order_of_its_obstacles():
+    scenario = get_task().scenario_set("holdout").scenarios[-1]
+    turned = replace(scenario, obstacles=scenario.obstacles[::-1])
+    assert len(scenario.obstacles) > 1
+    assert routes_and_success.key(turned) == routes_and_success.key(scenario)
+    moved = replace(scenario, obstacles=((1.0, 2.0), *scenario.obstacles[1:]))
+    assert routes_and_success.key(moved) != routes_and_success.key(scenario)
