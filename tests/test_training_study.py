@@ -2,27 +2,19 @@
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
 from lerobot.configs import PreTrainedConfig
 from policy_runs import save_run
 
-from copolicy.collect.episodes import run_episodes
-from copolicy.dataset.task import get_task
-from copolicy.train.checkpoint import Checkpoint
 from copolicy.train.plugins import register_plugins
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 
-import handover  # pyright: ignore[reportMissingImports]
 import rival_settings  # pyright: ignore[reportMissingImports]
 import rivals  # pyright: ignore[reportMissingImports]
-import routes_and_success  # pyright: ignore[reportMissingImports]
 import training_study  # pyright: ignore[reportMissingImports]
 
 ROW = training_study.Row(policy="bc_lstm_gmm", preset="paper", steps=100, batch=8, bf16=False)
@@ -117,59 +109,3 @@ def test_a_changed_setting_is_one_of_the_policy_and_another_value(kind):
     for changes in rival_settings.CHANGES[kind].values():
         assert all(getattr(trained, name) != value for name, value in changes.items())
         PreTrainedConfig.get_choice_class(kind)(device="cpu", preset=preset, **changes)
-
-
-def test_a_policy_takes_over_from_a_demonstration_at_a_place(tmp_path):
-    """The states before are the recorded ones, to the last digit; it observes them, and acts from there on."""
-    (recorded,) = run_episodes("scripted:S01", "scripted:S01", limit=1)
-    policy = Checkpoint(save_run(tmp_path / "run", "bc_lstm_gmm"))
-    (own,) = handover.continued(policy, [recorded], 0.0)
-    (continued,) = handover.continued(policy, [recorded], 480.0)
-    taken = int(np.argmax(recorded.states[:, 0] >= 480.0))
-    assert taken > 100
-    assert np.array_equal(continued.states[: taken + 1], recorded.states[: taken + 1])
-    assert np.array_equal(continued.actions[:taken], recorded.actions[:taken])
-    assert not np.array_equal(continued.actions[taken], recorded.actions[taken])
-    assert not np.array_equal(own.actions[0], recorded.actions[0])
-
-
-@pytest.mark.parametrize(
-    ("end_x", "reason", "place", "expected"),
-    [
-        (470.0, "collision_obstacle", 0.0, {"column at 480 px": (1, 1), "column at 720 px": (0, 0)}),
-        (700.0, "collision_obstacle", 0.0, {"column at 480 px": (0, 1), "column at 720 px": (1, 1)}),
-        (700.0, "collision_obstacle", 540.0, {"column at 720 px": (1, 1)}),
-        (900.0, "goal", 0.0, {"column at 480 px": (0, 1), "column at 720 px": (0, 1)}),
-    ],
-)
-def test_a_failure_counts_at_the_column_of_obstacles_before_which_it_ended(end_x, reason, place, expected):
-    path = np.linspace([240.0, 300.0], [end_x, 300.0], 50)
-    episode: Any = SimpleNamespace(
-        states=path[:-1],
-        final_state=path[-1],
-        meta=SimpleNamespace(success=reason == "goal"),
-        scenario=SimpleNamespace(obstacles=((480.0, 300.0), (720.0, 180.0))),
-    )
-    assert handover.obstacle_failures([episode], place) == expected
-
-
-def test_kinds_of_maps_are_compared_within_equally_many_obstacles():
-    """Not over all maps: those with several routes are most of the difficult ones."""
-    one = [(0.9, 1, True), (0.9, 1, True), (0.8, 1, True), (0.4, 2, True), (0.3, 2, True)]
-    several = [(0.7, 1, False), (0.6, 1, False), (0.2, 2, False), (0.1, 2, False), (0.15, 2, False), (0.0, 3, False)]
-    row = routes_and_success.compare(*zip(*one, *several, strict=True))
-    assert row["one_route"] == {"mean": pytest.approx(0.66), "maps": 5}
-    assert row["several"] == {"mean": pytest.approx(1.75 / 6), "maps": 6}
-    # At one obstacle 0.65 - 0.8667 and at two 0.15 - 0.35, each weighted by 1 / (1/3 + 1/2).
-    assert row["difference"] == pytest.approx((0.65 - 2.6 / 3 - 0.2) / 2)
-    variances = (0.01 / 3 / 3 + 0.005 / 2, 0.005 / 2 + 0.0025 / 3)
-    assert row["standard_error"] == pytest.approx(sum(variances) ** 0.5 / 2)
-
-
-def test_a_map_is_the_same_in_any_order_of_its_obstacles():
-    scenario = get_task().scenario_set("holdout").scenarios[-1]
-    turned = replace(scenario, obstacles=scenario.obstacles[::-1])
-    assert len(scenario.obstacles) > 1
-    assert routes_and_success.key(turned) == routes_and_success.key(scenario)
-    moved = replace(scenario, obstacles=((1.0, 2.0), *scenario.obstacles[1:]))
-    assert routes_and_success.key(moved) != routes_and_success.key(scenario)

@@ -1,13 +1,17 @@
-"""Drift of a policy: co-planning that takes over from a demonstration at different places of its way.
+"""Co-planning that goes on from a demonstration: whether a policy fails by the way on which it came to an obstacle.
 
-    uv run python tests/benchmarks/handover.py --runs outputs/rivals/runs/bc/seed_* --recordings FOLDER --out bc.json
+    uv run python tests/benchmarks/handover.py --runs outputs/rivals/runs/bc-scan-10hz/seed_* \\
+        --recordings outputs/rivals/data/pairs-sim-376-recordings --datasets outputs/rivals/data/pairs-sim-376 \\
+        --out bc.json
 
-Each world repeats a recorded demonstration, exactly, until the table's centre has come to `--places` (px along the
-map); from there the policy, which has observed the demonstration up to then, acts for both players. Beside it the
-policy acts from the start. A policy that passes an obstacle from the demonstrated state before it, and touches it after
-its own way to it, fails by the states into which it brings itself. The recordings are of the training data (simulated
-pairs): their layouts are known to the policy. Runs differ in their training seed; differences have standard errors over
-maps (bootstrap).
+Each world repeats a recorded demonstration until the table's centre is first at a given x. From there the policy, which
+has observed the demonstration up to then, acts for both players; of an action chunk that it predicted before, it
+executes the rest. Beside it the policy acts from the start. A policy that fails after its own way to an obstacle, and
+not after a demonstrated one, fails by the states into which it brings itself, or, on maps whose demonstrations take
+several routes (see routes_and_success.py), by a choice that the demonstration has made for it: most have by then.
+
+The recordings are of the training data (simulated pairs), so the policy knows their maps. Runs differ in their training
+seed; differences have standard errors over maps (bootstrap).
 """
 
 import os
@@ -16,12 +20,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from routes_and_success import ONE_ROUTE, MapKey, commonest_routes, map_key
 
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.episodes import run_episodes
@@ -32,8 +37,10 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.notebook import compare_episodes, success
 from copolicy.train.checkpoint import Checkpoint
 
-PLACES = (330.0, 540.0)
-"""px: 150 before the first and 180 before the second column of obstacles of the original maps, at 480 and 720."""
+HANDOVER_X = (330.0, 540.0)
+"""px: 150 before the first and 180 before the second column of obstacles; half the table is 96 px long."""
+COLUMNS = (480, 720)
+"""px: x of all obstacles of the original maps."""
 
 
 class HandoverAgent(PolicyAgent):
@@ -58,33 +65,46 @@ class HandoverAgent(PolicyAgent):
         return half
 
 
-def continued(policy: Checkpoint, recordings: Sequence[Episode], place: float) -> list[Episode]:
-    """Co-planning of the recordings' scenarios, taken over where the table's centre first is at `place`, px."""
+def continued(policy: Checkpoint, recordings: Sequence[Episode], handover_x: float) -> list[Episode]:
+    """Co-planning of the recordings' scenarios, from where the table's centre first is at `handover_x`, px.
+
+    Raises:
+        SystemExit: a recording does not come so far, or is of a world with other settings than the policy's data.
+    """
     task = get_task(policy.task)
     policy.n_action_steps = policy.n_predicted_actions = min(8, policy.chunk_size)
     settings = replace(policy.conditions.settings, step_limit=task.studies.step_limit)
-    steps = [int(np.argmax(recording.states[:, 0] >= place)) for recording in recordings]
+    steps: list[int] = []
+    for recording in recordings:
+        reached = recording.states[:, 0] >= handover_x
+        if not reached.any():
+            raise SystemExit(
+                f"expected recordings in which the table comes to x = {handover_x:g} px, found one without"
+            )
+        if replace(recording.settings, step_limit=settings.step_limit) != settings:
+            raise SystemExit("expected recordings of the world of the policy's data, found one with other settings")
+        steps.append(int(np.argmax(reached)))
     agent = HandoverAgent(policy, [recording.actions for recording in recordings], steps, seed=0)
     return run_episodes(agent, None, [recording.scenario for recording in recordings], settings=settings)
 
 
-def obstacle_failures(episodes: Sequence[Episode], place: float) -> dict[str, tuple[int, int]]:
-    """Failures of the episodes, and their number, at each column of obstacles that lies beyond `place`.
+def touched(episodes: Sequence[Episode], column: int, from_x: float) -> tuple[int, int]:
+    """Number of episodes that end at an obstacle of a column, of those that have one there and come to `from_x`."""
+    there = [
+        episode
+        for episode in episodes
+        if any(round(x) == column for x, _ in episode.scenario.obstacles) and episode.states[:, 0].max() >= from_x
+    ]
+    return sum(_touched_column(episode) == column for episode in there), len(there)
 
-    Counted are maps with an obstacle in the column. The first column is failed by an episode that ends before it, the
-    second by one that ends beyond `PLACES[1]`.
-    """
-    counts = {}
-    for column, reached in ((480, 0.0), (720, PLACES[1])):
-        there = [
-            episode
-            for episode in episodes
-            if any(round(x) == column for x, _ in episode.scenario.obstacles) and episode.states[:, 0].max() >= reached
-        ]
-        failed = [not episode.meta.success and (column == 720 or episode.final_state[0] < 480) for episode in there]
-        if place < column:
-            counts[f"column at {column} px"] = (int(sum(failed)), len(there))
-    return counts
+
+def _touched_column(episode: Episode) -> int | None:
+    """Column of the obstacle that ended an episode: the nearest; None if none did."""
+    if episode.meta.termination_reason != "collision_obstacle":
+        return None
+    centres = np.array(episode.scenario.obstacles)
+    nearest = np.argmin(np.linalg.norm(centres - episode.final_state[:2], axis=1))
+    return round(float(centres[nearest, 0]))
 
 
 def main() -> None:
@@ -92,9 +112,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", nargs="+", type=Path, required=True, help="training runs of one method")
     parser.add_argument("--recordings", type=Path, required=True, help="folder with the demonstrations (MCAP)")
+    parser.add_argument("--datasets", nargs="+", type=Path, required=True, help="demonstrations that count the routes")
     parser.add_argument("--out", type=Path, required=True, help="file (JSON) for the results")
-    parser.add_argument("--places", nargs="+", type=float, default=list(PLACES), help="px along the map")
-    parser.add_argument("--limit", type=int, default=94, help="recordings, spread evenly")
+    parser.add_argument("--limit", type=int, default=94, help="number of recordings, spread evenly")
     arguments = parser.parse_args()
     files = sorted(arguments.recordings.glob("*.mcap"))
     if not files:
@@ -102,21 +122,38 @@ def main() -> None:
     chosen = np.linspace(0, len(files) - 1, min(arguments.limit, len(files))).astype(int)
     recordings = [recording for recording in (read_episode(files[index]) for index in chosen) if recording.meta.success]
     runs = [run / "training" if (run / "training").exists() else run for run in arguments.runs]
-    result: dict[str, Any] = {"runs": len(runs), "demonstrations": len(recordings), "places": {}}
-    print("| policy from | success, % | difference | failed at 480 px | failed at 720 px |\n|---|---:|---:|---:|---:|")
-    unchanged: list[Episode] = []
-    for place in (0.0, *arguments.places):
-        episodes = [episode for run in runs for episode in continued(Checkpoint(run), recordings, place)]
-        rate, failures = success(episodes)["mean"], obstacle_failures(episodes, place)
-        entry = result["places"][f"{place:g}"] = {"success": rate, "failures": failures}
-        counts = [failures.get(f"column at {column} px") for column in (480, 720)]
-        cells = ["", *("" if count is None else f"{count[0]} of {count[1]}" for count in counts)]
-        if unchanged:
-            entry["difference"] = difference = compare_episodes(episodes, unchanged)["success"]
-            cells[0] = f"{100 * difference['mean']:+.1f} ± {100 * difference['standard_error']:.1f}"
-        unchanged = unchanged or episodes
-        print(f"| {f'{place:g} px' if place else 'the start'} | {100 * rate:.1f} | {' | '.join(cells)} |", flush=True)
+    routes = commonest_routes(arguments.datasets)
+    print("| policy from | routes | success, % | difference | at 480 px | at 720 px |\n|---|---|---:|---:|---:|---:|")
+    own: list[Episode] = []
+    rows: list[dict[str, Any]] = []
+    for handover_x in (0.0, *HANDOVER_X):
+        episodes = [episode for run in runs for episode in continued(Checkpoint(run), recordings, handover_x)]
+        own = own or episodes
+        for kind in ("one", "several"):
+            part, before = (_of_kind(chosen, routes, kind) for chosen in (episodes, own))
+            row = {"from_x": handover_x, "routes": kind, "success": success(part)["mean"]}
+            row["touched"] = [touched(part, COLUMNS[0], 0.0), touched(part, COLUMNS[1], HANDOVER_X[1])]
+            row["difference"] = compare_episodes(part, before)["success"] if handover_x else None
+            rows.append(row)
+            print(_line(row), flush=True)
+    result = {"runs": len(runs), "demonstrations": len(recordings), "rows": rows}
     arguments.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
+
+
+def _of_kind(episodes: Sequence[Episode], routes: Mapping[MapKey, float], kind: str) -> list[Episode]:
+    return [e for e in episodes if (routes[map_key(e.scenario)] >= ONE_ROUTE) == (kind == "one")]
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    difference, counts = row["difference"], zip(COLUMNS, row["touched"], strict=True)
+    cells = [
+        f"{row['from_x']:g} px" if row["from_x"] else "the start",
+        row["routes"],
+        f"{100 * row['success']:.1f}",
+        "" if difference is None else f"{100 * difference['mean']:+.1f} ± {100 * difference['standard_error']:.1f}",
+        *(f"{count} of {of}" if row["from_x"] < column else "" for column, (count, of) in counts),
+    ]
+    return f"| {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":
