@@ -126,13 +126,15 @@ ROWS: Mapping[str, Row] = {
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
-    "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),  # the published constant rate
+    "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),  # rows "rate": the published constant one
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
+    "bc-normalized-10hz-rate": _bc("normalized", 10, steps=15_000, flags=()),
     "bc-scan": _bc("scan", _RIVALS_HZ),
     "bc-scan-10hz": _bc("scan", 10),
     "bc-scan-10hz-long": _bc("scan", 10, steps=15_000),
+    "bc-scan-10hz-rate": _bc("scan", 10, steps=15_000, flags=()),
     "bc-scan-10hz-orientations": _bc("scan", 10, _ORIENTATIONS),
     "cnn": _cnn("cnn"),
     "cnn-inpainting": _cnn("cnn-inpainting"),
