@@ -123,6 +123,8 @@ def main() -> None:
     recordings = [recording for recording in (read_episode(files[index]) for index in chosen) if recording.meta.success]
     runs = [run / "training" if (run / "training").exists() else run for run in arguments.runs]
     routes = commonest_routes(arguments.datasets)
+    if any(map_key(recording.scenario) not in routes for recording in recordings):
+        raise SystemExit("--datasets: expected demonstrations on the map of each recording, found a recording without")
     print("| policy from | routes | success, % | difference | at 480 px | at 720 px |\n|---|---|---:|---:|---:|---:|")
     own: list[Episode] = []
     rows: list[dict[str, Any]] = []
@@ -130,10 +132,12 @@ def main() -> None:
         episodes = [episode for run in runs for episode in continued(Checkpoint(run), recordings, handover_x)]
         own = own or episodes
         for kind in ("one", "several"):
-            part, before = (_of_kind(chosen, routes, kind) for chosen in (episodes, own))
+            part, own_part = _of_kind(episodes, routes, kind), _of_kind(own, routes, kind)
+            if not part:  # few recordings
+                continue
             row = {"from_x": handover_x, "routes": kind, "success": success(part)["mean"]}
             row["touched"] = [touched(part, COLUMNS[0], 0.0), touched(part, COLUMNS[1], HANDOVER_X[1])]
-            row["difference"] = compare_episodes(part, before)["success"] if handover_x else None
+            row["difference"] = compare_episodes(part, own_part)["success"] if handover_x else None
             rows.append(row)
             print(_line(row), flush=True)
     result = {"runs": len(runs), "demonstrations": len(recordings), "rows": rows}
@@ -150,10 +154,15 @@ def _line(row: Mapping[str, Any]) -> str:
         f"{row['from_x']:g} px" if row["from_x"] else "the start",
         row["routes"],
         f"{100 * row['success']:.1f}",
-        "" if difference is None else f"{100 * difference['mean']:+.1f} ± {100 * difference['standard_error']:.1f}",
+        "" if difference is None else _points(difference),
         *(f"{count} of {of}" if row["from_x"] < column else "" for column, (count, of) in counts),
     ]
     return f"| {' | '.join(cells)} |"
+
+
+def _points(difference: Mapping[str, Any]) -> str:
+    error = difference["standard_error"]  # None on a single map
+    return f"{100 * difference['mean']:+.1f}" + ("" if error is None else f" ± {100 * error:.1f}")
 
 
 if __name__ == "__main__":

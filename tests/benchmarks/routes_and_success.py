@@ -117,6 +117,7 @@ def main() -> None:
     print(f"{is_one_route.sum()} maps with one route, {(~is_one_route).sum()} with several\n")
     print("| method | one route, % | several, % | difference | minus that of the first |\n|---|---:|---:|---:|---:|")
     first: Array | None = None
+    compared = 0
     for method in arguments.methods:
         name, _, folder = method.partition("=")
         success = holdout_success(Path(folder), scenarios)
@@ -129,6 +130,8 @@ def main() -> None:
         cells = [f"{100 * values[kind].mean():.1f}" for kind in (is_one_route, ~is_one_route)]
         cells += [f"{100 * each.mean:+.1f} ± {100 * each.standard_error:.1f}" for each in contrasts]
         print(f"| {name} | {' | '.join([*cells, ''][:4])} |")
+        compared = contrasts[0].maps
+    print(f"\nDifferences are within {compared} maps of which both kinds have two with equally many obstacles.")
 
 
 if __name__ == "__main__":
