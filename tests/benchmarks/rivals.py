@@ -62,6 +62,8 @@ _BC_RATE = (
     "--scheduler.num_warmup_steps=0",
 )  # fmt: skip
 
+_NO_VELOCITY = policy_flags(hidden_state=["vx", "vy", "omega"])
+
 
 def _recipe(preset: str) -> str:
     return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
@@ -131,6 +133,9 @@ ROWS: Mapping[str, Row] = {
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
     "bc-normalized-10hz-rate": _bc("normalized", 10, steps=15_000, flags=()),
+    "bc-paper-10hz-rate-no-velocity": _bc("paper", 10, steps=15_000, flags=_NO_VELOCITY),
+    "bc-normalized-10hz-no-velocity": _bc("normalized", 10, flags=(*_BC_RATE, *_NO_VELOCITY)),
+    "bc-scan-10hz-no-velocity": _bc("scan", 10, flags=(*_BC_RATE, *_NO_VELOCITY)),
     "bc-scan": _bc("scan", _RIVALS_HZ),
     "bc-scan-10hz": _bc("scan", 10),
     "bc-scan-10hz-long": _bc("scan", 10, steps=15_000),

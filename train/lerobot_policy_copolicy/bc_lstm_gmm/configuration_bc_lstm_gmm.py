@@ -1,10 +1,13 @@
 """Settings of BC-LSTM-GMM."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from lerobot.configs import PreTrainedConfig
 from lerobot.optim import AdamConfig
+
+from copolicy.dataset.exceptions import UnknownNameError
+from copolicy.dataset.task import get_task
 
 from ..pair_policy.bounds import POSITIVE, Bounds
 from ..pair_policy.configuration_pair import PairPolicyConfig
@@ -47,6 +50,8 @@ class BcLstmGmmConfig(PairPolicyConfig):
     }
 
     preset: str = "paper"  # "paper", "normalized" or "scan"
+    # Elements of the state that the network sees as 0, by name: without the velocity BC cannot copy its own motion.
+    hidden_state: list[str] = field(default_factory=list)
     sequence_length: int = 10  # frames of a training window; in execution the LSTM's state is reset as often
     n_layers: int = 2  # layers of the LSTM
     width: int = 400  # hidden size of the LSTM
@@ -57,6 +62,17 @@ class BcLstmGmmConfig(PairPolicyConfig):
     optimizer_lr: float = 1e-4  # learning rate of Adam
     optimizer_weight_decay: float = 0.0  # weight decay of Adam
     optimizer_grad_clip_norm: float = 0.0  # largest gradient norm; 0 does not clip
+
+    def _validate(self) -> None:
+        """The hidden elements are of the task's state.
+
+        Raises:
+            UnknownNameError: the state has no such element.
+        """
+        names = get_task(self.filled.task).spec.state.names
+        for name in self.hidden_state:
+            if name not in names:
+                raise UnknownNameError("hidden_state", name, names)
 
     @property
     def observation_delta_indices(self) -> list[int]:

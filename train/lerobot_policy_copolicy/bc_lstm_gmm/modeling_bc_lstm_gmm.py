@@ -1,15 +1,17 @@
 """BC-LSTM-GMM: behaviour cloning of both players by an LSTM with a mixture of normal distributions."""
 
-from typing import Unpack
+from typing import Any, Unpack
 
 import torch
 from lerobot.policies.pretrained import ActionSelectKwargs
 from torch import Tensor
 
 from copolicy.dataset.features import ACTION
+from copolicy.dataset.task import PairTask
 
 from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
+from .hidden_state import HiddenState
 from .network import LayerStates, LayerWeights, RecurrentMixtureNetwork
 
 
@@ -34,6 +36,10 @@ class BcLstmGmmPolicy(FramePolicy):
             self.features.size, self._sizes[ACTION], config.width, config.n_layers, config.n_modes, config.min_deviation
         )
         self.reset()
+
+    def _make_features(self, task: PairTask) -> Any:
+        features, hidden = super()._make_features(task), self.config.hidden_state
+        return HiddenState(features, task.spec, hidden) if hidden else features
 
     def reset(self) -> None:
         """Resets the state of the LSTM; call it whenever the environment is reset or weights were changed."""
