@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import torch
 from lerobot.configs import FeatureType, PolicyFeature
@@ -46,7 +47,7 @@ def save_run(
         output_features={ACTION: PolicyFeature(FeatureType.ACTION, features[ACTION]["shape"])},
         **{**default, "fps": 10.0, **settings},
     )
-    torch.manual_seed(hash((weights if weights is not None else seed, policy)) % 2**31)
+    torch.manual_seed(crc32(f"{weights if weights is not None else seed} {policy}".encode()))
     checkpoint = folder / "checkpoints" / f"{reached:06d}"
     made: Any = make_policy(config)
     with torch.no_grad():

@@ -37,7 +37,7 @@ class Point:
 
 
 _ORDERS = "pairs-sim-376-orders"
-"""Data of rows that read the obstacles as a list; the scan sees no order. See train/docs/results.md."""
+"""Data of rows that read the obstacles as a list; the scan sees no order. See train/docs/comparison.md."""
 _ORIENTATIONS = "pairs-sim-376-orientations"
 """Data with the four start orientations of a cross-play; all others have one."""
 _PAPER_INPUTS = {"observation_features": "absolute", "mirror": False, "permute_obstacles": False}
@@ -128,7 +128,8 @@ ROWS: Mapping[str, Row] = {
     "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
-    "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),  # rows "rate": the published constant one
+    "bc-paper-rate": _bc("paper", _RIVALS_HZ, steps=15_000, flags=()),  # rows "rate": the published constant one
+    "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
