@@ -130,6 +130,7 @@ ROWS: Mapping[str, Row] = {
     "bc-paper-10hz": _bc("paper", 10),
     "bc-paper-rate": _bc("paper", _RIVALS_HZ, steps=15_000, flags=()),  # rows "rate": the published constant one
     "bc-paper-10hz-rate": _bc("paper", 10, steps=15_000, flags=()),
+    "bc-paper-10hz-rate-long": _bc("paper", 10, steps=30_000, flags=()),
     "bc-normalized": _bc("normalized", _RIVALS_HZ),
     "bc-normalized-10hz": _bc("normalized", 10),
     "bc-normalized-10hz-long": _bc("normalized", 10, steps=15_000),
