@@ -68,7 +68,7 @@ def test_a_preset_chooses_the_inputs(preset, features, symmetries, size):
         ({"observation_features": "pixels"}, InvalidValueError, "absolute, raw, relative, scan"),
         ({"sequence_length": 0}, InvalidValueError, "sequence_length: expected at least 1, found 0"),
         ({"execution_mode": "mean"}, UnknownNameError, "execution_mode.*drawn, likeliest"),
-        ({"hidden_state": ["theta"]}, UnknownNameError, "hidden_state 'theta'.*cos_theta"),
+        ({"masked_state": ["theta"]}, UnknownNameError, "masked_state 'theta'.*cos_theta"),
         ({"n_modes": 0}, InvalidValueError, "n_modes: expected at least 1, found 0"),
         ({"min_deviation": 0.0}, InvalidValueError, "min_deviation: expected a number above 0, found 0"),
         ({"optimizer_lr": float("nan")}, InvalidValueError, "optimizer_lr"),
@@ -89,26 +89,26 @@ def test_raw_inputs_are_the_columns_themselves():
 
 
 @pytest.mark.parametrize("preset", ["paper", "normalized", "scan"])
-def test_hidden_elements_of_the_state_have_no_effect(preset):
+def test_masked_elements_of_the_state_have_no_effect(preset):
     torch.manual_seed(0)
     shown = BcLstmGmmPolicy(config(preset=preset)).eval()
-    hidden = BcLstmGmmPolicy(config(preset=preset, hidden_state=["vx", "vy", "omega"])).eval()
-    hidden.load_state_dict(shown.state_dict())
+    masked = BcLstmGmmPolicy(config(preset=preset, masked_state=["vx", "vy", "omega"])).eval()
+    masked.load_state_dict(shown.state_dict())
     columns, resting, elsewhere = batch(10), batch(10), batch(10)
     resting[STATE][..., 4:] = 0
     elsewhere[STATE][..., 0] += 1
-    loss = hidden(columns, reduction="none")[0]
-    torch.testing.assert_close(loss, hidden(resting, reduction="none")[0], rtol=0, atol=0)
+    loss = masked(columns, reduction="none")[0]
+    torch.testing.assert_close(loss, masked(resting, reduction="none")[0], rtol=0, atol=0)
     torch.testing.assert_close(loss, shown(resting, reduction="none")[0], rtol=0, atol=0)
-    for other in (shown(columns, reduction="none")[0], hidden(elsewhere, reduction="none")[0]):
-        assert (loss - other).abs().min() > 0
+    for changed in (shown(columns, reduction="none")[0], masked(elsewhere, reduction="none")[0]):
+        assert (loss - changed).abs().min() > 0
     frame, at_rest = batch(None), batch(None)
     at_rest[STATE][:, 4:] = 0
     acted = []
     for observation in (frame, at_rest):
         torch.manual_seed(0)
-        hidden.reset()
-        acted.append(hidden.select_action(observation))
+        masked.reset()
+        acted.append(masked.select_action(observation))
     torch.testing.assert_close(*acted, rtol=0, atol=0)
 
 

@@ -62,7 +62,7 @@ _BC_RATE = (
     "--scheduler.num_warmup_steps=0",
 )  # fmt: skip
 
-_NO_VELOCITY = policy_flags(hidden_state=["vx", "vy", "omega"])
+_NO_VELOCITY = policy_flags(masked_state=["vx", "vy", "omega"])
 
 
 def _recipe(preset: str) -> str:

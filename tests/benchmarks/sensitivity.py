@@ -3,11 +3,11 @@
     uv run python tests/benchmarks/sensitivity.py --dataset outputs/rivals/data/pairs-sim-376-orders \\
         --runs outputs/rivals/runs/bc-normalized-10hz/seed_0 outputs/rivals/runs/codp-h-paper-long/seed_0
 
-Each policy observes whole demonstrations of the data set, as it would in execution, and predicts the next action at
-each frame, with the same random numbers for each change. The table has the mean absolute error against the demonstrated
+Each policy observes whole demonstrations of the data set and predicts the next action at each frame (of a chunk the
+first), with the same random numbers for each change. The table has the mean absolute error against the demonstrated
 actions, and the mean absolute change of the prediction if the velocity reads 0, if the table is 20 px further in y, and
-if it is turned by 30 degrees; for forces of [-1, 1]. A policy that depends on the velocity much more than on the place
-may copy its past actions, which the velocity tells.
+if it is turned by 30 degrees; for forces of [-1, 1]. Compare policies with each other: the changes are not of equal
+size. The velocity tells the past actions, which a policy may copy.
 """
 
 import os
@@ -27,21 +27,21 @@ from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.train.checkpoint import Checkpoint
 
 
-def without_velocity(states: Array) -> Array:
+def resting_states(states: Array) -> Array:
     """States `(..., 7)` of a table at rest."""
     changed = states.copy()
     changed[..., 4:] = 0
     return changed
 
 
-def moved(states: Array) -> Array:
+def shifted_states(states: Array) -> Array:
     """States `(..., 7)` of a table 20 px further in y."""
     changed = states.copy()
     changed[..., 1] += 20
     return changed
 
 
-def turned(states: Array) -> Array:
+def turned_states(states: Array) -> Array:
     """States `(..., 7)` of a table turned by 30 degrees."""
     changed, (cos, sin) = states.copy(), (math.cos(math.pi / 6), math.sin(math.pi / 6))
     changed[..., 2] = cos * states[..., 2] - sin * states[..., 3]
@@ -49,14 +49,16 @@ def turned(states: Array) -> Array:
     return changed
 
 
-CHANGES: Mapping[str, Callable[[Array], Array]] = {
-    "velocity 0": without_velocity,
-    "20 px in y": moved,
-    "30 degrees": turned,
+STATE_CHANGES: Mapping[str, Callable[[Array], Array]] = {
+    "velocity 0": resting_states,
+    "20 px in y": shifted_states,
+    "30 degrees": turned_states,
 }
 
 
-def predicted(policy: Checkpoint, episodes: Sequence[DatasetEpisode], change: Callable[[Array], Array]) -> Array:
+def predicted_actions(
+    policy: Checkpoint, episodes: Sequence[DatasetEpisode], change: Callable[[Array], Array]
+) -> Array:
     """The action `(N, 2 m)` that a policy predicts at each frame of the episodes, which it observes changed.
 
     Args:
@@ -95,20 +97,23 @@ def main() -> None:
     parser.add_argument("--limit", type=int, default=94, help="number of episodes, spread evenly")
     arguments = parser.parse_args()
     dataset = load_dataset(arguments.dataset)
+    if arguments.limit < 1:
+        raise SystemExit(f"--limit: expected at least 1, found {arguments.limit}")
     if dataset.task.spec.name != "table":
         raise SystemExit(f"{arguments.dataset}: expected a data set of the table, found {dataset.task.spec.title}")
     chosen = np.linspace(0, len(dataset) - 1, min(arguments.limit, len(dataset))).astype(int)
     episodes = [dataset.episodes[int(index)] for index in chosen]
     demonstrated = np.concatenate([episode.actions for episode in episodes])
-    print(f"{len(episodes)} episodes, {len(demonstrated)} frames, mean action {np.abs(demonstrated).mean():.2f}\n")
-    print(f"| run | error | {' | '.join(CHANGES)} |\n|---|---:|{'---:|' * len(CHANGES)}")
+    mean_action = np.abs(demonstrated).mean()
+    print(f"{len(episodes)} episodes, {len(demonstrated)} frames, mean absolute action {mean_action:.2f}\n")
+    print(f"| run | error | {' | '.join(STATE_CHANGES)} |\n|---|---:|{'---:|' * len(STATE_CHANGES)}")
     for run in arguments.runs:
         policy = Checkpoint(run / "training" if (run / "training").exists() else run)
         if policy.fps != dataset.fps:
             raise SystemExit(f"{run}: expected a policy of {dataset.fps} Hz, the rate of the data, found {policy.fps}")
-        unchanged = predicted(policy, episodes, np.copy)
+        unchanged = predicted_actions(policy, episodes, np.copy)
         differences = [demonstrated - unchanged]
-        differences += [predicted(policy, episodes, change) - unchanged for change in CHANGES.values()]
+        differences += [predicted_actions(policy, episodes, change) - unchanged for change in STATE_CHANGES.values()]
         cells = " | ".join(f"{np.abs(difference).mean():.3f}" for difference in differences)
         print(f"| {'/'.join(run.parts[-2:])} | {cells} |", flush=True)
 

@@ -141,6 +141,7 @@ class Checkpoint:
             "learned": self.conditions.to_json(),
             "parameters": sum(p.numel() for p in self.policy.parameters() if p.requires_grad),
             **{name: getattr(self._config, name) for name in _DESCRIBED if hasattr(self._config, name)},
+            **({"masked_state": masked} if (masked := getattr(self._config, "masked_state", None)) else {}),
             **({"planned_with": list(backends)} if (backends := getattr(self.policy, "planned_with", ())) else {}),
         }
 

@@ -50,8 +50,9 @@ class BcLstmGmmConfig(PairPolicyConfig):
     }
 
     preset: str = "paper"  # "paper", "normalized" or "scan"
-    # Elements of the state that the network sees as 0, by name: without the velocity BC cannot copy its own motion.
-    hidden_state: list[str] = field(default_factory=list)
+    # Elements of the state, by name, that read 0 in task units. Without the velocity BC knows its motion from
+    # successive poses alone, and copies it less.
+    masked_state: list[str] = field(default_factory=list)
     sequence_length: int = 10  # frames of a training window; in execution the LSTM's state is reset as often
     n_layers: int = 2  # layers of the LSTM
     width: int = 400  # hidden size of the LSTM
@@ -64,15 +65,15 @@ class BcLstmGmmConfig(PairPolicyConfig):
     optimizer_grad_clip_norm: float = 0.0  # largest gradient norm; 0 does not clip
 
     def _validate(self) -> None:
-        """The hidden elements are of the task's state.
+        """The masked elements are of the task's state.
 
         Raises:
             UnknownNameError: the state has no such element.
         """
         names = get_task(self.filled.task).spec.state.names
-        for name in self.hidden_state:
+        for name in self.masked_state:
             if name not in names:
-                raise UnknownNameError("hidden_state", name, names)
+                raise UnknownNameError("masked_state", name, names)
 
     @property
     def observation_delta_indices(self) -> list[int]:

@@ -1,17 +1,18 @@
 """BC-LSTM-GMM: behaviour cloning of both players by an LSTM with a mixture of normal distributions."""
 
+from collections.abc import Collection
 from typing import Any, Unpack
 
 import torch
 from lerobot.policies.pretrained import ActionSelectKwargs
-from torch import Tensor
+from torch import Tensor, nn
 
-from copolicy.dataset.features import ACTION
+from copolicy.dataset.features import ACTION, STATE
 from copolicy.dataset.task import PairTask
+from copolicy.dataset.task_spec import TaskSpec
 
 from ..pair_policy.modeling_frame import FramePolicy
 from .configuration_bc_lstm_gmm import BcLstmGmmConfig
-from .hidden_state import HiddenState
 from .network import LayerStates, LayerWeights, RecurrentMixtureNetwork
 
 
@@ -38,8 +39,8 @@ class BcLstmGmmPolicy(FramePolicy):
         self.reset()
 
     def _make_features(self, task: PairTask) -> Any:
-        features, hidden = super()._make_features(task), self.config.hidden_state
-        return HiddenState(features, task.spec, hidden) if hidden else features
+        features, masked = super()._make_features(task), self.config.masked_state
+        return MaskedStateFeatures(features, task.spec, masked) if masked else features
 
     def reset(self) -> None:
         """Resets the state of the LSTM; call it whenever the environment is reset or weights were changed."""
@@ -95,3 +96,24 @@ class BcLstmGmmPolicy(FramePolicy):
         deviation, likeliest = self.config.execution_deviation, self.config.execution_mode == "likeliest"
         drawn, self._state = self.network.sample(inputs, self._state, deviation, self._layers, likeliest)
         return self.action_scale.physical(drawn.clamp(-1.0, 1.0))
+
+
+class MaskedStateFeatures(nn.Module):
+    """Features of an observation in which some elements of the state are 0.
+
+    Attributes:
+        size: number of features.
+    """
+
+    kept: Tensor
+
+    def __init__(self, features: Any, spec: TaskSpec, masked: Collection[str]):
+        super().__init__()
+        self._features = features
+        self.size: int = features.size
+        kept = torch.tensor([float(name not in masked) for name in spec.state.names])
+        self.register_buffer("kept", kept, persistent=False)
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Encodes observation columns `(..., n)` in the units of the task to `(..., size)`."""
+        return self._features({**observation, STATE: observation[STATE] * self.kept})
