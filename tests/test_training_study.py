@@ -67,6 +67,25 @@ def test_losses_of_a_resumed_training_are_not_counted_twice(tmp_path):
     assert training_study.losses(tmp_path, 1) == [(6000, 0.7)]
 
 
+def test_the_run_of_a_row_and_seed_is_found(tmp_path):
+    assert training_study.training_run(tmp_path) == tmp_path
+    (tmp_path / "training").mkdir()
+    assert training_study.training_run(tmp_path) == tmp_path / "training"
+
+
+@pytest.mark.parametrize(
+    ("limit", "chosen"), [(1, [0]), (2, [0, 9]), (4, [0, 3, 6, 9]), (10, list(range(10))), (11, list(range(10)))]
+)
+def test_a_limit_spreads_evenly(limit, chosen):
+    assert training_study.spread(range(10), limit) == chosen
+
+
+@pytest.mark.parametrize("limit", [0, -1])
+def test_a_limit_below_one_is_one_line(limit):
+    with pytest.raises(SystemExit, match=f"--limit: expected at least 1, found {limit}"):
+        training_study.spread(range(10), limit)
+
+
 def test_curves_are_of_the_checkpoints_along_a_training(tmp_path):
     (tmp_path / "data" / "pairs-sim-376").mkdir(parents=True)
     arguments = SimpleNamespace(out=tmp_path, checkpoints=2, scale=0.5, limit=None, rows=["codp-h"], data=None)

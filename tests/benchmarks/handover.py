@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 from routes_and_success import ONE_ROUTE, MapKey, commonest_routes, map_key
+from training_study import spread, training_run
 
 from copolicy.collect.agents import PolicyAgent
 from copolicy.collect.episodes import run_episodes
@@ -119,9 +120,9 @@ def main() -> None:
     files = sorted(arguments.recordings.glob("*.mcap"))
     if not files:
         raise SystemExit(f"{arguments.recordings}: expected recordings (*.mcap), found none")
-    chosen = np.linspace(0, len(files) - 1, min(arguments.limit, len(files))).astype(int)
-    recordings = [recording for recording in (read_episode(files[index]) for index in chosen) if recording.meta.success]
-    runs = [run / "training" if (run / "training").exists() else run for run in arguments.runs]
+    chosen = map(read_episode, spread(files, arguments.limit))
+    recordings = [recording for recording in chosen if recording.meta.success]
+    runs = [training_run(run) for run in arguments.runs]
     routes = commonest_routes(arguments.datasets)
     if any(map_key(recording.scenario) not in routes for recording in recordings):
         raise SystemExit("--datasets: expected demonstrations on the map of each recording, found a recording without")

@@ -18,6 +18,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from training_study import training_run
+
 from copolicy.dataset.episode import Episode
 from copolicy.evaluate.notebook import compare_episodes, coplan_episodes, success
 from copolicy.train.checkpoint import Checkpoint
@@ -73,7 +75,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="file (JSON) for the results")
     parser.add_argument("--limit", type=int, help="only the first N maps; to try the script")
     arguments = parser.parse_args()
-    runs = [path for run in arguments.runs for path in ([run / "training"] if (run / "training").exists() else [run])]
+    runs = [training_run(run) for run in arguments.runs]
     types = {Checkpoint(run).policy.config.type for run in runs}
     if len(types) != 1 or not types <= CHANGES.keys():
         raise SystemExit(f"--runs: expected runs of one of {', '.join(CHANGES)}, found {', '.join(sorted(types))}")

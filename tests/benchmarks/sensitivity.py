@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from training_study import spread, training_run
 
 from copolicy.dataset import DatasetEpisode, load_dataset
 from copolicy.dataset.arrays import Array
@@ -97,18 +98,15 @@ def main() -> None:
     parser.add_argument("--limit", type=int, default=94, help="number of episodes, spread evenly")
     arguments = parser.parse_args()
     dataset = load_dataset(arguments.dataset)
-    if arguments.limit < 1:
-        raise SystemExit(f"--limit: expected at least 1, found {arguments.limit}")
     if dataset.task.spec.name != "table":
         raise SystemExit(f"{arguments.dataset}: expected a data set of the table, found {dataset.task.spec.title}")
-    chosen = np.linspace(0, len(dataset) - 1, min(arguments.limit, len(dataset))).astype(int)
-    episodes = [dataset.episodes[int(index)] for index in chosen]
+    episodes = spread(dataset.episodes, arguments.limit)
     demonstrated = np.concatenate([episode.actions for episode in episodes])
     mean_action = np.abs(demonstrated).mean()
     print(f"{len(episodes)} episodes, {len(demonstrated)} frames, mean absolute action {mean_action:.2f}\n")
     print(f"| run | error | {' | '.join(STATE_CHANGES)} |\n|---|---:|{'---:|' * len(STATE_CHANGES)}")
     for run in arguments.runs:
-        policy = Checkpoint(run / "training" if (run / "training").exists() else run)
+        policy = Checkpoint(training_run(run))
         if policy.fps != dataset.fps:
             raise SystemExit(f"{run}: expected a policy of {dataset.fps} Hz, the rate of the data, found {policy.fps}")
         unchanged = predicted_actions(policy, episodes, np.copy)

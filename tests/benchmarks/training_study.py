@@ -105,6 +105,24 @@ def train(row: Row, dataset: Path, folder: Path, seed: int, device: str = "cpu",
     return run
 
 
+def training_run(folder: Path) -> Path:
+    """The run in the folder of a row and seed, or the folder itself if it is a run."""
+    run = folder / "training"
+    return run if run.exists() else folder
+
+
+def spread[Item](items: Sequence[Item], limit: int) -> list[Item]:
+    """At most `limit` items, spread evenly.
+
+    Raises:
+        SystemExit: `limit` is below 1.
+    """
+    if limit < 1:
+        sys.exit(f"--limit: expected at least 1, found {limit}")
+    count = min(limit, len(items))
+    return [items[index * (len(items) - 1) // max(1, count - 1)] for index in range(count)]
+
+
 def steps_of(run: Path) -> int | None:
     """Steps of the newest complete checkpoint of a run; None without one."""
     last = run / "checkpoints" / "last"  # the trainer sets this link when the checkpoint is written
