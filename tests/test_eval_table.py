@@ -15,6 +15,7 @@ from copolicy.dataset.task import get_task
 from copolicy.evaluate.cli import main
 from copolicy.evaluate.coplan import study
 from copolicy.evaluate.coplanning_table import evaluations
+from copolicy.evaluate.coplanning_table.training_runs import read_trained_methods
 from copolicy.train.processor_files import processors_sha256
 
 SHORT = ("--limit", "4", "--step-limit", "24")
@@ -292,6 +293,19 @@ def test_runs_of_one_method_differ_in_their_seed_alone(methods, tmp_path, capsys
     assert refused(preset="scan") == f"expected preset paper, as {first}: {alone}, found scan"
     assert refused(policy="copolicy") == f"expected type bc_lstm_gmm, as {first}: {alone}, found copolicy"
     assert refused(min_deviation=0.1) == f"expected min_deviation 0.0001, as {first}: {alone}, found 0.1"
+
+
+def test_a_setting_that_an_earlier_version_lacked_has_its_default(methods, tmp_path, capsys):
+    bc = methods / "bc"
+    config = bc / "seed_0" / "training" / "checkpoints" / "last" / "pretrained_model" / "config.json"
+    entries = json.loads(config.read_text(encoding="utf-8"))
+    del entries["masked_state"]
+    config.write_text(json.dumps(entries), encoding="utf-8")
+    assert [run.seed for run in read_trained_methods([str(bc)])[0].runs] == [0, 1]
+    other = save_run(bc / "seed_2", "bc_lstm_gmm", seed=2, masked_state=["vx"])
+    line = _refused(capsys, bc, out=tmp_path / "out")
+    assert line.startswith(f"{other}: expected masked_state ")
+    assert line.endswith("found ['vx']")
 
 
 def test_names_outputs_and_rates(methods, tmp_path, capsys):

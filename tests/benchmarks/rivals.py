@@ -97,6 +97,8 @@ _VRNN_CHOICES: Mapping[str, Mapping[str, Any]] = {
     "no-pose": {"observe_pose": False},
     "cycles": {"kl_cycles": 4, "kl_ramp": 0.5},
     "weight-decay": {"optimizer_weight_decay": 0.2},
+    "windows": {"window_frames": 120, "stride": 1, "encoded_frames": 120},  # 4 s, encoded as long
+    "no-clipping": {"optimizer_grad_clip_norm": 0.0},
 }
 _COGAIL_CHOICES: Mapping[str, Mapping[str, Any]] = {
     "unit-range": {"input_range": "unit"},

@@ -74,7 +74,6 @@ class Checkpoint:
         self.folder: Path = (folder := checkpoint_folder(path))
         self.conditions: TrainingConditions = training_conditions(folder)
         self.fps: int = self.conditions.fps
-        register_plugins()
         try:
             policy, self._preprocess, self._postprocess = _load(
                 folder, device, settings or {}, get_task(self.conditions.task)
@@ -194,8 +193,21 @@ class Checkpoint:
                     _set_random_state(device, state)
 
 
+def read_configuration(folder: Path) -> Any:
+    """The configuration of a checkpoint as the installed version reads it; settings that it lacks have their default.
+
+    Raises:
+        FileFormatError: it cannot be read.
+    """
+    register_plugins()
+    try:
+        return PreTrainedConfig.from_pretrained(folder)
+    except Exception as error:
+        raise FileFormatError(folder, "a policy that LeRobot can load", f"{type(error).__name__}: {error}") from error
+
+
 def _load(folder: Path, device: str, settings: Mapping[str, Any], task: PairTask) -> tuple[Any, Any, Any]:
-    config: Any = PreTrainedConfig.from_pretrained(folder)
+    config = read_configuration(folder)
     config.device = device
     config.pretrained_path = folder
     for setting, value in settings.items():

@@ -172,11 +172,20 @@ def _default_name(run: TrainingRun) -> str:
     return str(run.config.get("type")) + (f" {preset}" if preset else "")
 
 
+def _entries(name: str, *runs: TrainingRun) -> list[Any]:
+    """An entry of the method of each run; a setting that an earlier version did not have has its default."""
+    if all(name in run.method for run in runs) or not any(name in run.policy_settings for run in runs):
+        return [run.method.get(name) for run in runs]
+    from copolicy.train.checkpoint import read_configuration  # torch
+
+    return [getattr(read_configuration(run.checkpoint), name, None) for run in runs]
+
+
 def _require_one_method(runs: Sequence[TrainingRun]) -> None:
     first = runs[0]
     for position, run in enumerate(runs[1:], 1):
         for name in {**first.method, **run.method}:
-            expected, actual = first.method.get(name), run.method.get(name)
+            expected, actual = _entries(name, first, run)
             if expected != actual:
                 raise FileFormatError(
                     run.folder, f"{name} {expected}, as {first.folder}: runs of one method differ in their seed alone",
