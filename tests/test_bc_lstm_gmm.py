@@ -287,5 +287,7 @@ def test_it_is_evaluated_and_described(run, tmp_path, capsys):
     assert train(["export", str(run), "--out", str(tmp_path / "exported"), "--eval", str(out)]) == 0
     assert cards(["model", str(tmp_path / "exported")]) == 0
     card = (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
-    assert "bc_lstm_gmm" in card
+    assert "| `type` | bc_lstm_gmm |" in card
+    assert "| `min_deviation` | 0.0001 |" in card
+    assert "`device`" not in card
     assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]

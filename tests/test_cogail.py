@@ -249,7 +249,10 @@ def test_it_is_evaluated_and_described(run, tmp_path):
     recipe = json.loads((tmp_path / "exported" / "recipe.json").read_text(encoding="utf-8"))
     assert (recipe["training"]["steps"], recipe["training"]["samples"]) == (400, 400)
     assert cards(["model", str(tmp_path / "exported")]) == 0
-    assert "cogail" in (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
+    card = (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
+    assert "| `type` | cogail |" in card
+    assert "| `code` | drawn |" in card
+    assert "| `reward` | logit |" in card
     assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]
 
 

@@ -121,7 +121,7 @@ def test_a_mixture_is_recorded_with_its_counts_and_is_no_physics(copied_table, c
 )
 def test_settings_in_frames_of_another_rate_are_named(copied_table, caplog, kind, setting, frames):
     record_conditions(kind(device="cpu"), LeRobotDatasetMetadata("local/table", copied_table), None)
-    assert f"{setting} = {frames} is for data of 30 frames a second, and these have 10; convert" in caplog.text
+    assert f"{setting} = {frames} is for data of 30 frames a second, and local/table has 10; convert" in caplog.text
     caplog.clear()
     divided = kind(device="cpu", **{setting: frames // 3})
     record_conditions(divided, LeRobotDatasetMetadata("local/table", copied_table), None)

@@ -267,7 +267,10 @@ def test_it_is_evaluated_and_described(run, tmp_path):
     assert json.loads(again.read_text(encoding="utf-8"))["episodes"] == result["episodes"]
     assert train(["export", str(run), "--out", str(tmp_path / "exported"), "--eval", str(out)]) == 0
     assert cards(["model", str(tmp_path / "exported")]) == 0
-    assert "vrnn" in (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
+    card = (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
+    assert "| `type` | vrnn |" in card
+    assert "| `controller` | velocity |" in card
+    assert "`kl_steps`" not in card
     assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]
 
 

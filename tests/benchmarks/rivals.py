@@ -121,6 +121,7 @@ def _lerobot(policy: str, steps: int, *flags: str) -> Row:
 
 ROWS: Mapping[str, Row] = {
     "codp-h": Row(),
+    "codp-h-long": Row(steps=24_000),
     "codp-h-orientations": Row(recipe=_ORIENTATIONS),
     "codp": Row(policy_flags(past_human_action=False)),
     "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
@@ -152,6 +153,7 @@ ROWS: Mapping[str, Row] = {
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
     "vrnn-long": _vrnn("default", 25_000),
+    "vrnn-longer": _vrnn("default", 60_000),
     "vrnn-scan": _vrnn("scan"),
     "vrnn-scan-long": _vrnn("scan", 25_000),
     "vrnn-scan-longer": _vrnn("scan", 60_000),

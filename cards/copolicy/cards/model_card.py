@@ -1,6 +1,6 @@
 """The card of a model: Hub metadata with results, and a README with facts from the model's files only."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from huggingface_hub import ModelCardData
@@ -18,6 +18,12 @@ _SETTINGS = (
     "prediction_type", "sampler", "num_inference_steps", "timestep_spacing", "initial_noise_scale", "mirror",
     "permute_obstacles", "ema", "fps",
 )  # fmt: skip
+_CHOSEN_FOR = "copolicy"  # the policy type whose distinguishing settings are all above; of others all are stated
+# Entries of `config.json` that other sections state, or that say where a policy was trained and kept.
+_NO_SETTINGS = {
+    "device", "kl_steps", "license", "physics", "pretrained_path", "pretrained_revision", "private", "push_to_hub",
+    "repo_id", "tags", "task", "unseen", "use_amp", "use_peft",
+}  # fmt: skip
 _UNET_SETTINGS = {"down_widths", "inpainting"}
 _WITHOUT_EFFECT = {  # by network
     "transformer": _UNET_SETTINGS,
@@ -129,7 +135,10 @@ def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, 
     averaged = (checkpoint.recipe.get("weights") or {}).get("averaged")
     # Stated in another row, or without effect.
     skipped = ({"ema"} if averaged else set()) | _WITHOUT_EFFECT.get(checkpoint.config.get("network") or "", set())
-    rows = [(f"`{key}`", checkpoint.config[key]) for key in _SETTINGS if key in checkpoint.config.keys() - skipped]
+    names = [
+        key for key in (*_SETTINGS, *_own_settings(checkpoint.config)) if key in checkpoint.config.keys() - skipped
+    ]
+    rows = [(f"`{key}`", checkpoint.config[key]) for key in names]
     training = [
         (f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if checkpoint.training.get(key) is not None
     ]
@@ -144,6 +153,19 @@ def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, 
     if not checkpoint.training:
         text += "\n\nThe training settings are not stated (no `train_config.json` or `recipe.json`)."
     return f"## Policy and training\n\n{text}"
+
+
+def _own_settings(config: Mapping[str, Any]) -> list[str]:
+    """Settings that only this type of policy has; those of the optimizer are stated with the training."""
+    if config["type"] == _CHOSEN_FOR:
+        return []
+    return [
+        name
+        for name, value in config.items()
+        if name not in _NO_SETTINGS.union(_SETTINGS)
+        and not name.startswith(("optimizer_", "scheduler_"))
+        and not (value is None or value == [] or isinstance(value, dict))
+    ]
 
 
 def _reproduction(checkpoint: CheckpointFacts) -> list[str]:

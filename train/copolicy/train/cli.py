@@ -30,6 +30,7 @@ from .pair_split import SPLIT_HELP, PairSplit
 from .plugins import register_plugins
 from .policy_commands import policy_parser
 from .settings_check import require_usable_numbers
+from .suitability import require_fitting_data, require_type_of_run
 from .world_training import IN_WORLD, WORLD_HELP, require_right_trainer, trainer_of, with_world_defaults
 
 _PROG = "copolicy-train"
@@ -181,12 +182,15 @@ def _train(arguments: argparse.Namespace) -> dict[str, Any]:
     with contextlib.redirect_stdout(sys.stderr), _lerobot(flags):
         from .episode_choice import check_local_dataset
 
+        source = _value("config_path", flags) or _value("policy.path", flags)
+        require_type_of_run(_value("config_path", flags), _value("policy.type", flags))
         config = _parse()
         _validate(config)
-        require_right_trainer(config, arguments.in_world)
+        require_right_trainer(config, arguments.in_world, source)
         _check_split(config, split)
         if config.dataset.root is not None and not config.dataset.streaming:
             check_local_dataset(config.dataset.root)
+            require_fitting_data(config, source)
         try:
             with named_errors(Path(config.output_dir or "")):
                 trainer_of(arguments.in_world)(config, split)
@@ -311,8 +315,12 @@ def _with_newest_checkpoint(flag: str) -> str:
 
 
 def _check_local_path(name: str, value: str | None) -> None:
-    """Refuses a path that does not exist, which LeRobot would take for the name of a Hub repository."""
-    if value is None or Path(value).exists():
+    """Refuses a folder without a checkpoint, and a path that does not exist, which LeRobot looks up on the Hub."""
+    if value is None:
+        return
+    if Path(value).exists():
+        if Path(value).is_dir() and find_policy_folder(Path(value)) is None:
+            raise FileFormatError(value, f"a checkpoint or the folder of a run for --{name}", "none in this folder")
         return
     expected = f"a file or folder for --{name}"
     if value.endswith((".json", ".yaml", ".yml")):

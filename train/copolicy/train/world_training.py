@@ -45,22 +45,23 @@ def with_world_defaults(flags: Sequence[str]) -> list[str]:
     return [*added, *flags]
 
 
-def require_right_trainer(config: Any, in_world: bool) -> None:
+def require_right_trainer(config: Any, in_world: bool, source: str | None = None) -> None:
     """Refuses a policy that the other command trains.
 
     Args:
         config: LeRobot's `TrainPipelineConfig`.
         in_world: the command is `copolicy-train cogail`.
+        source: the run or checkpoint that the policy is of, if it is not new.
 
     Raises:
-        InvalidValueError: names the command.
+        InvalidValueError: names the command, and the run or else the flag.
     """
-    found = None if config.policy is None else config.policy.type
+    found, where = (None if config.policy is None else config.policy.type), source or "--policy.type"
     if in_world and found != IN_WORLD:
-        raise InvalidValueError("--policy.type", f"{IN_WORLD}, or the command copolicy-train alone", found)
+        raise InvalidValueError(where, f"{IN_WORLD}, or the command copolicy-train alone", found)
     if not in_world and found == IN_WORLD:
         expected = f"a policy that learns from batches, or the command copolicy-train {IN_WORLD}"
-        raise InvalidValueError("--policy.type", expected, found)
+        raise InvalidValueError(where, expected, found)
 
 
 def trainer_of(in_world: bool) -> Callable[[Any, PairSplit | None], None]:

@@ -69,13 +69,13 @@ def record_conditions(config: PairPolicyConfig, meta: Any, episodes: Collection[
     """
     fps = float(meta.fps)
     if config.fps is not None and config.fps != fps:
-        logging.warning("The policy was trained at %g frames a second; these data have %g", config.fps, fps)
+        logging.warning("The policy was trained at %g frames a second; %s has %g", config.fps, meta.repo_id, fps)
     config.fps = fps
     for name, frames in config.frames_at_30_hz.items():
         if fps != _PUBLISHED_FPS and getattr(config, name) == frames:
             logging.warning(
-                "%s: %s = %d is for data of %d frames a second, and these have %g; convert with --fps %d, or "
-                "multiply all settings in frames by %.2g", config.type, name, frames, _PUBLISHED_FPS, fps,
+                "%s: %s = %d is for data of %d frames a second, and %s has %g; convert with --fps %d, or "
+                "multiply all settings in frames by %.2g", config.type, name, frames, _PUBLISHED_FPS, meta.repo_id, fps,
                 _PUBLISHED_FPS, fps / _PUBLISHED_FPS,
             )  # fmt: skip
     counts = _settings_counts(meta, episodes)
