@@ -75,9 +75,9 @@ def _bc(preset: str, fps: int, recipe: str | None = None, steps: int = 6_000, fl
     return Row(flags, preset, recipe or _recipe(preset), bf16=False, **settings)
 
 
-def _vrnn(preset: str, steps: int = 10_000, **changed: object) -> Row:
+def _vrnn(preset: str, steps: int = 10_000, flags: tuple[str, ...] = (), **changed: object) -> Row:
     settings = {"policy": "vrnn", "fps": _RIVALS_HZ}
-    return Row(policy_flags(**changed), preset, _recipe(preset), steps, 64, bf16=False, **settings)
+    return Row((*flags, *policy_flags(**changed)), preset, _recipe(preset), steps, 64, bf16=False, **settings)
 
 
 def _cogail(preset: str, steps: int = 6_000_000, **changed: object) -> Row:
@@ -86,6 +86,7 @@ def _cogail(preset: str, steps: int = 6_000_000, **changed: object) -> Row:
     return Row(policy_flags(**changed), preset, _recipe(preset), steps, 1, bf16=False, **settings)
 
 
+_FIRST_FILES = f"--dataset.episodes={list(range(30))}".replace(" ", "")  # all that the published loader read
 # Single published choices of the training, each in the corrected settings; those of execution: rival_settings.py.
 _VRNN_CHOICES: Mapping[str, Mapping[str, Any]] = {
     "loss": {"loss_balance": "published"},
@@ -121,7 +122,7 @@ def _lerobot(policy: str, steps: int, *flags: str) -> Row:
 
 ROWS: Mapping[str, Row] = {
     "codp-h": Row(),
-    "codp-h-long": Row(steps=24_000),
+    "codp-h-long": Row(steps=12_000),
     "codp-h-orientations": Row(recipe=_ORIENTATIONS),
     "codp": Row(policy_flags(past_human_action=False)),
     "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
@@ -154,6 +155,7 @@ ROWS: Mapping[str, Row] = {
     "vrnn": _vrnn("default"),
     "vrnn-long": _vrnn("default", 25_000),
     "vrnn-longer": _vrnn("default", 60_000),
+    "vrnn-30-files": _vrnn("default", flags=(_FIRST_FILES,)),
     "vrnn-scan": _vrnn("scan"),
     "vrnn-scan-long": _vrnn("scan", 25_000),
     "vrnn-scan-longer": _vrnn("scan", 60_000),

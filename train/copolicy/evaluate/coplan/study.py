@@ -98,7 +98,8 @@ def write_coplan_result(
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     success = result["summary"]["success"]
-    title = f"co-planning on {settings['maps']}: {percent(success)} of {success['episodes']} episodes"
+    rate = f"{percent(success)} of {success['episodes']} episodes"
+    title = f"{policy.name} in co-planning on {settings['maps']}, in simulation: {rate}"
     if protocol.task.outline is not None:
         save_path_figure(episodes, out.with_suffix(".png"), title)
     named = ((policy.name, episode) for episode in episodes)
