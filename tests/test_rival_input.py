@@ -3,14 +3,17 @@
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet as pq
 import pytest
 from policy_runs import save_run
 
+from copolicy.dataset.exceptions import FileFormatError
 from copolicy.dataset.features import ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.evaluate.cli import main as evaluate
 from copolicy.train.cli import main as train
+from copolicy.train.suitability import require_fitting_data
 
 
 def _refused(capsys, main, *flags: object) -> str:
@@ -107,9 +110,21 @@ def test_a_resumed_run_keeps_its_method_and_rate(data_set, tmp_path, capsys):
 def test_a_folder_without_a_checkpoint(tmp_path, capsys, flag):
     folder = tmp_path / "recordings"
     folder.mkdir()
-    line = _refused(capsys, train, f"--{flag}={folder}", f"--dataset.root={tmp_path}")
+    assert train([f"--{flag}={folder}", f"--dataset.root={tmp_path}"]) == 2
     expected = f"a checkpoint or the folder of a run for --{flag}"
-    assert line == f"copolicy-train: {folder}: expected {expected}, found none in this folder"
+    assert capsys.readouterr().err == f"copolicy-train: {folder}: expected {expected}, found none in this folder\n"
+
+
+def test_a_renamed_column_is_found(data_set, tmp_path):
+    root = _without(data_set, STATE, tmp_path / "set")
+    info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
+    config = SimpleNamespace(resume=False, policy=SimpleNamespace(type="act"), rename_map={"observation.pose": STATE})
+    config.dataset = SimpleNamespace(root=root)
+    with pytest.raises(FileFormatError, match=f"the column {STATE}, which act reads"):
+        require_fitting_data(config, None)
+    info["features"]["observation.pose"] = {"dtype": "float32", "shape": [7]}
+    (root / "meta" / "info.json").write_text(json.dumps(info), encoding="utf-8")
+    require_fitting_data(config, None)
 
 
 def test_a_rate_that_the_task_does_not_have(tmp_path, capsys):

@@ -270,7 +270,7 @@ def test_it_is_evaluated_and_described(run, tmp_path):
     card = (tmp_path / "exported" / "README.md").read_text(encoding="utf-8")
     assert "| `type` | vrnn |" in card
     assert "| `controller` | velocity |" in card
-    assert "`kl_steps`" not in card
+    assert "`device`" not in card
     assert load_policy(tmp_path / "exported").weights_sha256 == result["policy"]["weights_sha256"]
 
 

@@ -5,6 +5,8 @@ from typing import Any
 
 from huggingface_hub import ModelCardData
 
+from copolicy.dataset.policies.training_run import PLACE_SETTINGS
+
 from .checkpoint_facts import CheckpointFacts
 from .dataset_card import citation, source_text
 from .formatting import count_text, counts_text, table
@@ -19,11 +21,7 @@ _SETTINGS = (
     "permute_obstacles", "ema", "fps",
 )  # fmt: skip
 _CHOSEN_FOR = "copolicy"  # the policy type whose distinguishing settings are all above; of others all are stated
-# Entries of `config.json` that other sections state, or that say where a policy was trained and kept.
-_NO_SETTINGS = {
-    "device", "kl_steps", "license", "physics", "pretrained_path", "pretrained_revision", "private", "push_to_hub",
-    "repo_id", "tags", "task", "unseen", "use_amp", "use_peft",
-}  # fmt: skip
+_STATED_ELSEWHERE = ("physics", "task", "use_amp", "use_peft")  # in other sections, or with the training
 _UNET_SETTINGS = {"down_widths", "inpainting"}
 _WITHOUT_EFFECT = {  # by network
     "transformer": _UNET_SETTINGS,
@@ -135,10 +133,8 @@ def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, 
     averaged = (checkpoint.recipe.get("weights") or {}).get("averaged")
     # Stated in another row, or without effect.
     skipped = ({"ema"} if averaged else set()) | _WITHOUT_EFFECT.get(checkpoint.config.get("network") or "", set())
-    names = [
-        key for key in (*_SETTINGS, *_own_settings(checkpoint.config)) if key in checkpoint.config.keys() - skipped
-    ]
-    rows = [(f"`{key}`", checkpoint.config[key]) for key in names]
+    names = (*_SETTINGS, *_own_settings(checkpoint.config))
+    rows = [(f"`{key}`", checkpoint.config[key]) for key in names if key in checkpoint.config.keys() - skipped]
     training = [
         (f"training `{key}`", checkpoint.training[key]) for key in _TRAINING if checkpoint.training.get(key) is not None
     ]
@@ -162,7 +158,7 @@ def _own_settings(config: Mapping[str, Any]) -> list[str]:
     return [
         name
         for name, value in config.items()
-        if name not in _NO_SETTINGS.union(_SETTINGS)
+        if name not in (*_SETTINGS, *PLACE_SETTINGS, *_STATED_ELSEWHERE)
         and not name.startswith(("optimizer_", "scheduler_"))
         and not (value is None or value == [] or isinstance(value, dict))
     ]

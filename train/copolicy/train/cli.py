@@ -319,7 +319,8 @@ def _check_local_path(name: str, value: str | None) -> None:
     if value is None:
         return
     if Path(value).exists():
-        if Path(value).is_dir() and find_policy_folder(Path(value)) is None:
+        needed = _SETTINGS if name == "config_path" else "config.json"  # weights may be adapters
+        if Path(value).is_dir() and find_policy_folder(Path(value), (needed,)) is None:
             raise FileFormatError(value, f"a checkpoint or the folder of a run for --{name}", "none in this folder")
         return
     expected = f"a file or folder for --{name}"

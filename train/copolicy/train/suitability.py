@@ -41,7 +41,7 @@ def require_fitting_data(config: Any, source: str | None) -> None:
     """
     root, policy = Path(config.dataset.root), config.policy
     info = read_optional_json(root / INFO_FILE, dict[str, Any], "a data set's meta/info.json") or {}
-    features = info.get("features") or {}
+    features = {config.rename_map.get(name, name): value for name, value in (info.get("features") or {}).items()}
     if policy is None:
         return
     for name in _columns(policy, features):

@@ -6,6 +6,12 @@ from pathlib import Path
 POLICY_FILES = ("config.json", "model.safetensors")
 """Files in a folder that a policy can be loaded from."""
 
+PLACE_SETTINGS = (
+    "device", "license", "physics_mixture", "pretrained_path", "pretrained_revision", "private", "push_to_hub",
+    "repo_id", "tags", "unseen",
+)  # fmt: skip
+"""Entries of `config.json` that say where a policy was trained and kept, not which it is."""
+
 _CHECKPOINTS, _LAST, _POLICY = "checkpoints", "last", "pretrained_model"
 
 

@@ -12,7 +12,7 @@ from copolicy.collect.agents.training_conditions import TrainingConditions, trai
 from copolicy.dataset.exceptions import FileFormatError, InvalidValueError
 from copolicy.dataset.files.json_file import read_json, read_optional_json
 from copolicy.dataset.files.listing import is_hidden
-from copolicy.dataset.policies.training_run import find_policy_folder
+from copolicy.dataset.policies.training_run import PLACE_SETTINGS, find_policy_folder
 from copolicy.dataset.task import PublishedMethod, Studies
 from copolicy.train.recipe import RECIPE_FILE, TRAINING_FILE, reached_training
 
@@ -20,11 +20,6 @@ from ..file_names import split_name
 from .result_files import json_files, read_result
 
 _SECONDS = "seconds.json"
-# Entries of `config.json` that say where a policy was trained and kept, not which.
-_PLACES = (
-    "device", "license", "physics_mixture", "pretrained_path", "pretrained_revision", "private", "push_to_hub",
-    "repo_id", "tags", "unseen",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,7 +94,7 @@ class TrainingRun:
     @property
     def policy_settings(self) -> dict[str, Any]:
         """The entries of `config.json` that say which policy it is, not where it was trained and kept."""
-        return {name: value for name, value in self.config.items() if name not in _PLACES}
+        return {name: value for name, value in self.config.items() if name not in PLACE_SETTINGS}
 
 
 @dataclass(frozen=True)
