@@ -19,7 +19,9 @@ from copolicy.train.suitability import require_fitting_data
 def _refused(capsys, main, *flags: object) -> str:
     capsys.readouterr()
     assert main([str(flag) for flag in flags]) == 2
-    return capsys.readouterr().err.strip().splitlines()[-1]
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert [line for line in lines if line.startswith(("copolicy-", "Traceback"))] == lines[-1:], lines
+    return lines[-1]
 
 
 def test_settings_of_one_method_for_a_checkpoint_of_another(tmp_path, capsys):

@@ -112,8 +112,8 @@ _COGAIL_CHOICES: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def _cnn(preset: str, steps: int = 5_000) -> Row:
-    return Row((), preset, _recipe(preset), steps, 256, bf16=False)
+def _cnn(preset: str, steps: int = 5_000, recipe: str | None = None, flags: tuple[str, ...] = ()) -> Row:
+    return Row(flags, preset, recipe or _recipe(preset), steps, 256, bf16=False)
 
 
 def _lerobot(policy: str, steps: int, *flags: str) -> Row:
@@ -153,6 +153,7 @@ ROWS: Mapping[str, Row] = {
     "cnn-small": _cnn("cnn-small", 800),
     "cnn-small-long": _cnn("cnn-small", 3_200),
     "cnn-small-longer": _cnn("cnn-small", 6_400),
+    "cnn-small-paper": _cnn("cnn-small", 3_200, _ORDERS, policy_flags(**_PAPER_INPUTS)),
     "vrnn-paper": _vrnn("paper"),
     "vrnn": _vrnn("default"),
     "vrnn-long": _vrnn("default", 25_000),
