@@ -48,6 +48,9 @@ def test_the_defaults_are_robomimics():
     optimizer = settings.get_optimizer_preset()
     assert (optimizer.lr, optimizer.weight_decay, optimizer.grad_clip_norm) == (1e-4, 0.0, 0.0)
     assert settings.get_scheduler_preset() is None
+    decaying = config(scheduler_final_lr_fraction=0.25).get_scheduler_preset()
+    assert decaying is not None
+    assert (decaying.num_warmup_steps, decaying.final_lr_fraction) == (0, 0.25)
 
 
 @pytest.mark.parametrize(
@@ -72,6 +75,7 @@ def test_a_preset_chooses_the_inputs(preset, features, symmetries, size):
         ({"n_modes": 0}, InvalidValueError, "n_modes: expected at least 1, found 0"),
         ({"min_deviation": 0.0}, InvalidValueError, "min_deviation: expected a number above 0, found 0"),
         ({"optimizer_lr": float("nan")}, InvalidValueError, "optimizer_lr"),
+        ({"scheduler_final_lr_fraction": 1.5}, InvalidValueError, "scheduler_final_lr_fraction: expected 0 to 1"),
         ({"mirror": True, "task": "peg"}, InvalidValueError, "mirror"),
     ],
 )

@@ -13,7 +13,7 @@ from copolicy.dataset.exceptions import CopolicyError, InvalidValueError, ShapeE
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE
 from copolicy.tasks.table.features import FEATURES
 from lerobot_policy_copolicy import CopolicyConfig
-from lerobot_policy_copolicy.copolicy.learning_rate import WarmupCosineSchedulerConfig
+from lerobot_policy_copolicy.pair_policy.learning_rate import WarmupCosineSchedulerConfig
 
 
 def features() -> tuple[dict, dict]:

@@ -10,8 +10,8 @@ from copolicy.dataset.exceptions import InvalidValueError
 
 from ..pair_policy.bounds import FRACTION, POSITIVE, Bounds
 from ..pair_policy.configuration_pair import PairPolicyConfig
+from ..pair_policy.learning_rate import WarmupCosineSchedulerConfig
 from .fast.backend import AUTO, BACKENDS
-from .learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 
 _CHOICES = {

@@ -9,9 +9,9 @@ from lerobot.optim import AdamConfig
 from copolicy.dataset.exceptions import InvalidValueError
 from copolicy.dataset.task import get_task
 
-from ..copolicy.learning_rate import WarmupCosineSchedulerConfig
 from ..pair_policy.bounds import POSITIVE, Bounds
 from ..pair_policy.configuration_pair import PairPolicyConfig
+from ..pair_policy.learning_rate import WarmupCosineSchedulerConfig
 from .presets import PRESETS
 
 _COUNT = Bounds(1)
