@@ -63,6 +63,11 @@ def _recipe(preset: str) -> str:
     return "pairs-sim-376" if preset in ("scan", "small", "cnn-small") else _ORDERS
 
 
+def _codp(recipe: str = "pairs-sim-376", steps: int = 6_000, **changed: object) -> Row:
+    """The MLP of the preset `small`, in float32 as the other methods."""
+    return Row(policy_flags(**changed), recipe=recipe, steps=steps, bf16=False)
+
+
 def _bc(preset: str, fps: int, recipe: str | None = None, steps: int = 6_000, flags: tuple[str, ...] = _BC_RATE) -> Row:
     """robomimic's batch; `_BC_RATE` on a short budget."""
     settings = {"policy": "bc_lstm_gmm", "fps": fps, "steps": steps, "batch": 100}
@@ -115,17 +120,17 @@ def _lerobot(policy: str, steps: int, *flags: str) -> Row:
 
 
 ROWS: Mapping[str, Row] = {
-    "codp-h": Row(),
-    "codp-h-long": Row(steps=12_000),
-    "codp-h-orientations": Row(recipe=_ORIENTATIONS),
-    "codp": Row(policy_flags(past_human_action=False)),
-    "codp-h-paper": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS),
-    "codp-h-paper-long": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS, steps=18_000),
-    "codp-h-paper-longer": Row(policy_flags(**_PAPER_INPUTS), recipe=_ORDERS, steps=36_000),
-    "codp-paper": Row(policy_flags(past_human_action=False, **_PAPER_INPUTS), recipe=_ORDERS),
-    "codp-paper-long": Row(policy_flags(past_human_action=False, **_PAPER_INPUTS), recipe=_ORDERS, steps=18_000),
-    "codp-h-paper-settings": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=20_000),
-    "codp-h-paper-settings-long": Row(policy_flags(**_PAPER_SETTINGS), recipe=_ORDERS, steps=40_000),
+    "codp-h": _codp(),
+    "codp-h-long": _codp(steps=12_000),
+    "codp-h-orientations": _codp(_ORIENTATIONS),
+    "codp": _codp(past_human_action=False),
+    "codp-h-paper": _codp(_ORDERS, **_PAPER_INPUTS),
+    "codp-h-paper-long": _codp(_ORDERS, 18_000, **_PAPER_INPUTS),
+    "codp-h-paper-longer": _codp(_ORDERS, 36_000, **_PAPER_INPUTS),
+    "codp-paper": _codp(_ORDERS, past_human_action=False, **_PAPER_INPUTS),
+    "codp-paper-long": _codp(_ORDERS, 18_000, past_human_action=False, **_PAPER_INPUTS),
+    "codp-h-paper-settings": _codp(_ORDERS, 20_000, **_PAPER_SETTINGS),
+    "codp-h-paper-settings-long": _codp(_ORDERS, 40_000, **_PAPER_SETTINGS),
     "bc-paper": _bc("paper", _RIVALS_HZ),
     "bc-paper-10hz": _bc("paper", 10),
     "bc-paper-rate": _bc("paper", _RIVALS_HZ, steps=15_000, flags=()),  # rows "rate": the published constant one
