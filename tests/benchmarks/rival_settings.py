@@ -46,6 +46,7 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "one sampled future, no choice": _ONE,
         "one sampled future, absent obstacles are copies of the last": {**_ONE, "repeat_last_obstacle": True},
         "sampled futures of twice the deviation": {"temperature": 2.0},
+        "cosines and sines that leave the circle": {"heading_on_circle": False},
     },
     "bc_lstm_gmm": {
         "state never reset": {"sequence_length": 100_000},

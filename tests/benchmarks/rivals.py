@@ -93,7 +93,6 @@ _VRNN_CHOICES: Mapping[str, Mapping[str, Any]] = {
     "prior": {"encoded_frames": 30},
     "scene-axes": {"motion_axes": "scene"},
     "px": {"scaled_rows": False, "loss_balance": "published"},  # the other balance is of scaled rows
-    "off-circle": {"heading_on_circle": False},
     "no-pose": {"observe_pose": False},
     "cycles": {"kl_cycles": 4, "kl_ramp": 0.5},
     "weight-decay": {"optimizer_weight_decay": 0.2},
