@@ -20,6 +20,7 @@ def _refused(capsys, main, *flags: object) -> str:
     capsys.readouterr()
     assert main([str(flag) for flag in flags]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
+    # The refusal is the last line and the only one of the command; libraries may log before it.
     assert [line for line in lines if line.startswith(("copolicy-", "Traceback"))] == lines[-1:], lines
     return lines[-1]
 

@@ -1,11 +1,11 @@
 """How the failed episodes of a policy end: head-on at an obstacle, beside one, at a wall, or out of time.
 
     uv run copolicy-eval coplan --policy RUN --maps unseen --trajectories --out outputs/bc.json
-    uv run python tests/benchmarks/failures.py outputs/bc.trajectories.parquet
+    uv run python tests/benchmarks/failures.py outputs/bc.json
 
-A table that ends at an obstacle met it head-on if its centre is still before the obstacle, seen from the start towards
-the goal along x, by more than half the obstacle and `MARGIN`; else it is beside it or has passed it. The nearest
-obstacle counts.
+A contact with an obstacle is head-on if the centre of the table is more than `MARGIN` before the edge of the obstacle,
+along x towards the goal; else the table is beside the obstacle or has passed it. The obstacle nearest to the centre
+counts. For the table alone, whose maps are crossed along x.
 """
 
 import argparse
@@ -13,43 +13,50 @@ import math
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
-
 from copolicy.dataset.arrays import Array
 from copolicy.evaluate.trajectories import Trajectory, read_trajectories
 from copolicy.tasks.table.map_config import MapConfig
 
 MARGIN = 10.0
-"""px between the centre of the table and the near edge of an obstacle, from which on the table is beside it."""
+"""px; a contact with the centre of the table at most this far before the edge of the obstacle is "beside"."""
 
-KINDS = ("head-on", "beside", "wall", "timeout")
+KINDS = {
+    "head-on": "collision_obstacle",
+    "beside": "collision_obstacle",
+    "wall": "collision_wall",
+    "timeout": "timeout",
+}
+"""Kinds of failures, and the reasons that the world gives for them."""
 
 
 def kind_of_failure(episode: Trajectory) -> str:
-    """One of `KINDS`, for an episode of the table that failed in a study."""
-    reason = str(episode.columns["reason"])
-    if reason != "collision_obstacle":
-        return {"collision_wall": "wall", "timeout": "timeout"}[reason]
-    return _meeting(episode.every_state[-1, :2], episode.scenario)
+    """One of `KINDS`, for an episode of the table that failed."""
+    reason = episode.columns["reason"]
+    kinds = [kind for kind, of_reason in KINDS.items() if of_reason == reason]
+    if len(kinds) == 1:
+        return kinds[0]
+    return "head-on" if _distance_before_obstacle(episode.every_state[-1, :2], episode.scenario) > MARGIN else "beside"
 
 
-def _meeting(centre: Array, scenario: MapConfig) -> str:
-    """How a table with its centre at `(2,)` met the nearest obstacle."""
-    middle, size = min(scenario.squares, key=lambda square: math.dist(square[0], centre))
-    ahead = (middle[0] - centre[0]) * np.sign(scenario.goal[0] - scenario.start[0])
-    return "head-on" if ahead > size / 2 + MARGIN else "beside"
+def _distance_before_obstacle(centre: Array, scenario: MapConfig) -> float:
+    """Distance in px along x from the centre of the table, `(2,)`, to the near edge of the nearest obstacle."""
+    obstacle, size = min(scenario.squares, key=lambda square: math.dist(square[0], centre))
+    towards_goal = 1 if scenario.goal[0] >= scenario.start[0] else -1
+    return float(obstacle[0] - centre[0]) * towards_goal - size / 2
 
 
 def main() -> None:
     """Prints a Markdown table, a line for each file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("files", nargs="+", type=Path, help="trajectories of copolicy-eval coplan --trajectories")
+    parser.add_argument("files", nargs="+", type=Path, help="results of copolicy-eval coplan --trajectories")
     arguments = parser.parse_args()
     print(f"| file | episodes | failures | {' | '.join(KINDS)} |\n|---|{'---:|' * (2 + len(KINDS))}")
     for file in arguments.files:
-        episodes = read_trajectories(file).episodes
-        counts = Counter(kind_of_failure(episode) for episode in episodes if not episode.columns["success"])
-        cells = [len(episodes), counts.total(), *(counts[kind] for kind in KINDS)]
+        found = read_trajectories(file)
+        if (task := found.task.spec.name) != "table":
+            raise SystemExit(f"{file}: expected trajectories of the task table, found {task}")
+        counts = Counter(kind_of_failure(episode) for episode in found.episodes if not episode.columns["success"])
+        cells = [len(found.episodes), counts.total(), *(counts[kind] for kind in KINDS)]
         print(f"| {file.name} | {' | '.join(map(str, cells))} |")
 
 

@@ -31,7 +31,7 @@ import torch
 from lerobot.configs import FeatureType, PolicyFeature, PreTrainedConfig
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.utils.import_utils import register_third_party_plugins
-from rivals import ACT_NETWORK, DIFFUSION_NETWORK
+from rival_rows import ACT_NETWORK, DIFFUSION_NETWORK
 
 from copolicy.dataset.exceptions import CopolicyError
 from copolicy.dataset.features import ACTION, ENVIRONMENT_STATE, HUMAN_ACTION, STATE, bounds_of, features_of

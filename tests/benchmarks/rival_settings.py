@@ -40,13 +40,14 @@ CHANGES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "proportional controller": _PROPORTIONAL,
         "proportional controller, forces of unit norm": _UNIT_FORCE,
         "the latter, angles not wrapped": {**_UNIT_FORCE, "wrapped_angle": False},
-        "all of these but the velocity": {
+        "cosines and sines that leave the circle": {"heading_on_circle": False},
+        "all published choices but the velocity": {
             **_UNIT_FORCE, **_FAR, "wrapped_angle": False, "zero_history": True, "repeat_last_obstacle": True,
+            "heading_on_circle": False,
         },
         "one sampled future, no choice": _ONE,
         "one sampled future, absent obstacles are copies of the last": {**_ONE, "repeat_last_obstacle": True},
         "sampled futures of twice the deviation": {"temperature": 2.0},
-        "cosines and sines that leave the circle": {"heading_on_circle": False},
     },
     "bc_lstm_gmm": {
         "state never reset": {"sequence_length": 100_000},

@@ -65,9 +65,7 @@ class BcLstmGmmConfig(PairPolicyConfig):
     optimizer_lr: float = 1e-4  # learning rate of Adam
     optimizer_weight_decay: float = 0.0  # weight decay of Adam
     optimizer_grad_clip_norm: float = 0.0  # largest gradient norm; 0 does not clip
-    # Learning rate of the last update, as a fraction of the first; below 1 it falls by a cosine, as short trainings of
-    # scaled inputs need (with optimizer_lr=1e-3 and 0 a thirtieth of robomimic's windows suffices).
-    scheduler_final_lr_fraction: float = 1.0
+    scheduler_final_lr_fraction: float = 1.0  # final learning rate of a cosine decay; 1: constant, as in robomimic
 
     def _validate(self) -> None:
         """The masked elements are of the task's state.
@@ -99,7 +97,7 @@ class BcLstmGmmConfig(PairPolicyConfig):
         )
 
     def get_scheduler_preset(self) -> WarmupCosineSchedulerConfig | None:
-        """None, a constant learning rate, or a cosine decay to `scheduler_final_lr_fraction`."""
+        """Cosine decay to `scheduler_final_lr_fraction` of the learning rate; None, a constant rate, if it is 1."""
         if self.scheduler_final_lr_fraction == 1:
             return None
         return WarmupCosineSchedulerConfig(0, self.scheduler_final_lr_fraction)

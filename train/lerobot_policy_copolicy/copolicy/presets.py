@@ -31,9 +31,9 @@ PRESETS: dict[str, dict] = {
     },
 }
 
-# The paper's network with changes that raise closed-loop success: the network predicts the actions instead of the noise,
-# goal and obstacles are relative to the table and seen by a range scan, the task's symmetries augment the data, and ten
-# deterministic steps sample. Effects of each: train/docs/results.md.
+# The paper's network with changes that raise closed-loop success: it predicts the actions instead of the noise, goal
+# and obstacles are relative to the table and seen by a range scan, the task's symmetries augment the data, and it
+# samples with ten deterministic steps. Effects: train/docs/results.md.
 PRESETS["default"] = {
     **PRESETS["paper"],
     "observation_features": "scan",
