@@ -94,9 +94,8 @@ def main() -> None:
     n_obstacles = np.array([len(scenario.obstacles) for scenario in maps])
     numbers = [f"{number} obstacles ({(n_obstacles == number).sum()})" for number in np.unique(n_obstacles)]
     columns = ["policy", "seeds", "success", "first minus it", *numbers]
-    print(
-        f"{len(maps)} layouts of seed {arguments.seed}\n\n| {' | '.join(columns)} |\n|---|{'---:|' * (len(columns) - 1)}"
-    )
+    print(f"{len(maps)} layouts of seed {arguments.seed}\n")
+    print(f"| {' | '.join(columns)} |\n|---|{'---:|' * (len(columns) - 1)}")
     first: Array | None = None
     found: dict[str, Any] = {}
     for name, policies in map(policies_of, arguments.policies):
