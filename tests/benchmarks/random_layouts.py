@@ -92,7 +92,7 @@ def main() -> None:
     arguments = parser.parse_args()
     maps = layouts(arguments.layouts, arguments.seed)
     n_obstacles = np.array([len(scenario.obstacles) for scenario in maps])
-    numbers = [f"{number} obstacles ({(n_obstacles == number).sum()})" for number in np.unique(n_obstacles)]
+    numbers = [f"{number} obst. ({(n_obstacles == number).sum()})" for number in np.unique(n_obstacles)]
     columns = ["policy", "seeds", "success", "first minus it", *numbers]
     print(f"{len(maps)} layouts of seed {arguments.seed}\n")
     print(f"| {' | '.join(columns)} |\n|---|{'---:|' * (len(columns) - 1)}")
