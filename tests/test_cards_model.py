@@ -47,6 +47,7 @@ def run(tmp_path) -> Path:
     training = {
         "dataset": {"repo_id": "lab/table", "root": str(tmp_path / "gone"), "episodes": [0, 2]},
         "steps": 2500, "batch_size": 512, "seed": 7, "optimizer": {"type": "adamw", "lr": 0.001},
+        "scheduler": {"type": "copolicy_cosine", "num_warmup_steps": None, "final_lr_fraction": 0.01},
     }  # fmt: skip
     (folder / "train_config.json").write_text(json.dumps(training), encoding="utf-8")
     return tmp_path / "training"
@@ -90,6 +91,8 @@ def test_a_card_states_what_training_and_evaluation_wrote(run, dataset, tmp_path
     assert "**No person took part.** Two scripted agents" in text
     assert "- Data set: `lab/table`\n- Source: simulated (4)\n- Episodes used: 2 of 4 (50.0 %)" in text
     assert "| training `seed` | 7 |" in text
+    assert "| optimizer `lr` | 0.001 |" in text
+    assert "| scheduler `type` | copolicy_cosine |\n| scheduler `final_lr_fraction` | 0.01 |" in text
     assert "| parameters | 1,132,464 |" in text
     assert f"`{hashlib.sha256(WEIGHTS).hexdigest()}`" in text
     assert str(tmp_path) not in text

@@ -34,7 +34,8 @@ def test_runs_of_a_method_are_the_folders_of_its_seeds(tmp_path):
         (tmp_path / "runs" / seed / "training").mkdir(parents=True)
     runs = [str(tmp_path / "runs" / seed / "training") for seed in ("seed_0", "seed_1")]
     assert random_layouts.policies_of(f"A={tmp_path / 'runs'}") == ("A", runs)
-    assert random_layouts.policies_of("pretrained") == ("pretrained", ["pretrained"])
+    for policy in ("pretrained", "runs/lr=1/training"):
+        assert random_layouts.policies_of(policy) == (policy, [policy])
     (tmp_path / "empty").mkdir()
     with pytest.raises(SystemExit, match="empty: expected a folder for each training seed, found none"):
         random_layouts.policies_of(f"A={tmp_path / 'empty'}")

@@ -20,6 +20,7 @@ from training_study import training_run
 from copolicy.dataset.arrays import Array
 from copolicy.evaluate.comparison.paired import between_runs, clustered_mean
 from copolicy.evaluate.coplan.rollouts import coplan
+from copolicy.evaluate.file_names import split_name
 from copolicy.evaluate.summary import percent, success_rate
 from copolicy.tasks.table.map_config import MapConfig
 from copolicy.tasks.table.physics import Physics
@@ -52,8 +53,8 @@ def policies_of(text: str) -> tuple[str, list[str]]:
     Raises:
         SystemExit: the folder has no runs.
     """
-    name, separator, folder = text.partition("=")
-    if not separator:
+    name, folder = split_name(text)
+    if not name:
         return text, [text]
     runs = [str(training_run(path)) for path in sorted(Path(folder).iterdir()) if path.is_dir()]
     if not runs:

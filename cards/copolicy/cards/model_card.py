@@ -140,6 +140,8 @@ def _configuration(checkpoint: CheckpointFacts, evaluations: Sequence[dict[str, 
     ]
     optimizer = checkpoint.training.get("optimizer") or {}
     training += [(f"optimizer `{key}`", optimizer[key]) for key in ("type", "lr", "weight_decay") if key in optimizer]
+    scheduler = checkpoint.training.get("scheduler") or {}
+    training += [(f"scheduler `{key}`", value) for key, value in scheduler.items() if value is not None]
     sizes = {evaluation["policy"].get("parameters") for evaluation in evaluations} - {None}
     size = [("parameters", f"{parameters:,}") for parameters in sizes]
     weights = [("sha256 of the weights", f"`{checkpoint.weights_sha256}`")]
